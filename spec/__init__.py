@@ -214,8 +214,8 @@ def of_options(options: Mapping[str, str]) -> AnySpec:
 
 def with_axes(spec: TachometerSpec, axes: int, *, parallel: bool) -> AxesSpec:
     """Return a core of so many axes, each of which is as `spec`; ParameterError if there cannot be one."""
-    if not isinstance(spec, STachometer):
-        why = f"must be s together with --axes, not {spec.method}"
+    if not isinstance(spec, STachometer | TrackTachometer):
+        why = f"must be s or track together with --axes, not {spec.method}"
         raise ParameterError("method", why, "is of one axis")
     return AxesSpec(tachometer=spec, axes=axes, parallel=parallel)
 

@@ -15,8 +15,8 @@ _OPTIONS = [
         "--axes",
         type=int,
         metavar="N",
-        help=f"Measure N encoders, up to {MAX_AXES}, with one datapath of method s: a and b have N bits, and what is "
-        "measured comes with the number of its axis. Without it: one encoder, and no such number.",
+        help=f"Measure N encoders, up to {MAX_AXES}, which have a datapath of method s or track in turn: a and b have "
+        "N bits, and what is measured comes with the number of its axis. Without it: one encoder, and no such number.",
     ),
     option(_AXES, "--parallel", is_flag=True, help="With --axes: outputs for each axis, which hold its values."),
 ]

@@ -16,7 +16,7 @@ def print_axes_core(spec: AxesSpec) -> None:
         "greatest speed": f"{speed_text(greatest)} ({axis.widths.max_velocity} counts per tick)",
         "full scale": full_scale_text(alone, axis.scale.full_scale),
         "widths": ", ".join(f"{port.name} {port.width}" for port in axis.ports.outputs if port.width > 1),
-        "reciprocal": f"{memory_text(*spec.words.memory)}; there is no time to divide between two axes",
+        **_reciprocal(spec),
         **{name: plural(clocks, "clock") for name, clocks in latencies.items()},
         "tick_to_velocity": "0 clocks: velocity_valid comes together with tick",
     }
@@ -26,3 +26,10 @@ def print_axes_core(spec: AxesSpec) -> None:
     )
     rows = [(name, own.get(name, value)) for name, value in configuration(alone) if name != "note"]
     print_rows([rows[0], ("axes", turns), *rows[1:], *(("note", note) for note in spec.words.notes)])
+
+
+def _reciprocal(spec: AxesSpec) -> dict[str, str]:
+    memory = spec.words.memory
+    return (
+        {} if memory is None else {"reciprocal": f"{memory_text(*memory)}; there is no time to divide between two axes"}
+    )

@@ -13,7 +13,7 @@ from tachometry.hdl.output.update import update_layout
 from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput
 from tachometry.hdl.wires.delay import delay
 from tachometry.spec.methods.axes import AxesSpec
-from tachometry.spec.methods.axis import DECIDE, READ
+from tachometry.spec.methods.s_axis import DECIDE, READ, SAxis
 
 _UPDATE = ("velocity", "interval", "forced")
 
@@ -66,6 +66,7 @@ class AxesDatapath(wiring.Component):
     def __init__(self, spec: AxesSpec) -> None:
         self._spec = spec
         axis = spec.axis
+        assert isinstance(axis, SAxis)
         self.turns = Turns(spec.axes, spec.turn_cycles)
         self.window = AxisWindow(
             max_ticks=axis.timing.max_ticks,
@@ -75,7 +76,7 @@ class AxesDatapath(wiring.Component):
             cancel=axis.cancel,
         )
         self.quotient = Quotient(
-            spec.reciprocal,
+            axis.form.looked_up,
             quotients={"velocity": (axis.widths.native, 0)},
             numerator_width=axis.form.numerator_width,
             tag=data.StructLayout({"forced": 1}),

@@ -7,9 +7,11 @@ from amaranth.lib import wiring
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleRounds, idle_of
 from tachometry.hdl.axes.axes_datapath import AxesDatapath
+from tachometry.hdl.axes.axes_track_datapath import AxesTrackDatapath
 from tachometry.hdl.axes.axis_counters import AxisCounters, of_slot
 from tachometry.hdl.axes.axis_filter import AxisFilter
 from tachometry.hdl.axes.axis_index import AxisIndex
+from tachometry.hdl.axes.axis_tick_counts import AxisTickCounts
 from tachometry.hdl.axes.held_outputs import HeldOutputs
 from tachometry.hdl.axes.rounds import Rounds
 from tachometry.hdl.wires.delay import delay
@@ -18,6 +20,7 @@ from tachometry.hdl.wires.synchronizer import Synchronizer
 from tachometry.spec.language.port import INDEX, TICK, UPDATE
 from tachometry.spec.methods.axes import AxesSpec
 from tachometry.spec.methods.axis import WARM_UP
+from tachometry.spec.methods.track_axis import TrackAxis
 
 
 class AxesTachometer(wiring.Component):
@@ -41,10 +44,15 @@ class AxesTachometer(wiring.Component):
         self.axis_filter: AxisFilter | None = None
         if spec.axis.filter_clocks:
             self.axis_filter = AxisFilter(slots=spec.slots, looks=spec.axis.filter_clocks, lines=spec.lines)
-        self.axis_counters = AxisCounters(
-            slots=spec.slots, rounds=times.longest_tick, decoding=spec.axis.encoder.decoding
-        )
-        self.datapath = AxesDatapath(spec)
+        decoding = spec.axis.encoder.decoding
+        self.axis_counters: AxisCounters | AxisTickCounts
+        self.datapath: AxesDatapath | AxesTrackDatapath
+        if isinstance(spec.axis, TrackAxis):
+            self.axis_counters = AxisTickCounts(slots=spec.slots, form=spec.axis.form, decoding=decoding)
+            self.datapath = AxesTrackDatapath(spec)
+        else:
+            self.axis_counters = AxisCounters(slots=spec.slots, rounds=times.longest_tick, decoding=decoding)
+            self.datapath = AxesDatapath(spec)
         self.axis_index: AxisIndex | None = None
         if spec.axis.index:
             self.axis_index = AxisIndex(slots=spec.slots, width=spec.axis.position_width, resets=spec.axis.index_reset)

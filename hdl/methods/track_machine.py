@@ -87,9 +87,14 @@ class TrackMachine(wiring.Component):
     Parameters
     ----------
     program : Program
+    others : Program
+        Of further axes, which have the machine in turn; they differ in their words alone.
 
     Members
     -------
+    axis : In(range(axes))
+        Only with other axes: whose words they are, from `begin` to the end. All have begun once before the first
+        begins again.
     begin : In(1)
     number, times, places, last, moved, length : In
         What the tick had; they hold until the next, as all inputs do.
@@ -99,12 +104,14 @@ class TrackMachine(wiring.Component):
         They are those of this tick `program.clocks` after `begin`, and two more.
     """
 
-    def __init__(self, program: Program) -> None:
+    def __init__(self, program: Program, *others: Program) -> None:
         self._program = program
+        self._axes = (program, *others)
         form = program.form
         self.unit = (QuickUnit if program.times == QUICK else SmallUnit)(program)
         super().__init__(
             {
+                **({"axis": In(range(len(self._axes)))} if others else {}),
                 "begin": In(1),
                 "number": In(form.number_bits),
                 "times": In(form.times_bits),
@@ -130,8 +137,8 @@ class TrackMachine(wiring.Component):
         )
         m.submodules.words = words = Memory(
             shape=signed(WIDTH),
-            depth=1 << ADDRESS_BITS,
-            init=list(program.words.values()),
+            depth=len(self._axes) << ADDRESS_BITS,
+            init=self._contents(),
             attrs={"no_rw_check": 1},  # the program reads no word in the clock in which it is written
         )
         fetch = rom.read_port()
@@ -155,14 +162,16 @@ class TrackMachine(wiring.Component):
             place.eq(Mux(taken, Cat(now.how, now.store), pc)),
             fetch.addr.eq(place),
             fetch.en.eq(~hold),
-            read.addr.eq(self._chosen(m, coming.word)),
+            read.addr.eq(self._at(self._chosen(m, coming.word))),
             read.en.eq(~hold),
             go.eq(active & ~hold),
         ]
         with m.If(~hold):
             m.d.sync += [now.eq(coming), active.eq(fetched & ~taken & ~stop), pc.eq(place + 1)]
         with m.If(stop):
-            m.d.sync += [fetched.eq(0), first.eq(0), pc.eq(labels["tick"])]
+            m.d.sync += [fetched.eq(0), pc.eq(labels["tick"])]
+            with m.If(self._is_last()):
+                m.d.sync += first.eq(0)
         with m.If(self.begin):
             m.d.sync += fetched.eq(1)
         with m.Elif(~fetched & ~active):
@@ -199,7 +208,7 @@ class TrackMachine(wiring.Component):
             m.d.sync += sign.eq(total[-1])
         m.d.comb += [
             write.en.eq(go & now.writes),
-            write.addr.eq(Mux(now.store[3:ADDRESS_BITS].all(), self.kind, now.store[:ADDRESS_BITS])),
+            write.addr.eq(self._at(Mux(now.store[3:ADDRESS_BITS].all(), self.kind, now.store[:ADDRESS_BITS]))),
             write.data.eq(total),
         ]
         for number, name in enumerate(OUTPUTS):
@@ -223,6 +232,19 @@ class TrackMachine(wiring.Component):
             stop.eq(go & (now.jump == Jump.END)),
         ]
         return m
+
+    def _contents(self) -> list[int]:
+        """Return the first words of all axes."""
+        return [
+            word for one in self._axes for word in (*one.words.values(), *[0] * ((1 << ADDRESS_BITS) - len(one.words)))
+        ]
+
+    def _at(self, word: Value) -> Value:
+        """Return the address of a word of the axis that has its turn."""
+        return Cat(word, self.axis) if len(self._axes) > 1 else word
+
+    def _is_last(self) -> Value:
+        return self.axis == len(self._axes) - 1 if len(self._axes) > 1 else C(1, 1)
 
     def _inputs(self) -> Array[Value]:
         """Return the inputs of the tick as words."""

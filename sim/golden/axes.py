@@ -21,7 +21,7 @@ def run_axes(spec: AxesSpec, trace: AxesTrace, tables: Callable[[TachometerSpec,
     """
     found: dict[str, list[Table]] = {name: [] for name in spec.axis.ports.strobes}
     for axis, pins in enumerate(trace.each):
-        rows = tables(spec.axis, seen(spec, pins, axis))
+        rows = tables(spec.at(axis), seen(spec, pins, axis))
         ticks, updates = rows[TICK], rows[UPDATE]
         latency = spec.axis.latency.tick
         clocks = {

@@ -13,6 +13,7 @@ from tachometry.spec import (
     CoreSpec,
     STachometer,
     TachometerSpec,
+    TrackTachometer,
     common_options,
     of_texts,
     own_options,
@@ -118,9 +119,9 @@ def spec_of(words: tuple[str, ...]) -> TachometerSpec:
     return of_texts(method, texts)
 
 
-def _axes_words(axes: int, tick: int, max_ticks: int, *more: str) -> tuple[str, ...]:
+def _axes_words(axes: int, tick: int, max_ticks: int, *more: str, method: str = "s") -> tuple[str, ...]:
     core = ("--ppr", "500", "--clock", "48000000", "--tick", f"{tick}clk", "--max-time", f"{tick * max_ticks}clk")
-    return ("--method", "s", *core, *more, "--axes", str(axes))
+    return ("--method", method, *core, *more, "--axes", str(axes))
 
 
 # Few and many axes, all slots taken and not, turns that fill the tick, and every option that many axes have.
@@ -131,6 +132,8 @@ AXES: tuple[tuple[str, ...], ...] = (
     _axes_words(1, 63, 2048, "--no-cancel", "--index"),
     _axes_words(64, 960, 5, "--max-speed", "500rad/s", "--decoding", "1", "--frac-bits", "4", "--position-width", "48"),
     (*_axes_words(17, 1000, 4, "--frac-bits", "24", "--index", "--filter", "30", "--external-tick"), "--parallel"),
+    (*_axes_words(5, 1440, 9, "--max-speed", "2000rad/s", "--unit", "rpm", method="track"), "--parallel"),
+    _axes_words(2, 1920, 6, "--external-tick", "--filter", "9", "--index", "--index-reset", method="track"),
     _axes_words(3, 120, 4, "--unit", "rpm", "--velocity-width", "24", "--external-tick", "--filter", "5"),
 )
 
@@ -141,7 +144,7 @@ def core_of(words: tuple[str, ...]) -> CoreSpec:
         return spec_of(words)
     place = words.index("--axes")
     alone = spec_of(words[:place])
-    assert isinstance(alone, STachometer)
+    assert isinstance(alone, STachometer | TrackTachometer)
     return AxesSpec(tachometer=alone, axes=int(words[place + 1]), parallel="--parallel" in words)
 
 

@@ -134,7 +134,7 @@ def verification(
     cores = [
         Configuration(f"{method}{number}", method, words)
         for method in methods
-        for number, words in enumerate([*configurations(method), *(AXES if method == "s" else ())], 1)
+        for number, words in enumerate([*configurations(method), *(axes for axes in AXES if axes[1] == method)], 1)
     ]
     check = partial(_check, engines=engines, n_clocks=-(-n_clocks // len(cores)), seed=seed)
     found = Verification([], len(cores))

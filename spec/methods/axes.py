@@ -11,24 +11,13 @@ from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.core.times import Times
 from tachometry.spec.core.timing import Timing
-from tachometry.spec.formats.reciprocal import Reciprocal
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import INDEX, TICK, UPDATE, Port, Ports, held, pin, strobe
-from tachometry.spec.methods.axis import (
-    COUNT_LATENCY,
-    FILTER_LATENCY,
-    MAX_AXES,
-    MIN_SLOTS,
-    READ,
-    WARM_UP,
-    SAxis,
-    fits,
-    nearest_ticks,
-    one_axis,
-    slots_of,
-    turn_cycles,
-)
-from tachometry.spec.methods.s import MAX_TABLE, STachometer
+from tachometry.spec.methods.axis import COUNT_LATENCY, FILTER_LATENCY, MAX_AXES, MIN_SLOTS, WARM_UP, Plan
+from tachometry.spec.methods.s import STachometer
+from tachometry.spec.methods.s_axis import SAxis
+from tachometry.spec.methods.track import TrackTachometer
+from tachometry.spec.methods.track_axis import TrackAxis
 
 _FOR_ONE = "is for one axis"
 # Options of the core of one axis, the value that leaves them out, and why many axes do not have them.
@@ -46,6 +35,42 @@ _STROBES = {
     "tick_error": "One clock: an external tick was missing, and the core made one, or it came too early and was left "
     "out.",
 }
+_NEAR = 2000  # clocks; 64 axes with the S method need some 800
+
+
+def slots_of(axes: int, cycles: int) -> int | None:
+    """Return S for a tick of so many clocks; None if no number divides it."""
+    return next((slots for slots in range(max(axes, MIN_SLOTS), MAX_AXES + 1) if cycles % slots == 0), None)
+
+
+def one_axis(spec: STachometer | TrackTachometer, axes: int, slots: int) -> SAxis | TrackAxis:
+    """Return the core that each axis is if a round has so many slots."""
+    return TrackAxis.of(spec, axes, slots) if isinstance(spec, TrackTachometer) else SAxis.of(spec, axes, slots)
+
+
+def fits(spec: STachometer | TrackTachometer, axes: int, cycles: int) -> bool:
+    """Tell whether a tick of so many clocks has whole rounds, and room for the turns of all axes."""
+    slots = slots_of(axes, cycles)
+    if slots is None:
+        return False
+    most = spec.timing.max_ticks * spec.timing.tick_cycles // cycles
+    alone = replace(spec, timing=Timing(spec.timing.clock_hz, cycles, max(most, 2)))
+    return one_axis(alone, axes, slots).plan.end + slots <= cycles
+
+
+def _possible(spec: STachometer | TrackTachometer, axes: int, cycles: int) -> bool:
+    try:
+        return fits(spec, axes, cycles)
+    except ParameterError:  # no axis can have this tick
+        return False
+
+
+def nearest_ticks(spec: STachometer | TrackTachometer, axes: int) -> list[int]:
+    """Return the longest tick below that of `spec` that fits, and the shortest above, in clocks, if they are near."""
+    cycles = spec.timing.tick_cycles
+    ways = (range(cycles - 1, max(cycles - _NEAR, 0), -1), range(cycles + 1, cycles + _NEAR))
+    found = (next((one for one in way if _possible(spec, axes, one)), None) for way in ways)
+    return [one for one in found if one is not None]
 
 
 class _OfAxes:
@@ -108,14 +133,15 @@ class AxesRecovery(_OfAxes):
     """Says how long a core of many axes takes until all is right again after an upset; see `Recovery`."""
 
     @property
-    def clocks(self) -> int:
-        """Clocks after which all is right.
+    def clocks(self) -> int | None:
+        """Clocks after which all is right; None: the method forgets only gradually.
 
         Each axis is a core of its own whose clock is a round. Before that the slots go on to the end of their register,
         and turns that have begun end; after it each axis has its turn.
         """
         own = self.spec.axis.recovery.clocks
-        assert own is not None  # there is no low-pass filter
+        if own is None:
+            return None
         slots = self.spec.slots
         return own * slots + (1 << (slots - 1).bit_length()) + 2 * self.spec.axis.times.longest_tick * slots
 
@@ -134,21 +160,23 @@ class AxesWords(_OfAxes):
         )
 
     @property
-    def memory(self) -> tuple[str, int, int]:
-        """The memory of the reciprocal: its kind, entries, bits of an entry."""
-        return "table", self.spec.reciprocal.depth, self.spec.reciprocal.width
+    def memory(self) -> tuple[str, int, int] | None:
+        """The memory of the reciprocal: its kind, entries, bits of an entry. None: there is no such memory."""
+        axis = self.spec.axis
+        # It is always looked up: there is no time between two axes to divide.
+        return ("table", axis.form.looked_up.depth, axis.form.looked_up.width) if isinstance(axis, SAxis) else None
 
 
 @dataclass(frozen=True, kw_only=True)
 class AxesSpec:
-    """Several encoders, one S-method datapath.
+    """Several encoders whose axes have one datapath in turn, or as many as it takes.
 
     In a round each axis is looked at once, in its slot of one clock. So an axis is, to the bit, a core of its own whose
     clock is a round: see `axis`.
 
     Parameters
     ----------
-    tachometer : STachometer
+    tachometer : STachometer or TrackTachometer
         What each axis would be as a core of its own; its clock and tick are those of this core.
     axes : int
         N, 1 to 64.
@@ -161,7 +189,7 @@ class AxesSpec:
         If there cannot be such a core.
     """
 
-    tachometer: STachometer
+    tachometer: STachometer | TrackTachometer
     axes: int
     parallel: bool = False
 
@@ -176,11 +204,6 @@ class AxesSpec:
         for name, value, why in _LEFT_OUT:
             if getattr(spec, name) != value:
                 raise ParameterError(name, f"must not be given together with axes: {why}")
-        if spec.timing.max_ticks > MAX_TABLE:
-            raise ParameterError(
-                "max_ticks",
-                f"must be at most {MAX_TABLE} with axes, not {spec.timing.max_ticks}: 1/m_s is looked up",
-            )
         self._check_tick()
 
     def _check_tick(self) -> None:
@@ -218,7 +241,7 @@ class AxesSpec:
         return found
 
     @cached_property
-    def axis(self) -> SAxis:
+    def axis(self) -> SAxis | TrackAxis:
         """The core that each axis is: one of its clocks is a round of this core."""
         return one_axis(self.tachometer, self.axes, self.slots)
 
@@ -228,14 +251,22 @@ class AxesSpec:
         return self.axis.timing.tick_cycles
 
     @property
-    def turn_cycles(self) -> int:
-        """Clocks for which an axis has the datapath."""
-        return turn_cycles(self.axis)
+    def plan(self) -> Plan:
+        """When each axis has its turn."""
+        return self.axis.plan
 
     @property
-    def reciprocal(self) -> Reciprocal:
-        """The reciprocal of m_s, which is always looked up: there is no time between two axes to divide."""
-        return self.axis.form.looked_up
+    def turn_cycles(self) -> int:
+        """Clocks for which an axis has the datapath."""
+        return self.plan.cycles
+
+    def at(self, axis: int) -> SAxis | TrackAxis:
+        """Return the core that one of the axes is."""
+        return self.axis.at(axis, self.delay(axis))
+
+    def delay(self, axis: int) -> int:
+        """Return clocks from the last look at an axis in a tick to what is shown of it."""
+        return int(self.shown(axis, 0)) - int(self.look(axis, 0))
 
     def look(self, axis: int, number: Any) -> Any:
         """Return the clock in which the level of an axis is looked at for the `number`-th time, of a number or an
@@ -253,7 +284,7 @@ class AxesSpec:
     def shown(self, axis: int, last: Any) -> Any:
         """Return the clock in which `tick` is high for a tick of an axis that ends with the round `last`."""
         begun = self.look(0, last) + self.latency.count + 1 + self.tachometer.index_reset
-        return begun + axis * self.turn_cycles + self.turn_cycles + READ + self.parallel
+        return begun + self.plan.start(axis) + self.plan.latency + self.parallel
 
     @cached_property
     def ports(self) -> Ports:
@@ -297,8 +328,8 @@ class AxesSpec:
         """Return those of the core that each axis is; but its clocks are rounds, and times here are in clocks of this
         core.
         """
-        units = {port.name: port.unit for port in self.tachometer.ports.outputs}
-        return tuple(replace(port, unit=units[port.name]) for port in self.axis.ports.outputs)
+        unit = next(port.unit for port in self.tachometer.ports if port.name == "interval")
+        return tuple(replace(port, unit=unit) if port.name == "interval" else port for port in self.axis.ports.outputs)
 
     @property
     def entries(self) -> dict[str, Any]:
@@ -312,13 +343,15 @@ class AxesSpec:
         }
         return of_one | {
             "velocity": of_one["velocity"] | of_velocity,
-            "recovery_cycles": self.recovery.clocks,
+            **axis.method_entries,
+            **({} if self.recovery.clocks is None else {"recovery_cycles": self.recovery.clocks}),
             **({"external_tick_cycles": self._external} if alone.external_tick else {}),
             "axes": {
                 "axes": self.axes,
                 "parallel": self.parallel,
                 "round_cycles": self.slots,
                 "turn_cycles": self.turn_cycles,
+                "machines": self.plan.machines,
                 "first_tick": self.tick_clock(0, 0),
             },
             "latency_cycles": self.latency.entries,
@@ -342,7 +375,8 @@ class AxesSpec:
     @property
     def parameters(self) -> dict[str, Any]:
         """Every option in canonical form, defaults included."""
-        found = {"reciprocal_source": "table", "axes": self.axes, "parallel": self.parallel}
+        source = {"reciprocal_source": "table"} if isinstance(self.axis, SAxis) else {}
+        found = source | {"axes": self.axes, "parallel": self.parallel}
         return {**self.tachometer.parameters, **found}
 
 

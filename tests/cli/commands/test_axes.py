@@ -110,11 +110,11 @@ def test_verilog_without_warnings(words: tuple[str, ...], tmp_path: Path) -> Non
     [
         ("--parallel", "--parallel must be given together with --axes"),
         ("--axes 65", "--axes must be from 1 to 64, not 65"),
-        ("--axes 4 --method m", "--method must be s together with --axes, not m"),
+        ("--axes 4 --method m", "--method must be s or track together with --axes, not m"),
         ("--axes 4 --age", "--age must not be given together with axes: "),
         ("--axes 8 --tick 1us --max-time 1ms", "--tick, in clocks, must be a multiple of a number from 8 to 64, "),
         ("--axes 4 --bus apb", "--parallel must be given together with axes and a bus: "),
-        ("--axes 64 --parallel --bus spi", "--bus must be another than spi for 324 registers: it has 127"),
+        ("--axes 64 --method s --parallel --bus spi", "--bus must be another than spi for 324 registers: it has 127"),
         ("--axes 4 --for rio", "--for must be another than rio with axes: "),
     ],
 )

@@ -12,7 +12,7 @@ from tachometry.hdl import core_of
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.signals.axes import AxesTrace
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.spec import AxesSpec, Encoder, Speed, STachometer, Timing
+from tachometry.spec import AxesSpec, Encoder, Speed, STachometer, TachometerSpec, Timing
 
 _EDGES = 10  # of a motion, at each of its speeds
 
@@ -60,7 +60,7 @@ class AxesCase(Case):
         return Stimulus(np.concatenate(pins)[:, np.newaxis], traces, starts)
 
 
-def _motion(spec: STachometer, rng: np.random.Generator, number: int) -> PinTrace:
+def _motion(spec: TachometerSpec, rng: np.random.Generator, number: int) -> PinTrace:
     kind = rng.integers(4)
     if number % 4 == 0:
         return stress(spec, int(rng.integers(1 << 30)), _EDGES + int(rng.integers(_EDGES)))

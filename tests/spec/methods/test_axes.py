@@ -77,6 +77,7 @@ def test_manifest() -> None:
         "parallel": False,
         "round_cycles": 8,
         "turn_cycles": spec.turn_cycles,
+        "machines": 1,
         "first_tick": spec.tick_clock(0, 0),
     }
     assert told["velocity"] == manifest(ALONE)["velocity"]
@@ -213,4 +214,6 @@ def test_the_reciprocal_is_that_of_a_table() -> None:
     for source in ("serial", "table"):
         spec = spec_of(8, reciprocal_source=source)
         assert spec.parameters["reciprocal_source"] == "table"
-        assert spec.words.memory[0] == "table"
+        memory = spec.words.memory
+        assert memory is not None
+        assert memory[0] == "table"

@@ -1,0 +1,74 @@
+"""An axis of a core of many with the S method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from tachometry.spec.language.option import ParameterError
+from tachometry.spec.language.port import Ports
+from tachometry.spec.methods.axis import Plan, output_cycles, own_options, without_swallowed
+from tachometry.spec.methods.s import MAX_TABLE, STachometer, STimes
+
+# Clocks of a turn of the datapath: what its memories have is in registers, and m_e is.
+READ, DECIDE = 2, 3
+
+
+class SAxisTimes(STimes):
+    """Says how far ticks of an axis are apart, in rounds."""
+
+    @property
+    def min_tick_cycles(self) -> int:
+        # Each axis has its turn, and a round to hand its count over.
+        assert isinstance(self.spec, SAxis)
+        return max(2, -(-self.spec.plan.end // self.spec.slots) + 1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SAxis(STachometer):
+    """Core of one axis that an axis of many is, to the bit; its clock is a round.
+
+    Parameters
+    ----------
+    axes_of_tick : int
+        How many have their turn in a tick.
+    slots : int
+        Clocks of a round.
+    """
+
+    axes_of_tick: int
+    slots: int
+
+    times = cached_property(SAxisTimes)
+
+    @classmethod
+    def of(cls, spec: STachometer, axes: int, slots: int) -> SAxis:
+        """Return the core that each axis is if a round has so many slots.
+
+        Raises
+        ------
+        ParameterError
+            If it cannot be.
+        """
+        if spec.timing.max_ticks > MAX_TABLE:
+            raise ParameterError(
+                "max_ticks",
+                f"must be at most {MAX_TABLE} with axes, not {spec.timing.max_ticks}: 1/m_s is looked up",
+            )
+        return cls(**own_options(spec, slots), axes_of_tick=axes, slots=slots)
+
+    @property
+    def ports(self) -> Ports:
+        """Ports of the core, less the count of the glitch filter, which no axis has."""
+        return without_swallowed(super().ports)
+
+    @cached_property
+    def plan(self) -> Plan:
+        """When each axis has its turn."""
+        # The next axis begins while the velocity of this one is shown. One clock starts the scaler, one takes its sum.
+        cycles = DECIDE + 1 + self.form.looked_up.digits + 1 + output_cycles(self) - READ
+        return Plan(self.axes_of_tick, cycles, cycles + READ)
+
+    def at(self, axis: int, clocks: int) -> SAxis:
+        """Return the core that one of the axes is, which is shown so many clocks after its last look."""
+        return self

@@ -1,0 +1,90 @@
+"""An axis of a core of many with the tracking method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from tachometry.spec.core.times import Times
+from tachometry.spec.formats.tracking_code import Program
+from tachometry.spec.formats.tracking_units import QUICK, Small
+from tachometry.spec.language.port import Ports
+from tachometry.spec.methods.axis import Plan, output_cycles, own_options, without_swallowed
+from tachometry.spec.methods.track import FETCH_CLOCKS, TrackTachometer
+
+
+class TrackAxisTimes(Times["TrackAxis"]):
+    """Says how far ticks of an axis are apart, in rounds."""
+
+    @property
+    def min_tick_cycles(self) -> int:
+        # Each axis has its turn, and a round to hand its counts over.
+        return max(2, -(-self.spec.plan.end // self.spec.slots) + 1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackAxis(TrackTachometer):
+    """Core of one axis that an axis of many is, to the bit; its clock is a round.
+
+    Parameters
+    ----------
+    axes_of_tick : int
+        How many have their turn in a tick.
+    slots : int
+        Clocks of a round.
+    tick_clocks : int
+        Clocks of the shortest tick in which all turns must end.
+    ahead : int
+        Rounds from an edge to what is shown: the velocity is that of the clock in which it is shown.
+    """
+
+    axes_of_tick: int
+    slots: int
+    tick_clocks: int
+    ahead: int = 0
+
+    times = cached_property(TrackAxisTimes)
+
+    @classmethod
+    def of(cls, spec: TrackTachometer, axes: int, slots: int) -> TrackAxis:
+        """Return the core that each axis is if a round has so many slots.
+
+        Raises
+        ------
+        ParameterError
+            If it cannot be.
+        """
+        own = own_options(spec, slots)
+        if spec.max_memory is not None:
+            own["max_memory"] = max(spec.max_memory // slots, own["timing"].tick_cycles)
+        return cls(**own, axes_of_tick=axes, slots=slots, tick_clocks=spec.timing.tick_cycles)
+
+    @property
+    def ports(self) -> Ports:
+        """Ports of the core, less the count of the glitch filter, which no axis has."""
+        return without_swallowed(super().ports)
+
+    @cached_property
+    def program(self) -> Program:
+        """The program of a turn, on the quick unit if nothing else is asked for."""
+        times = Small(self.form).times if self.multiplier == "serial" else QUICK
+        made = Program(self.form, times, 0)
+        return replace(made, delay=self.ahead - made.clocks)
+
+    @cached_property
+    def plan(self) -> Plan:
+        """When each axis has its turn: on as few machines as all turns end in time with."""
+        program = self.program
+        cycles = program.all_clocks + FETCH_CLOCKS + 1
+        latency = program.clocks + FETCH_CLOCKS + output_cycles(self)
+        found = [Plan(self.axes_of_tick, cycles, latency, n) for n in range(1, self.axes_of_tick + 1)]
+        return next((plan for plan in found if plan.end + self.slots <= self._room), found[0])
+
+    @property
+    def _room(self) -> int:
+        # External ticks may come in half the time.
+        return self.tick_clocks // (1 + self.external_tick)
+
+    def at(self, axis: int, clocks: int) -> TrackAxis:
+        """Return the core that one of the axes is, which is shown so many clocks after its last look."""
+        return replace(self, ahead=self.latency.pin_to_count + round(clocks / self.slots))
