@@ -105,6 +105,7 @@ def of_texts(
             spec = made(name)
             if name != methods[-1]:
                 _check_division(spec)
+                _check_machines(spec if within is None else within(spec))
         except ParameterError as error:
             if name == methods[-1]:
                 raise
@@ -161,6 +162,15 @@ def _able(given: Mapping[str, str]) -> tuple[list[str], list[str]]:
         others = " and ".join(f"--{name}" for name in asked[:-1])
         raise ParameterError(asked[-1], f"must not be given together with {others}: no method has all of them")
     return [name for name in _PREFERRED if name in able] or able, asked
+
+
+def _check_machines(core: object) -> None:
+    """Refuse tracking of many axes with a ParameterError where one machine has no time for all turns of a tick."""
+    if isinstance(core, AxesSpec) and core.plan.machines > 1:
+        machines = core.plan.machines
+        raise ParameterError(
+            "tick_cycles", f"must be so long that one machine is enough, not {machines}", f"needs {machines} machines"
+        )
 
 
 def _check_division(spec: TachometerSpec) -> None:

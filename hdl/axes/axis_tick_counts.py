@@ -104,7 +104,7 @@ class AxisTickCounts(wiring.Component):
         m.d.comb += place.eq(Mux(ready, before.end, 0))  # the memory is not that of a reset
         m.d.sync += [
             new.end.eq(place + step),
-            new.last.eq(Mux(counts, 0, before.last + 1)),
+            new.last.eq(Mux(counts | ~number.any(), 0, before.last + 1)),  # an axis that stands changes nothing
             new.moved.eq(way + step),
             new.times.eq(times + number),
             new.number.eq(number),

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tachometry.spec import AxesSpec, Encoder, ParameterError, Speed, STachometer, Timing
+from tachometry.spec import AxesSpec, Encoder, ParameterError, Speed, STachometer, Timing, of_texts, with_axes
 from tachometry.spec.registers.manifest import manifest
 
 ALONE = STachometer(
@@ -202,6 +202,12 @@ def test_times_are_in_clocks_of_the_core() -> None:
     assert manifest(spec)["interval_unit_cycles"] == 960
     held = spec_of(3, tick=1000, parallel=True)
     assert {port.unit for port in held.ports if port.name.startswith("interval")} == {"1000 clocks"}
+
+
+@pytest.mark.parametrize(("axes", "method"), [(8, "track"), (32, "s")])
+def test_auto_takes_tracking_where_one_machine_has_time_for_all_axes(axes: int, method: str) -> None:
+    texts = {"ppr": "500", "max-speed": "1000rad/s", "tick": "100us", "max-time": "100ms"}
+    assert of_texts("auto", texts, lambda spec: with_axes(spec, axes, parallel=False)).method == method
 
 
 def test_a_speed_that_is_looked_at_too_seldom_is_told() -> None:
