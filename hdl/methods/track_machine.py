@@ -101,7 +101,7 @@ class TrackMachine(wiring.Component):
     kind, end, down : In
         Of the last count's edge; of the position at the end; whether the count went backward.
     velocity, position_fine, quality, acceleration : Out(signed)
-        They are those of this tick `program.clocks` after `begin`, and two more.
+        They are those of this tick `program.clocks` after `begin`, and three more.
     """
 
     def __init__(self, program: Program, *others: Program) -> None:
@@ -211,10 +211,12 @@ class TrackMachine(wiring.Component):
             write.addr.eq(self._at(Mux(now.store[3:ADDRESS_BITS].all(), self.kind, now.store[:ADDRESS_BITS]))),
             write.data.eq(total),
         ]
+        shows = Signal(3)
+        m.d.sync += shows.eq(Mux(go, now.output, 0))
         for number, name in enumerate(OUTPUTS):
             if name:
-                with m.If(go & (now.output == number)):
-                    m.d.sync += getattr(self, name).eq(total)
+                with m.If(shows == number):
+                    m.d.sync += getattr(self, name).eq(sum_)
         # The unit.
         uses = from_unit | ((now.start != Start.NONE) & (now.start != Start.CHANCE))
         m.d.comb += [

@@ -24,7 +24,7 @@ from tachometry.spec.language.option import ParameterError, option
 from tachometry.spec.language.port import UPDATE, Port, held
 from tachometry.spec.language.units import format_time, next_written_time, short_time, written_time
 
-FETCH_CLOCKS = 3  # to fetch the first instruction, to read its word, and to hold the result
+FETCH_CLOCKS = 4  # to fetch the first instruction, to read its word, and to hold the result twice
 NOISE = Fraction(1, 4 * 20_000)  # rad/s that an LSB has at 2000 counts: a quarter of what is left at constant speed
 LOOP_MEMORY = Fraction(3, 5)  # over k_v: the longest memory in a loop
 _MAX_TIME = "100ms"  # by default
