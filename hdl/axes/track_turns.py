@@ -83,7 +83,7 @@ class TrackTurns(wiring.Component):
         turn = Signal(range(max(n, 2)))
         whose = Signal.like(self.axis)
         at = {name: running & (clock == place) for name, place in (("begin", 0), ("read", 1), ("add", 2), ("keep", 3))}
-        shows = running & (clock == axis.program.clocks + 2)
+        shows = running & (clock == axis.program.clocks + FETCH_CLOCKS - 1)
         ends = running & (clock == plan.cycles - 1)
         m.d.sync += clock.eq(clock + 1)
         with m.If(ends):
