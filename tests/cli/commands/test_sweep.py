@@ -70,7 +70,7 @@ methods = ["s", "m:average=2"]
 results = "{result}"
 [vary]
 speed = ["5rad/s", "50rad/s"]
-tick = [100, "1ms"]
+tick = ["100us", "1ms"]
 """)
     assert run(*CORE, *MOTION, *AXES, *scheduler, "--results", result) == 0
     first = result.read_bytes()
@@ -157,8 +157,8 @@ speed = ["5rad/s", "50rad/s"]
 tick = ["100us", "1ms"]
 """
 BAD = [
-    (["--vary", "cpr=1"], "--vary must be of ppr, decoding, "),
-    (["--vary", "cpr=1"], "or of a name in braces within --motion, such as {speed}, not 'cpr'"),
+    (["--vary", "turns=1"], "--vary must be of ppr, lines, cpr, decoding, "),
+    (["--vary", "turns=1"], "or of a name in braces within --motion, such as {speed}, not 'turns'"),
     (["--motion", "stop:1s"], "not 'speed'"),
     (["--motion", "constant:{speed}:{tick}"], "--motion must have names in braces that are no option or column, not "),
     (["--motion", "constant:{speed}:{v}"], "--vary must have values for {v} of --motion, such as --vary v=1,2,5"),
@@ -240,9 +240,11 @@ def test_an_interrupt_before_there_is_a_row(
 def test_a_file_that_is_not_there_or_no_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(tmp_path / "no.toml") == 2
     assert capsys.readouterr().err == f"tachometry: error: {tmp_path / 'no.toml'}: No such file or directory\n"
-    (tmp_path / "s.toml").write_text("cpr = 3")
+    (tmp_path / "s.toml").write_text("turns = 3")
     assert run(tmp_path / "s.toml") == 2
-    assert capsys.readouterr().err.startswith(f"tachometry: error: {tmp_path / 's.toml'}: 'cpr' is no key of a sweep: ")
+    assert capsys.readouterr().err.startswith(
+        f"tachometry: error: {tmp_path / 's.toml'}: 'turns' is no key of a sweep: "
+    )
 
 
 def test_what_fails_on_the_way_is_told_and_the_rest_is_kept(
