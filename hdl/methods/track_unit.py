@@ -77,7 +77,9 @@ class Unit(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        self.doing, self.how_done = doing, how = Signal(Start), Signal(HOW_BITS)
+        self.doing = Signal(Start)
+        self.how_done = Signal(HOW_BITS)
+        doing, how = self.doing, self.how_done
         m.d.sync += [doing.eq(self.start), how.eq(self.how)]
         # The number of the event, its bits reversed.
         self.chance = Signal(CHANCE_BITS)
@@ -143,7 +145,8 @@ class QuickUnit(Unit):
         # A product; or a power, a clock later, so that its last bit is that of 2^36.
         product = Signal(signed(WIDTH + bits), reset_less=True)
         distance = Signal(6, reset_less=True)
-        multiplied, raised = last == Start.TIMES, Signal()
+        multiplied = last == Start.TIMES
+        raised = Signal()
         power = Cat(C(0, CHANCE_BITS + RESULT_BITS - POWER_BITS - _LOW), self.table.data[:POWER_BITS], C(1, 1))
         m.d.sync += [raised.eq(last == Start.EXP), product.eq(Mux(last == Start.EXP, power, self.sum * self.factor))]
         with m.If((doing == Start.TIMES) | (doing == Start.EXP)):
@@ -165,7 +168,8 @@ class QuickUnit(Unit):
         second = Signal(signed(width), reset_less=True)
         # Second stage: by 4, 2 and 1.
         rest = Signal(6, reset_less=True)
-        second_finds, second_factor = Signal(), Signal()
+        second_finds = Signal()
+        second_factor = Signal()
         ends = Signal()
         is_log = Signal()
         may_be_large = Signal()
@@ -266,7 +270,11 @@ class SmallUnit(Unit):
         begins = (doing != Start.NONE) & (doing != Start.CHANCE)
         reads, adds, shifts = (state == item for item in (State.READS, State.ADDS, State.SHIFTS))
         # What is added next: a digit of the factor, which turns meanwhile, or all at once.
-        before, owed, minus, multiplies, code = Signal(), Signal(), Signal(), Signal(), Signal(2)
+        before = Signal()
+        owed = Signal()
+        minus = Signal()
+        multiplies = Signal()
+        code = Signal(2)
         how = self.how_done
         named_odd = Array(C(shift % 2, 1) for _, shift in self.shifts)[how]
         finds = (doing == Start.LOG) | (doing == Start.BY)
@@ -321,7 +329,8 @@ class SmallUnit(Unit):
             m.d.sync += work[CHANCE_BITS + RESULT_BITS + 1 : CHANCE_BITS + WIDTH].eq(work[-1].replicate(WIDTH))
         # How many pairs of places it is to go: those of what is done, and those that the operand or the factor says.
         named = Array(C(-small.pairs(*kind), 6) for kind in self.shifts)[how]
-        more, up = Signal(6), Signal()
+        more = Signal(6)
+        up = Signal()
         with m.If(~begins):
             m.d.comb += more.eq(Mux(by_8, 4, 1))
         with m.Elif(doing == Start.EXP):

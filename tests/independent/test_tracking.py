@@ -16,7 +16,6 @@ from independent.show import check_velocity
 from independent.stimulus import Lines, steady
 from reference.front import conditioned, wrapped
 from reference.settings import Settings, arguments
-from support.nightly import nightly
 
 TRACKING = [case for case in CASES if case.settings.method == "track"]
 FIRST = 5  # ticks before the motion
@@ -157,7 +156,8 @@ def check_rest(motion: Motion) -> None:
         assert motion.settings.lowpass is not None or row["velocity"] == 0
 
 
-@nightly  # in every tick of a core, test_cores.py has what tracking may show; tests/sim/golden has how well it does
+# In every tick of a core, test_cores.py has what tracking may show; tests/sim/golden has how well it does.
+@pytest.mark.nightly
 @pytest.mark.parametrize("case", TRACKING, ids=lambda case: case.name)
 def test_a_known_motion(case: Case, generated: Callable[..., Path]) -> None:
     settings = case.settings

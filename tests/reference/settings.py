@@ -13,13 +13,21 @@ PER_TURN = {"rad/s": 2 * PI, "rev/s": Fraction(1), "rpm": Fraction(60)}
 Words = Mapping[str, str]  # options without their dashes; a flag has the word "yes" or "no"
 
 
+# Times, which the words have as numbers of clocks.
+_CLOCKS = ("tick", "dt", "max-time", "min-time", "max-tick-period", "max-memory")
+
+
 def arguments(words: Words) -> list[str]:
     """Return the words as the command line takes them."""
     flags = {"yes": "--{}", "no": "--no-{}"}
     return [
         part
         for name, word in words.items()
-        for part in ([flags[word].format(name)] if word in flags else [f"--{name}", word])
+        for part in (
+            [flags[word].format(name)]
+            if word in flags
+            else [f"--{name}", word + "clk" * (name in _CLOCKS and word.isdigit())]
+        )
     ]
 
 
@@ -34,7 +42,7 @@ class Settings:
     words: Words
 
     def _whole(self, name: str, default: int) -> int:
-        return int(self.words.get(name, default))
+        return int(str(self.words.get(name, default)).removesuffix("clk"))
 
     def flag(self, name: str, default: bool = False) -> bool:
         """Tell whether a flag is set."""

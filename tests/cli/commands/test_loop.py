@@ -13,7 +13,7 @@ from tachometry.sim import build
 from tachometry.sim.engines.loop import COLUMNS
 from tachometry.sim.studies.sweeping import cluster
 
-CORE = "--ppr 500 --clock 48MHz --tick 20us --max-time 10ms".split()
+CORE = "--methods s --ppr 500 --clock 48MHz --tick 20us --max-time 10ms".split()
 SHORT = [*CORE, "--motion", "ramp:0:4:30ms+constant:4:50ms", "--from", "40ms"]
 
 
@@ -29,7 +29,7 @@ def test_one_loop_and_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[st
     table = capsys.readouterr().out.splitlines()
     assert table[0].split()[:4] == ["seed", "RMS", "error", "(rad/s)"]
     assert [line.split()[0] for line in table[1:4]] == ["7", "8", "mean"]
-    assert table[5] == "S method, eq. (21); ramp:0:4:30ms+constant:4:50ms"
+    assert table[5] == "s; ramp:0:4:30ms+constant:4:50ms"
     for path in (tmp_path / "one").iterdir():
         assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes(), path.name
     with (tmp_path / "one" / "log.csv").open() as file:
@@ -134,7 +134,7 @@ def test_a_controller_in_gates(tmp_path: Path) -> None:
         ("--jobs 1 --scheduler tcp://nobody:1", "--jobs must not be given together with --scheduler"),
         ("--vary kv=1,2 --log log.csv", "--log must be of one loop on this machine"),
         ("--methods s,m --plot plot.png", "--vary must be given together with --plot of several loops"),
-        ("--vary speed=1,2", "--vary must be of ppr, decoding, clock, "),
+        ("--vary speed=1,2", "--vary must be of ppr, lines, cpr, decoding, clock, "),
         ("--vary kv=1,-2", "--kv must be greater than 0, not -2 (method s, kv=-2)"),
         ("--min-time 1ms", "--min-time must be given with a method that has it: mt"),
         ("--methods s,x", "--methods must be of auto, s, m, t, mt, rairan, track, or all, not 'x'"),

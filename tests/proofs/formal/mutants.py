@@ -251,7 +251,9 @@ MUTANTS = [
     Mutant("wishbone", "pb_error", RegisterBank, "(bus.address >= len(self._map.registers))", "0"),
     Mutant("wishbone", "pb_read", RegisterBank, "init=(1 << len(bus.address)) - 1", "init=0"),
     Mutant("wishbone", "pb_snapshot", RegisterBank, "self.capture | (bus.read", "(bus.read"),
-    Mutant("axi-lite", "pb_snapshot", RegisterBank, "waits | getattr(self, _EVENTS[flag])", "waits | Const(0)"),
+    Mutant(
+        "axi-lite", "pb_snapshot", RegisterBank, "waits | getattr(self, self._map.events[flag])", "waits | Const(0)"
+    ),
     Mutant("axi-lite", "pb_snapshot", TickPosition, "self.next - self.open_sum", "self.position"),
     Mutant("axi-lite", "pb_write", RegisterBank, 'bus.write & here["CONTROL"]', "bus.write"),
     Mutant("wishbone", "pw_access", WishboneBridge, "self.wb_we_i & self.wb_sel_i[0]", "self.wb_we_i"),

@@ -80,10 +80,10 @@ def test_values_of_two_words() -> None:
 
 def test_the_age_is_that_of_the_update_and_stays_at_the_maximum_time() -> None:
     """Rairán has no update after that of rest, which comes with the maximum time, eight ticks."""
-    bank = Bank(pins(1), "rairan", age="yes", max_time="80")
+    bank = Bank(pins(1), "rairan", age="yes", max_time="80clk")
     rests = 4 + 2 + 80 + 4  # from the level to the count, its maximum time, and to the update
     assert [bank.at(rests + 10 * k + 5, "AGE")[0] for k in (0, 1, 2, 6, 7, 8, 9, 30)] == [0, 1, 2, 6, 7, 8, 8, 8]
-    still = Bank(pins(0, n_clocks=900), "s", age="yes", max_time="800")
+    still = Bank(pins(0, n_clocks=900), "s", age="yes", max_time="800clk")
     assert [still.at(10 * k + 20, "AGE")[0] for k in (0, 3, 70, 78)] == [1, 4, 71, 79]  # from reset
 
 

@@ -27,6 +27,7 @@ def shown(name: str, value: str) -> str:
         return ""
     if value.startswith("yes "):
         return f"--{name} --{value.removeprefix('yes ')} "
+    value += "clk" * (name == "tick")
     return f"--{name} " if value == "yes" else f"--no-{name} " if value == "no" else f"--{name} {value} "
 
 
@@ -86,7 +87,7 @@ def test_every_option_is_a_factor(method: str) -> None:
     assert {about.name for about in own_options(method)} <= set(found)
     without = {about.name for about in common_options() if not about.needs} - set(found)
     never = {"rairan": {"external-tick"}, "track": {"tick", "bounds"}}
-    assert without == {"ppr", "clock", "dt", "lsb"} | never.get(method, set())
+    assert without == {"ppr", "lines", "cpr", "clock", "dt", "pwm", "lsb"} | never.get(method, set())
     assert "yes index-reset" in found["index"]
     assert ("yes edge-error 0.3" in found.get("bounds", ())) == METHODS[method].facts.bounds
 

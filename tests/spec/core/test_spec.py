@@ -19,7 +19,7 @@ TIMING = Timing(48_000_000, 960, 500)
         ("48MHz", "20us", "10ms"),
         ("48000kHz", "20000ns", "0.01s"),
         (48_000_000, 960, 480_000),
-        ("48000000Hz", "960", "480000"),
+        ("48000000Hz", "960clk", "480000clk"),
         ("4.8e7Hz", "2e-5s", "1e4us"),
     ],
 )
@@ -37,7 +37,7 @@ ERRORS = [
     (lambda: Encoder(0), "pulses_per_rev must be from 1 to 4194304 with x4 decoding, not 0"),
     (lambda: Encoder(1 << 24, 2), "pulses_per_rev must be from 1 to 8388608 with x2 decoding, not 16777216"),
     (lambda: Encoder((1 << 24) + 1, 1), "pulses_per_rev must be from 1 to 16777216 with x1 decoding, not 16777217"),
-    (lambda: Encoder(500, 3), "decoding must be 1, 2 or 4, not 3"),
+    (lambda: Encoder(500, 3), "decoding must be 1, 2 or 4, or x1, x2 or x4, not 3"),
     (lambda: Timing(0, 2, 2), "clock must be from 1 Hz to 100 GHz, not 0 Hz"),
     (
         lambda: Timing.parse("1MHz", "20us", "1us"),
@@ -56,17 +56,16 @@ ERRORS = [
     ),
     (lambda: Timing.parse("0.5Hz", "20us", "10ms"), "clock must be a positive whole number of Hz, not '0.5Hz'"),
     (
-        lambda: Timing.parse("48MHz", "20", "10 m"),
-        "max_time must be a number with one of the units s, ms, us, ns or a whole number of clocks, not '10 m'",
+        lambda: Timing.parse("48MHz", "20us", "10 m"),
+        "max_time must be a number with one of the units s, ms, us, ns, clk, not '10 m'",
     ),
     (
         lambda: Timing.parse("48MHz", "20.01us", "10ms"),
-        "tick must be a whole number of clocks, not 20.01us (960.48); nearest: "
-        "960 clocks (20us) and 961 clocks (20.0208333us)",
+        "tick must be a whole number of clocks, not 20.01us (960.48); nearest: 960clk (20us) and 961clk (20.0208333us)",
     ),
     (
         lambda: Timing.parse("48MHz", "1ns", "10ms"),
-        "tick must be a whole number of clocks, not 1ns (0.048); nearest: 1 clock (20.8333333ns)",
+        "tick must be a whole number of clocks, not 1ns (0.048); nearest: 1clk (20.8333333ns)",
     ),
     (
         lambda: Timing.parse("48MHz", "20us", "10.01ms"),

@@ -219,7 +219,7 @@ def test_what_is_no_manifest_is_refused(tmp_path: Path) -> None:
         ({"later": "1"}, "later must not be given with method s: there is no such option"),
         ({"method": "x"}, "method must be one of auto, s, m, t, mt, rairan, track, not 'x'"),
         ({"tick": "0clk"}, "tick must be longer than 0"),
-        ({"method": "m", "axes": "2"}, "method must be s together with --axes, not m"),
+        ({"method": "m", "axes": "2"}, "method must be s or track together with --axes, not m"),
     ):
         with pytest.raises(ParameterError, match=f"^{message}"):
             of_options({name: text for name, text in (options | more).items() if name not in ("cancel", "reciprocal")})

@@ -18,7 +18,7 @@ CHOICES = [
     ({"tick": "10us", "external-tick": "yes"}, "track", f"as its {QUICK} clocks fit the tick of 480"),
     ({"tick": "5us"}, "mt", f"as track needs a tick of {QUICK} clocks"),
     ({"tick": "250ns"}, "s", f"as track needs a tick of {QUICK} clocks and mt needs a tick of 20 clocks"),
-    ({"axes": "4"}, "s", "as track is of one axis and mt is of one axis"),
+    ({"axes": "4"}, "s", "as track needs 2 machines and mt is of one axis"),
     ({"bounds": "yes"}, "mt", "as it has --bounds"),
     ({"bounds": "yes", "tick": "250ns"}, "s", "as mt needs a tick of 23 clocks"),
     ({"max-memory": "5ms"}, "track", "as it has --max-memory"),

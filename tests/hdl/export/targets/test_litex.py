@@ -80,7 +80,12 @@ def spec() -> TachometerSpec:
     values = {"ppr", "clock", "tick", "max-time", "filter", "position-width"}
     given = {word[2:]: after for word, after in pairwise([*WORDS, ""]) if word.startswith("--")}
     return of_texts(
-        "s", {name: after if name in values else "yes" for name, after in given.items() if name not in ("for", "name")}
+        "s",
+        {
+            name: after if name in values else "yes"
+            for name, after in given.items()
+            if name not in ("for", "name", "method")
+        },
     )
 
 
@@ -175,7 +180,7 @@ def test_offsets_and_ports_are_those_of_the_core(method: str) -> None:
     names: dict[str, object] = {}
     exec(tables, names)
     assert names["REGISTERS"] == {register.name.lower(): register.offset for register in RegisterMap(core)}
-    assert names["PINS"] == [pin.name for pin in core.ports.pins]
+    assert names["PINS"] == {pin.name: pin.width for pin in core.ports.pins}
     assert names["OUTPUTS"] == {port.name: (port.width, port.signed) for port in core.ports.outputs}
     assert names["CLOCK_HZ"] == core.timing.clock_hz
     # An address is one of bytes, two bits of which are left out.
