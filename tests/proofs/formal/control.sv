@@ -55,7 +55,7 @@ module `CONTROL #(
       .gain_position(gain_position), .gain_velocity(gain_velocity), .gain_acceleration(gain_acceleration),
       .gain_disturbance(gain_disturbance), .current_limit(current_limit),
 `endif
-      .clk(clk), .rst(rst), .tick(tick), .update(update), .velocity(velocity), .enable(enable), .position(position),
+      .clk(clk), .rst(rst), .tick(tick), .update(update), .measured(1'b1), .velocity(velocity), .enable(enable), .position(position),
       .command_position(command_position), .command_velocity(command_velocity),
       .command_acceleration(command_acceleration), .valid(valid), .current(current), .saturated(saturated), .y(y), .w(w)
   );
