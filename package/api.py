@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.cli.files import Outputs
 from tachometry.hdl.export import export
 from tachometry.sim.captures.read import read_capture, with_last_tick
 from tachometry.sim.encoder.motion import parse_motion
@@ -250,12 +251,11 @@ def generate(
         If the files cannot be written.
     """
     texts = export(spec, name, bus, baud, target)
-    paths = []
-    for file, text in texts.items():
-        paths.append(Path(folder) / file)
-        paths[-1].parent.mkdir(parents=True, exist_ok=True)
-        paths[-1].write_text(text, encoding="utf-8", newline="\n")
-    return paths
+    places = {file: Path(folder) / file for file in texts}
+    with Outputs(places) as outputs:  # all of them, or none
+        for file, text in texts.items():
+            outputs[file].write_text(text, encoding="utf-8", newline="\n")
+    return [*places.values()]
 
 
 def _recorded(spec: AnySpec, motion: str, axis: int, encoder: dict[str, Any]) -> Encoding:

@@ -27,12 +27,28 @@ class Idle:
 
 
 @dataclass(frozen=True)
-class IdleCounter(Idle):
-    """A counter.
+class IdleRegister(Idle):
+    """A single register.
 
     Parameters
     ----------
     path : str
+    """
+
+    path: str
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Signals that it moves on."""
+        return (self.path,)
+
+
+@dataclass(frozen=True)
+class IdleCounter(IdleRegister):
+    """A counter.
+
+    Parameters
+    ----------
     step : int
         What it counts by, −1 or 1.
     stops : tuple of int
@@ -41,51 +57,22 @@ class IdleCounter(Idle):
         Instead of these two: its values, each after the one before, if it does not count. The last is the stop.
     """
 
-    path: str
     step: int = 0
     stops: tuple[int, ...] = ()
     order: tuple[int, ...] = ()
 
-    @property
-    def paths(self) -> tuple[str, ...]:
-        """Signals that it moves on."""
-        return (self.path,)
+
+@dataclass(frozen=True)
+class IdleSum(IdleRegister):
+    """A sum to which every clock adds the same as long as all else stands still; it wraps."""
 
 
 @dataclass(frozen=True)
-class IdleSum(Idle):
-    """A sum to which every clock adds the same as long as all else stands still; it wraps.
-
-    Parameters
-    ----------
-    path : str
-    """
-
-    path: str
-
-    @property
-    def paths(self) -> tuple[str, ...]:
-        """Signals that it moves on."""
-        return (self.path,)
-
-
-@dataclass(frozen=True)
-class IdleEcho(Idle):
+class IdleEcho(IdleRegister):
     """A register that is made anew in every clock of what moves, and that is not moved on.
 
     Nothing reads it in clocks that are skipped, nor in the one behind them.
-
-    Parameters
-    ----------
-    path : str
     """
-
-    path: str
-
-    @property
-    def paths(self) -> tuple[str, ...]:
-        """Signals that it moves on."""
-        return (self.path,)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,8 @@
 """m_e of every axis."""
 
-from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
+from typing import Any
+
+from amaranth import Cat, Const, Module, Mux, ShapeLike, Signal, Value, signed
 from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
@@ -45,21 +47,21 @@ class AxisCounters(wiring.Component):
     """
 
     def __init__(self, *, slots: int, rounds: int, decoding: int) -> None:
+        self._take(slots, decoding, signed(rounds.bit_length() + 1))
+
+    def _take(self, slots: int, decoding: int, count: ShapeLike) -> None:
+        """Have the ports of a core that adds up this."""
         self._slots = slots
         self._decoding = decoding
         super().__init__(
             {
                 "slot": In(range(slots)),
-                "first": In(1),
-                "last": In(1),
-                "ready": In(1),
-                "level_a": In(1),
-                "level_b": In(1),
+                **dict.fromkeys(("first", "last", "ready", "level_a", "level_b"), In(1)),
                 "axis": Out(range(slots)),
                 "step": Out(signed(2)),
                 "decode_error": Out(1),
                 "complete": Out(1),
-                "count": Out(signed(rounds.bit_length() + 1)),
+                "count": Out(count),
             }
         )
 
@@ -75,20 +77,16 @@ class AxisCounters(wiring.Component):
         before = Signal(kept)
         m.d.sync += before.eq(read.data)
         counted, backward, illegal = transition(self._decoding, a, b, before.a, before.b)
-        count = Signal()
+        counts = Signal()
         step = Signal.like(self.step)
-        m.d.comb += [
-            read.addr.eq(self.slot),
-            count.eq(ready & counted),
-            step.eq(Cat(count, count & backward)),
-        ]
+        m.d.comb += [read.addr.eq(self.slot), counts.eq(ready & counted), step.eq(Cat(counts, counts & backward))]
+        self._add(m, before.count, first, ready, step)
         new_a, new_b = delay(m, a, b)
         m.d.sync += [
             self.axis.eq(slot),
             self.step.eq(step),
             self.decode_error.eq(ready & illegal),
             self.complete.eq(last),
-            self.count.eq(Mux(first, 0, before.count) + step),
         ]
         m.d.comb += [
             write.addr.eq(self.axis),
@@ -98,6 +96,10 @@ class AxisCounters(wiring.Component):
             write.en.eq(1),
         ]
         return m
+
+    def _add(self, m: Module, before: Any, first: Signal, ready: Signal, step: Signal) -> None:
+        """Add a step to what was added up in the rounds before."""
+        m.d.sync += self.count.eq(Mux(first, 0, before) + step)
 
 
 def of_slot(lines: Signal, slot: Signal) -> Value:

@@ -1,12 +1,11 @@
 """The counts of a tick of every axis, for the tracking method."""
 
-from amaranth import Cat, Const, Module, Mux, Signal, signed
-from amaranth.lib import data, wiring
-from amaranth.lib.memory import Memory
-from amaranth.lib.wiring import In, Out
+from typing import Any
 
-from tachometry.hdl.front_end.decoder import transition
-from tachometry.hdl.wires.delay import delay
+from amaranth import Cat, Const, Module, Mux, Signal, signed
+from amaranth.lib import data
+
+from tachometry.hdl.axes.axis_counters import AxisCounters
 from tachometry.spec.formats.tracking import Tracking
 
 
@@ -26,10 +25,11 @@ def counts_layout(form: Tracking) -> data.StructLayout:
     )
 
 
-class AxisTickCounts(wiring.Component):
+class AxisTickCounts(AxisCounters):
     """Decodes the lines of an axis in its slot, and adds up times and places of its counts, in rounds.
 
-    It does what `AxisCounters` and `TickCounts` do. Latency: that of `AxisCounters`.
+    It does what `TickCounts` does for one axis. Members and latency are those of `AxisCounters`, but `count`:
+    Out(counts_layout(form)), of this tick so far.
 
     Parameters
     ----------
@@ -38,66 +38,13 @@ class AxisTickCounts(wiring.Component):
         That of an axis.
     decoding : int
         Counts per period: 1, 2 or 4.
-
-    Members
-    -------
-    slot, first, last, ready, level_a, level_b : In
-        As of `AxisCounters`.
-    axis, step, decode_error, complete : Out
-        As of `AxisCounters`.
-    count : Out(counts_layout(form))
-        Of this tick so far.
     """
 
     def __init__(self, *, slots: int, form: Tracking, decoding: int) -> None:
-        self._slots = slots
         self._form = form
-        self._decoding = decoding
-        super().__init__(
-            {
-                "slot": In(range(slots)),
-                **dict.fromkeys(("first", "last", "ready", "level_a", "level_b"), In(1)),
-                "axis": Out(range(slots)),
-                "step": Out(signed(2)),
-                "decode_error": Out(1),
-                "complete": Out(1),
-                "count": Out(counts_layout(form)),
-            }
-        )
+        self._take(slots, decoding, counts_layout(form))
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
-        kept = data.StructLayout({"a": 1, "b": 1, "count": counts_layout(self._form)})
-        m.submodules.memory = memory = Memory(shape=kept, depth=self._slots, init=[])
-        read = memory.read_port()
-        write = memory.write_port()
-        seen = self.level_a, self.level_b, self.slot, self.first, self.last, self.ready
-        a, b, slot, first, last, ready = delay(m, *seen, clocks=2)
-        # Block RAM is slow.
-        before = Signal(kept)
-        m.d.sync += before.eq(read.data)
-        counted, backward, illegal = transition(self._decoding, a, b, before.a, before.b)
-        counts = Signal()
-        step = Signal.like(self.step)
-        m.d.comb += [read.addr.eq(self.slot), counts.eq(ready & counted), step.eq(Cat(counts, counts & backward))]
-        self._add(m, before.count, first, ready, step)
-        new_a, new_b = delay(m, a, b)
-        m.d.sync += [
-            self.axis.eq(slot),
-            self.step.eq(step),
-            self.decode_error.eq(ready & illegal),
-            self.complete.eq(last),
-        ]
-        m.d.comb += [
-            write.addr.eq(self.axis),
-            write.data.a.eq(new_a),
-            write.data.b.eq(new_b),
-            write.data.count.eq(self.count),
-            write.en.eq(1),
-        ]
-        return m
-
-    def _add(self, m: Module, before: data.View, first: Signal, ready: Signal, step: Signal) -> None:
+    def _add(self, m: Module, before: Any, first: Signal, ready: Signal, step: Signal) -> None:
         counts, backward, new = step.any(), step[-1], self.count
         number, places, way, times = (Mux(first, 0, before[name]) for name in ("number", "places", "moved", "times"))
         place = Signal(2)

@@ -45,7 +45,7 @@ class AxesTachometer(wiring.Component):
         if spec.axis.filter_clocks:
             self.axis_filter = AxisFilter(slots=spec.slots, looks=spec.axis.filter_clocks, lines=spec.lines)
         decoding = spec.axis.encoder.decoding
-        self.axis_counters: AxisCounters | AxisTickCounts
+        self.axis_counters: AxisCounters
         self.datapath: AxesDatapath | AxesTrackDatapath
         if isinstance(spec.axis, TrackAxis):
             self.axis_counters = AxisTickCounts(slots=spec.slots, form=spec.axis.form, decoding=decoding)

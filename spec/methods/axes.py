@@ -13,7 +13,7 @@ from tachometry.spec.core.times import Times
 from tachometry.spec.core.timing import Timing
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import INDEX, TICK, UPDATE, Port, Ports, held, pin, strobe
-from tachometry.spec.methods.axis import COUNT_LATENCY, FILTER_LATENCY, MAX_AXES, MIN_SLOTS, WARM_UP, Plan
+from tachometry.spec.methods.axis import COUNT_LATENCY, FILTER_LATENCY, MAX_AXES, MIN_SLOTS, WARM_UP, Plan, slots_of
 from tachometry.spec.methods.s import STachometer
 from tachometry.spec.methods.s_axis import SAxis
 from tachometry.spec.methods.track import TrackTachometer
@@ -36,11 +36,6 @@ _STROBES = {
     "out.",
 }
 _NEAR = 2000  # clocks; 64 axes with the S method need some 800
-
-
-def slots_of(axes: int, cycles: int) -> int | None:
-    """Return S for a tick of so many clocks; None if no number divides it."""
-    return next((slots for slots in range(max(axes, MIN_SLOTS), MAX_AXES + 1) if cycles % slots == 0), None)
 
 
 def one_axis(spec: STachometer | TrackTachometer, axes: int, slots: int) -> SAxis | TrackAxis:

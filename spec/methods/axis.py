@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from abc import abstractmethod
 from dataclasses import dataclass, fields
 from fractions import Fraction
+from functools import cached_property
 from typing import Any, cast
 
 from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.core.times import Times
 from tachometry.spec.core.timing import Timing
-from tachometry.spec.language.port import Port, Ports
+from tachometry.spec.language.port import Ports
 
 MAX_AXES = 64
 # What is counted is back in memory before the same axis is looked at again.
@@ -49,11 +51,6 @@ def output_cycles(axis: TachometerSpec) -> int:
     return 0 if output is None else output.pipelined_latency
 
 
-def without_swallowed(ports: Iterable[Port]) -> Ports:
-    """Return ports of an axis: it has no count of what the glitch filter has kept out."""
-    return Ports(port for port in ports if port.name != "swallowed_edges")
-
-
 @dataclass(frozen=True)
 class Plan:
     """Says when each axis has its turn.
@@ -87,3 +84,38 @@ class Plan:
     def end(self) -> int:
         """Clocks from the beginning of the first turn to the end of the last one."""
         return -(-self.axes // self.machines) * self.cycles + (self.machines - 1) * self.apart
+
+
+class AxisTimes(Times["OneAxis"]):
+    """Says how far ticks of an axis are apart, in rounds."""
+
+    @property
+    def min_tick_cycles(self) -> int:
+        # Each axis has its turn, and a round to hand its counts over.
+        return max(2, -(-self.spec.plan.end // self.spec.slots) + 1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OneAxis(TachometerSpec):
+    """Core of one axis that an axis of many is, to the bit; its clock is a round.
+
+    Parameters
+    ----------
+    axes_of_tick : int
+        How many have their turn in a tick.
+    slots : int
+        Clocks of a round.
+    """
+
+    axes_of_tick: int
+    slots: int
+
+    @cached_property
+    def ports(self) -> Ports:
+        """Ports of the core, less the count of the glitch filter, which no axis has."""
+        return Ports(port for port in super().ports if port.name != "swallowed_edges")
+
+    @property
+    @abstractmethod
+    def plan(self) -> Plan:
+        """When each axis has its turn."""

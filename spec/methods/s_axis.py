@@ -6,38 +6,20 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from tachometry.spec.language.option import ParameterError
-from tachometry.spec.language.port import Ports
-from tachometry.spec.methods.axis import Plan, output_cycles, own_options, without_swallowed
+from tachometry.spec.methods.axis import AxisTimes, OneAxis, Plan, output_cycles, own_options
 from tachometry.spec.methods.s import MAX_TABLE, STachometer, STimes
 
 # Clocks of a turn of the datapath: what its memories have is in registers, and m_e is.
 READ, DECIDE = 2, 3
 
 
-class SAxisTimes(STimes):
+class SAxisTimes(AxisTimes, STimes):
     """Says how far ticks of an axis are apart, in rounds."""
-
-    @property
-    def min_tick_cycles(self) -> int:
-        # Each axis has its turn, and a round to hand its count over.
-        assert isinstance(self.spec, SAxis)
-        return max(2, -(-self.spec.plan.end // self.spec.slots) + 1)
 
 
 @dataclass(frozen=True, kw_only=True)
-class SAxis(STachometer):
-    """Core of one axis that an axis of many is, to the bit; its clock is a round.
-
-    Parameters
-    ----------
-    axes_of_tick : int
-        How many have their turn in a tick.
-    slots : int
-        Clocks of a round.
-    """
-
-    axes_of_tick: int
-    slots: int
+class SAxis(OneAxis, STachometer):
+    """One of many axes with the S method."""
 
     times = cached_property(SAxisTimes)
 
@@ -56,11 +38,6 @@ class SAxis(STachometer):
                 f"must be at most {MAX_TABLE} with axes, not {spec.timing.max_ticks}: 1/m_s is looked up",
             )
         return cls(**own_options(spec, slots), axes_of_tick=axes, slots=slots)
-
-    @property
-    def ports(self) -> Ports:
-        """Ports of the core, less the count of the glitch filter, which no axis has."""
-        return without_swallowed(super().ports)
 
     @cached_property
     def plan(self) -> Plan:

@@ -5,45 +5,28 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from tachometry.spec.core.times import Times
 from tachometry.spec.formats.tracking_code import Program
 from tachometry.spec.formats.tracking_units import QUICK, Small
-from tachometry.spec.language.port import Ports
-from tachometry.spec.methods.axis import Plan, output_cycles, own_options, without_swallowed
+from tachometry.spec.methods.axis import AxisTimes, OneAxis, Plan, output_cycles, own_options
 from tachometry.spec.methods.track import FETCH_CLOCKS, TrackTachometer
 
 
-class TrackAxisTimes(Times["TrackAxis"]):
-    """Says how far ticks of an axis are apart, in rounds."""
-
-    @property
-    def min_tick_cycles(self) -> int:
-        # Each axis has its turn, and a round to hand its counts over.
-        return max(2, -(-self.spec.plan.end // self.spec.slots) + 1)
-
-
 @dataclass(frozen=True, kw_only=True)
-class TrackAxis(TrackTachometer):
-    """Core of one axis that an axis of many is, to the bit; its clock is a round.
+class TrackAxis(OneAxis, TrackTachometer):
+    """One of many axes with the tracking method.
 
     Parameters
     ----------
-    axes_of_tick : int
-        How many have their turn in a tick.
-    slots : int
-        Clocks of a round.
     tick_clocks : int
         Clocks of the shortest tick in which all turns must end.
     ahead : int
         Rounds from an edge to what is shown: the velocity is that of the clock in which it is shown.
     """
 
-    axes_of_tick: int
-    slots: int
     tick_clocks: int
     ahead: int = 0
 
-    times = cached_property(TrackAxisTimes)
+    times = cached_property(AxisTimes)
 
     @classmethod
     def of(cls, spec: TrackTachometer, axes: int, slots: int) -> TrackAxis:
@@ -58,11 +41,6 @@ class TrackAxis(TrackTachometer):
         if spec.max_memory is not None:
             own["max_memory"] = max(spec.max_memory // slots, own["timing"].tick_cycles)
         return cls(**own, axes_of_tick=axes, slots=slots, tick_clocks=spec.timing.tick_cycles)
-
-    @property
-    def ports(self) -> Ports:
-        """Ports of the core, less the count of the glitch filter, which no axis has."""
-        return without_swallowed(super().ports)
 
     @cached_property
     def program(self) -> Program:

@@ -14,7 +14,7 @@ module `CONTROL #(
     parameter DISTURBANCES = 0, GAIN_WIDTH = 1, GAIN_SHIFT = 0, LIMIT_WIDTH = 1,
     parameter S_CURRENT = 0, S_POSITION = 0, S_VELOCITY = 0, S_ACCELERATION = 0, S_DISTURBANCE = 0
 ) (
-    input clk, input rst, input wants, input update, input signed [VELOCITY_WIDTH-1:0] any_velocity, input enable,
+    input clk, input rst, input wants, input update, input measured, input signed [VELOCITY_WIDTH-1:0] any_velocity, input enable,
     input signed [POSITION_WIDTH-1:0] position, input signed [POSITION_WIDTH+FRACTION-1:0] command_position,
     input signed [COMMAND_WIDTH-1:0] command_velocity, input signed [ACCELERATION_WIDTH-1:0] command_acceleration
 `ifdef GAINS
@@ -55,7 +55,7 @@ module `CONTROL #(
       .gain_position(gain_position), .gain_velocity(gain_velocity), .gain_acceleration(gain_acceleration),
       .gain_disturbance(gain_disturbance), .current_limit(current_limit),
 `endif
-      .clk(clk), .rst(rst), .tick(tick), .update(update), .measured(1'b1), .velocity(velocity), .enable(enable), .position(position),
+      .clk(clk), .rst(rst), .tick(tick), .update(update), .measured(measured), .velocity(velocity), .enable(enable), .position(position),
       .command_position(command_position), .command_velocity(command_velocity),
       .command_acceleration(command_acceleration), .valid(valid), .current(current), .saturated(saturated), .y(y), .w(w)
   );

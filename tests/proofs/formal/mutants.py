@@ -292,7 +292,7 @@ MUTANTS = [
     Mutant("two axes of four slots", "px_axis", AxisCounters, "self.axis.eq(slot)", "self.axis.eq(self.slot)"),
     Mutant("two axes of four slots", "px_step", AxisCounters, "write.data.b.eq(new_b)", "write.data.b.eq(b)"),
     Mutant("two axes of four slots", "px_count", AxisCounters, "write.addr.eq(self.axis)", "write.addr.eq(slot)"),
-    Mutant("two axes of four slots", "px_count", AxisCounters, "Mux(first, 0, before.count)", "before.count", 32),
+    Mutant("two axes of four slots", "px_count", AxisCounters, "Mux(first, 0, before)", "before", 32),
     Mutant("three axes of five slots", "px_error", AxisCounters, "ready & illegal", "illegal"),
     Mutant("three axes of five slots", "px_complete", Rounds, "self.last.eq(clock.last)", "self.last.eq(self.first)"),
     Mutant("control loop", "pc_total", Controller, "self.position << self._form.position_bits", "0"),
