@@ -41,14 +41,14 @@ def velocity_errors(x: float) -> tuple[float, float]:
         deviation, greatest = velocity_errors(_SMALL)
         return deviation * (x / _SMALL) ** 1.5, greatest * x / _SMALL
     e1 = x / ((1 + x) * (1 + 2 * x))
-    gain = np.array([9 * e1 * (1 - x) + 6 * e1 * x * x, 18 * x * e1 * (2 - x), 60 * x * x * e1])
-    predict = np.array([[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]])
-    step = predict - np.outer(gain, predict[0])
-    shown = np.array([0.0, 1.0, -0.5 / x if x <= ORDER_ONE else 0.0])
-    state, response = gain, []
+    gain = 9 * e1 * (1 - x) + 6 * e1 * x * x, 18 * x * e1 * (2 - x), 60 * x * x * e1
+    shown = -0.5 / x if x <= ORDER_ONE else 0.0
+    (place, velocity, acceleration), response = gain, []
     for _ in range(math.ceil(12 / x)):
-        response.append(float(shown @ state))
-        state = step @ state
+        response.append(velocity + shown * acceleration)
+        expected = place + velocity + acceleration / 2
+        place, velocity = expected * (1 - gain[0]), velocity + acceleration - gain[1] * expected
+        acceleration -= gain[2] * expected
     return math.sqrt(sum(value * value for value in response)), sum(map(abs, response))
 
 
@@ -82,12 +82,13 @@ def errors(
     unit = tsuji.unit_velocity(counts_per_rev, tick_seconds)
     ratio = speed / unit
     x = share(ratio, tick_seconds, max_memory)
-    near, where = np.unique(np.rint(np.log2(x) * _STEPS), return_inverse=True)
-    near = 2 ** (near / _STEPS)
-    deviation, greatest = np.array([velocity_errors(float(each)) for each in near]).T
+    deviation, greatest = (np.asarray(column) for column in zip(*map(_nearby, x.tolist()), strict=True))
     per_tick = np.minimum(ratio, 1) * edge_error * unit  # an error of a count from one event to the next, in rad/s
-    scaled = x / near[where]
-    return (
-        deviation[where] * scaled**1.5 * per_tick / np.sqrt(np.maximum(ratio, 1)),
-        greatest[where] * scaled * per_tick,
-    )
+    return deviation * per_tick / np.sqrt(np.maximum(ratio, 1)), greatest * per_tick
+
+
+def _nearby(x: float) -> tuple[float, float]:
+    """Return `velocity_errors` from one that is near, as they are nearly proportional to powers of X."""
+    near = 2 ** (round(math.log2(x) * _STEPS) / _STEPS)
+    deviation, greatest = velocity_errors(near)
+    return deviation * (x / near) ** 1.5, greatest * x / near
