@@ -83,7 +83,7 @@ class Tachometer(wiring.Component):
     @property
     def idle(self) -> tuple[Idle, ...]:
         """Registers that a simulation may move on."""
-        boxes: dict[str, object] = {"datapath": self.datapath}
+        boxes: dict[str, object] = {"conditioner": self.conditioner, "datapath": self.datapath}
         if not self._spec.facts.own_ticks:
             boxes["sampling_clock"] = self.sampling_clock
         return idle_of(boxes)

@@ -68,7 +68,7 @@ def _bench(spec: AnySpec) -> dict[str, object]:
     tacho = spec.tachometer
     return {
         "axes": None,
-        "hold": max(_hold(tacho), 2 * (tacho.filter_clocks + 8)),
+        "hold": max(_hold(tacho), min(2 * (tacho.filter_clocks + 8), tacho.filter_clocks + 300)),
         "a": "quarter[1] ^ quarter[0]",
         "b": "quarter[1]",
         "velocity": "velocity",

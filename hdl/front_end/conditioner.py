@@ -4,6 +4,7 @@ from amaranth import Cat, Module, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.arithmetic.idle import Idle, idle_of
 from tachometry.hdl.front_end.glitch_filter import GlitchFilter
 from tachometry.hdl.wires.synchronizer import Synchronizer
 
@@ -43,6 +44,12 @@ class InputConditioner(wiring.Component):
             | {f"ready_{name}": Out(1) for name in lines}
             | {"clear": In(1), "swallowed_edges": Out(16)}
         )
+        self._filters = {name: GlitchFilter(filter_clocks) for name in lines if filter_clocks}
+
+    @property
+    def idle(self) -> tuple[Idle, ...]:
+        """Counters of the filters, which a simulation may move on."""
+        return idle_of({f"filter_{name}": box for name, box in self._filters.items()})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
@@ -54,7 +61,7 @@ class InputConditioner(wiring.Component):
             level = Signal(name=f"synchronised_{name}") if self._filter_clocks else getattr(self, f"level_{name}")
             m.submodules[f"sync_{name}"] = Synchronizer(getattr(self, name), level)
             if self._filter_clocks:
-                m.submodules[f"filter_{name}"] = line = GlitchFilter(self._filter_clocks)
+                m.submodules[f"filter_{name}"] = line = self._filters[name]
                 m.d.comb += [
                     line.level.eq(level),
                     line.valid.eq(clocks_since_reset[1]),

@@ -4,6 +4,8 @@ from amaranth import Module, Mux, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
+
 
 class GlitchFilter(wiring.Component):
     """Passes a level when it has held for `clocks` consecutive clocks.
@@ -38,6 +40,11 @@ class GlitchFilter(wiring.Component):
             raise ValueError(f"clocks must be at least 1, not {clocks}")
         self._clocks = clocks
         super().__init__({"level": In(1), "valid": In(1), "filtered": Out(1), "known": Out(1), "swallowed": Out(1)})
+
+    @property
+    def idle(self) -> tuple[Idle, ...]:
+        """The time that a level has held; a simulation may move it on."""
+        return (IdleCounter("held", 1, (self._clocks - 1,)),)
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

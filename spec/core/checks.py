@@ -15,6 +15,8 @@ from tachometry.spec.language.units import PI, format_time, rounded, signed_widt
 if TYPE_CHECKING:
     from tachometry.spec.core.tachometer import TachometerSpec
 
+_LONGEST_FILTER = Fraction(10, 1000)  # s; contacts bounce for 2 ms or so
+
 
 def check(spec: TachometerSpec) -> None:
     """Check what is asked for.
@@ -32,13 +34,10 @@ def check(spec: TachometerSpec) -> None:
     _check_velocity(spec)
     if not 8 <= spec.position_width <= 48:
         raise ParameterError("position_width", f"must be from 8 to 48, not {spec.position_width}")
-    if not 0 <= spec.filter_clocks <= 255:
-        longest = format_time(Fraction(255, spec.timing.clock_hz))
-        raise ParameterError(
-            "filter_clocks",
-            f"must be from 0 to 255 clocks, {longest}, not {spec.filter_clocks}: what bounces longer must be filtered "
-            "before the core, or needs a slower clock",
-        )
+    most = max(255, int(spec.timing.clock_hz * _LONGEST_FILTER))
+    if not 0 <= spec.filter_clocks <= most:
+        longest = format_time(Fraction(most) / spec.timing.clock_hz)
+        raise ParameterError("filter_clocks", f"must be from 0 to {most} clocks, {longest}, not {spec.filter_clocks}")
     if spec.index_reset and not spec.index:
         raise ParameterError("index_reset", "must be given together with an index")
     if spec.facts.bounds:

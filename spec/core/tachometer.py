@@ -16,7 +16,7 @@ from tachometry.spec.core.ports import bound_ports, ports_of
 from tachometry.spec.core.recovery import Recovery
 from tachometry.spec.core.scale import Scale
 from tachometry.spec.core.times import Times
-from tachometry.spec.core.timing import Timing, parse_clocks
+from tachometry.spec.core.timing import Timing, parse_clocks, parse_filter
 from tachometry.spec.core.widths import Widths
 from tachometry.spec.core.words import Words
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS, parse_lsb
@@ -129,10 +129,12 @@ class TachometerSpec:
     )
     filter_clocks: int = option(
         0,
-        "Glitch filter: a level is accepted after N stable clocks, 0 to 255, and reported N clocks late. Swallowed "
-        "edges are counted.",
+        "Glitch filter: a level is accepted when it has held for so long, up to 10 ms, and reported so much late. In "
+        "s, ms, us or ns, rounded up to clocks; a plain number is clocks. Swallowed edges are counted.",
         name="filter",
-        metavar="N",
+        metavar="TIME",
+        shown="0",
+        parse_at=parse_filter,
         tests=("", "1", "5"),
     )
     index: bool = option(False, "Index line z: its rising edge captures the position in index_position.")

@@ -1,5 +1,6 @@
 """The clock, the sampling period and the longest measurement."""
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -29,6 +30,13 @@ _GROUP = "Timing"
 def parse_clocks(what: str, text: str, timing: Mapping[str, Any]) -> int:
     """Return a time as a whole number of clocks, as `whole_clocks` does, for an option."""
     return whole_clocks(what, text, timing["clock_hz"])
+
+
+def parse_filter(what: str, text: str, timing: Mapping[str, Any]) -> int:
+    """Return a time, rounded up to clocks, or clocks with or without their unit, for an option."""
+    if re.fullmatch(r"\s*-?\d{1,20}\s*", text, re.ASCII):
+        return int(text)
+    return math.ceil(time_or_clocks(what, text, timing["clock_hz"]) * timing["clock_hz"])
 
 
 def _tick(what: str, text: str, timing: Mapping[str, Any]) -> int:

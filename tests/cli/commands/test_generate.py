@@ -181,7 +181,7 @@ def test_baud_reaches_the_bus(words: str, baud: int, cycles: int, tmp_path: Path
         ("--ppr 500 --unit rad/s --frac-bits 40", "--lsb must be from 2^-14 to 2^17 rad/s with this encoder and tick"),
         ("--ppr 9 --velocity-width 65", "--velocity-width must be from 8 to 64, not 65"),
         ("--ppr 9 --position-width 7", "--position-width must be from 8 to 48, not 7"),
-        ("--ppr 9 --filter 256", "--filter must be from 0 to 255 clocks, 5.3125us, not 256"),
+        ("--ppr 9 --filter 11ms", "--filter must be from 0 to 480000 clocks, 10ms, not 528000"),
         ("--ppr 9 --index-reset", "--index-reset must be given together with --index"),
         ("--ppr 9 --max-tick-period 30us", "--max-tick-period must be given together with --external-tick"),
         (

@@ -58,6 +58,15 @@ def test_golden_filter_against_the_definition(clocks: int, seed: int) -> None:
     assert (found, len(returned)) == (shown, gone), seed
 
 
+def test_a_filter_of_many_clocks() -> None:
+    levels = [k % 2 for k, run in enumerate([299, 1, 298, 300, 299, 301, 2, 600]) for _ in range(run)]
+    rows = [{"valid": 1, "level": level} for level in levels]
+    seen = clock_by_clock(GlitchFilter(300), [*rows, {}], ["filtered", "known", "swallowed"])
+    shown, gone = definition(levels, 300)
+    assert [row["filtered"] if row["known"] else -1 for row in seen[1:]] == shown
+    assert sum(row["swallowed"] for row in seen[:-1]) == gone
+
+
 @pytest.mark.parametrize("clocks", [1, 4])
 @pytest.mark.parametrize("level", [0, 1])
 def test_the_first_level_is_believed_after_as_many_clocks_as_any(clocks: int, level: int) -> None:

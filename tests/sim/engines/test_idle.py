@@ -88,6 +88,11 @@ def test_slow_shafts(method: str) -> None:
     assert check(*slow(method)) > 0.8
 
 
+def test_a_filter_of_milliseconds() -> None:
+    """The time that a level has held is skipped as well."""
+    assert check(*slow_shaft("t", filter="10ms")) > 0.8
+
+
 def test_many_axes() -> None:
     """Their rounds are skipped, also where edges at the beginning of a round are few rounds apart."""
     axis = of_texts("s", {"ppr": "16", "clock": "1MHz", "tick": "1ms", "max-time": "9ms"})

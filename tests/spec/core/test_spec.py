@@ -84,9 +84,8 @@ ERRORS = [
         "position_width must be from 8 to 48, not 7",
     ),
     (
-        lambda: STachometer(encoder=Encoder(500), timing=TIMING, filter_clocks=256),
-        "filter_clocks must be from 0 to 255 clocks, 5.3125us, not 256: what bounces longer must be filtered before "
-        "the core, or needs a slower clock",
+        lambda: STachometer(encoder=Encoder(500), timing=TIMING, filter_clocks=480_001),
+        "filter_clocks must be from 0 to 480000 clocks, 10ms, not 480001",
     ),
     (lambda: parse_frequency("clock", -5), "clock must be a positive whole number of Hz, not -5"),
 ]

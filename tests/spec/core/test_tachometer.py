@@ -6,7 +6,16 @@ from typing import Any
 
 import pytest
 
-from tachometry.spec import Encoder, MTachometer, RairanTachometer, STachometer, Timing, TTachometer
+from tachometry.spec import (
+    Encoder,
+    MTachometer,
+    RairanTachometer,
+    STachometer,
+    Timing,
+    TTachometer,
+    of_options,
+    of_texts,
+)
 from tachometry.spec.core.timing import MAX_TICK_CYCLES
 
 
@@ -17,7 +26,7 @@ def spec_of(tick: int = 20, max_ticks: int = 10, **options: Any) -> MTachometer:
 RANGES = [
     ("velocity_width", 8, 64),
     ("position_width", 8, 48),
-    ("filter_clocks", 0, 255),
+    ("filter_clocks", 0, 10_000),
     ("frac_bits", 4, 24),
     ("average", 1, 256),
 ]
@@ -30,6 +39,15 @@ def test_ends_of_ranges(name: str, least: int, most: int) -> None:
     for value in (least - 1, most + 1):
         with pytest.raises(ValueError, match=f"^{name} must be from {least} to {most}.*, not {value}"):
             spec_of(**{name: value})
+
+
+def test_a_filter_is_given_in_clocks_or_in_time() -> None:
+    """A time is rounded up to clocks: at a slow clock 255 clocks may be longer than 10 ms."""
+    for text, clocks in (("4", 4), ("4clk", 4), ("2ms", 96_000), ("10ms", 480_000), ("21ns", 2), ("0", 0)):
+        spec = of_texts("t", {"ppr": "8", "clock": "48MHz", "filter": text})
+        assert spec.filter_clocks == clocks
+        assert of_options(spec.options) == spec
+    assert of_texts("s", {"ppr": "8", "clock": "1kHz", "tick": "1ms", "filter": "255"}).filter_clocks == 255
 
 
 def test_ends_of_timing() -> None:
