@@ -11,7 +11,7 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo figures compare icarus test test-all lowest pytest verify formal formal-quick mutate upset bench studies size bitstreams docs api site lint clean
+.PHONY: help venv demo figures compare icarus ghdl test test-all lowest pytest verify formal formal-quick mutate upset bench studies size bitstreams docs api site lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 16
@@ -52,11 +52,19 @@ figures: $(LINKED) ## the papers' figures anew in build/figures, and what the pa
 	$(BIN)/tachometry figures -o build/figures
 	$(BIN)/python bench/figures.py build/figures/claims.csv
 
+# $(call apt,COMMAND,PACKAGE,PAGE): a program that is no package of Python.
+define apt
+@command -v $(1) >/dev/null || { \
+  sudo=$$([ $$(id -u) = 0 ] || echo "sudo -n"); \
+  $$sudo apt-get install -qq -y $(2) >/dev/null || { $$sudo apt-get update -qq && $$sudo apt-get install -qq -y $(2) >/dev/null; }; \
+} || { echo "make: $(1) is needed and could not be installed: see $(3)" >&2; exit 1; }
+endef
+
 icarus: ## Icarus Verilog, installed with apt-get if it is missing
-	@command -v iverilog >/dev/null || { \
-	  sudo=$$([ $$(id -u) = 0 ] || echo "sudo -n"); \
-	  $$sudo apt-get install -qq -y iverilog >/dev/null || { $$sudo apt-get update -qq && $$sudo apt-get install -qq -y iverilog >/dev/null; }; \
-	} || { echo "make: Icarus Verilog is needed and could not be installed: see https://github.com/steveicarus/iverilog" >&2; exit 1; }
+	$(call apt,iverilog,iverilog,https://github.com/steveicarus/iverilog)
+
+ghdl: ## GHDL, the compiler of VHDL, in the same way
+	$(call apt,ghdl,ghdl,https://github.com/ghdl/ghdl)
 
 test: $(VENV)/.test icarus ## lint, types and all tests but the nightly ones
 	@$(MAKE) --no-print-directory -j2 lint pytest
@@ -64,7 +72,7 @@ test: $(VENV)/.test icarus ## lint, types and all tests but the nightly ones
 pytest: $(VENV)/.test icarus
 	$(BIN)/pytest -q -n auto --dist worksteal -m "not nightly"
 
-test-all: lint icarus lowest ## lint, types and all tests: every pair of options, and every mutant that a test must catch
+test-all: lint icarus ghdl lowest ## lint, types and all tests: every pair of options, and every mutant that a test must catch
 	$(BIN)/pytest -q -n auto --dist worksteal
 
 # Packages that came later may warn of what the lowest versions do.

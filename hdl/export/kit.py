@@ -1,4 +1,4 @@
-"""Template, constraints, FuseSoC core file and smoke test lie beside the Verilog, to build it into a design."""
+"""Templates, constraints, FuseSoC core file and smoke test lie beside the Verilog, to build it into a design."""
 
 from functools import singledispatch
 
@@ -12,6 +12,7 @@ from tachometry.spec.registers.buses import Bus, ports_on
 KIT = {
     "NAME.core": "FuseSoC core file (CAPI2): targets default, lint and sim",
     "NAME_inst.v": "instantiation template",
+    "NAME_pkg.vhd": "package for VHDL with the component",
     "NAME_tb.sv": "smoke test, for the target sim",
     "NAME.xdc": "constraints for Vivado",
     "NAME.sdc": "constraints for Quartus and others",

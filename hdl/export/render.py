@@ -21,8 +21,8 @@ def render_files(templates: Iterable[str], name: str, **holes: object) -> dict[s
     return {file.replace("NAME", name): render(file, name=name, **holes) for file in templates}
 
 
-def _comment(text: str) -> str:
-    return "\n".join(f"// {line}" for line in textwrap.wrap(text, 110, break_on_hyphens=False))
+def _comment(text: str, mark: str = "//") -> str:
+    return "\n".join(f"{mark} {line}" for line in textwrap.wrap(text, 110, break_on_hyphens=False))
 
 
 def _literal(value: object) -> str:
@@ -33,6 +33,22 @@ def _literal(value: object) -> str:
 def _shape(port: Port) -> str:
     """Return what stands in Verilog between the kind of a signal and its name."""
     return "signed " * port.signed + f"[{port.width - 1}:0] " * (port.width > 1)
+
+
+def _ascii(text: str) -> str:
+    """Return a text in the letters that every reader of VHDL takes."""
+    return text.translate(str.maketrans({"²": "^2", "·": "*", "π": "pi", "−": "-", "–": "-"}))
+
+
+def _vhdl_name(name: str) -> str:
+    """Return a name of Verilog in VHDL, where underscores stand only between other letters of a plain one."""
+    return name if "_" not in (name[0], name[-1]) and "__" not in name else f"\\{name}\\"
+
+
+def _vhdl_type(port: Port) -> str:
+    if port.width == 1:
+        return "std_logic"
+    return f"{'signed' if port.signed else 'unsigned'}({port.width - 1} downto 0)"
 
 
 # Doubled braces stand in Verilog and Python as they are, so a hole has other marks than Jinja's own.
@@ -46,4 +62,11 @@ _TEMPLATES = Environment(
     variable_end_string="}",
 )
 _TEMPLATES.globals |= {"notice": lambda mark: notice(mark).rstrip("\n"), "version": version}
-_TEMPLATES.filters |= {"comment": _comment, "literal": _literal, "shape": _shape}
+_TEMPLATES.filters |= {
+    "ascii": _ascii,
+    "comment": _comment,
+    "literal": _literal,
+    "shape": _shape,
+    "vhdl_name": _vhdl_name,
+    "vhdl_type": _vhdl_type,
+}

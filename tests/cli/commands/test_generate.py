@@ -30,7 +30,7 @@ def test_options_reach_the_core(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert written == export(spec, "spindle")
     assert capsys.readouterr().out.split("\n\n")[0].split() == [
         str(tmp_path / "new" / "rtl" / f"spindle{suffix}")
-        for suffix in (".v", ".json", ".core", "_inst.v", "_tb.sv", ".xdc", ".sdc")
+        for suffix in (".v", ".json", ".core", "_inst.v", "_pkg.vhd", "_tb.sv", ".xdc", ".sdc")
     ]
 
 

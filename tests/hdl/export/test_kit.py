@@ -192,12 +192,16 @@ def test_fusesoc_runs_every_target(bus: str, tmp_path: Path) -> None:
 
 
 def test_fusesoc_finds_what_programs_need(tmp_path: Path) -> None:
-    """With the flags `driver` and `registers`, and without them not; a core without a bus has neither."""
+    """With the flags `driver`, `registers` and `vhdl`, and without them not; a core without a bus has no registers."""
     for file, text in made("s", "native").items():
         (tmp_path / file).write_text(text)
     home_ = {"HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path)}
-    of_flags = {"driver": ["spindle_driver.h", "spindle_regs.h"], "registers": ["spindle.rdl"]}
-    for flags in ([], ["driver"], ["registers"]):
+    of_flags = {
+        "driver": ["spindle_driver.h", "spindle_regs.h"],
+        "registers": ["spindle.rdl"],
+        "vhdl": ["spindle_pkg.vhd"],
+    }
+    for flags in ([], ["driver"], ["registers", "vhdl"]):
         words = [f"--flag={flag}" for flag in flags]
         run(tmp_path, BIN / "fusesoc", "--cores-root", ".", "run", "--setup", *words, "spindle", **home_)
         (edam,) = tmp_path.glob("build/*/default/*.eda.yml")
