@@ -35,9 +35,12 @@ def _shape(port: Port) -> str:
     return "signed " * port.signed + f"[{port.width - 1}:0] " * (port.width > 1)
 
 
+_IN_ASCII = {ord(letter): plain for letter, plain in {"²": "^2", "·": "*", "π": "pi"}.items()}
+
+
 def _ascii(text: str) -> str:
     """Return a text in the letters that every reader of VHDL takes."""
-    return text.translate(str.maketrans({"²": "^2", "·": "*", "π": "pi", "−": "-", "–": "-"}))
+    return text.translate(_IN_ASCII)
 
 
 def _vhdl_name(name: str) -> str:
