@@ -8,6 +8,7 @@ Exit codes: 0, 1 if a bar is missed, 2 if a tool fails.
 """
 
 import argparse
+import json
 import os
 import sys
 from collections import Counter
@@ -36,6 +37,13 @@ from tachometry.sim.studies.size import (
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "measured" / "size.md"
+# What `plan` and `generate` know of the cells of a method, by the configuration that is measured.
+CELLS = ROOT / "sim" / "studies" / "cells.json"
+METHOD_CELLS = {
+    "s": "reference",
+    **{name: f"{name}-max-speed" for name in ("m", "t", "mt", "rairan")},
+    **{name: name for name in ("track", "track-block")},
+}
 Item = TypeVar("Item")
 
 
@@ -373,6 +381,9 @@ def run(options: argparse.Namespace) -> int:
         print(table.markdown())
     if options.output:
         write(options.output, page(measured, tools))
+        if options.output == PAGE:
+            counted = {name: results[row, "ECP5"].figures["COMB"] for name, row in METHOD_CELLS.items()}
+            CELLS.write_text(json.dumps(counted, indent=2) + "\n", encoding="utf-8")
         print(f"written: {options.output}")
     return int(any(row[-1] for row in bar_table(results).rows))
 

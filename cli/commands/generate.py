@@ -23,7 +23,6 @@ from tachometry.hdl.export.files import CORE_FILES
 from tachometry.hdl.export.registers.files import REGISTER_FILES
 from tachometry.hdl.export.targets.target import TARGETS, bus_for
 from tachometry.sim.encoder.virtual import Encoding
-from tachometry.sim.studies.plan import Plans, default_range
 from tachometry.sim.testbench.vectors import cocotb_bench
 from tachometry.spec import AxesSpec
 from tachometry.spec.control import AnySpec, LoopSpec
@@ -172,8 +171,7 @@ def _bench(spec: AnySpec, name: str, bus: str, record: Callable[..., Encoding] |
 
 @singledispatch
 def _print(spec: AnySpec, bus: str) -> None:
-    alone = spec.tachometer
-    print_core(alone, Plans(alone, {}, *default_range(alone)), bus)
+    print_core(spec.tachometer, bus)
 
 
 @_print.register

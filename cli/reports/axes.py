@@ -1,7 +1,8 @@
 """`generate` prints these lines of a core of many axes."""
 
-from tachometry.cli.reports.core import configuration, full_scale_text, memory_text, speed_text
+from tachometry.cli.reports.core import configuration, full_scale_text, measured, memory_text, speed_text
 from tachometry.cli.reports.terminal import print_rows
+from tachometry.sim.studies.plan import Plans
 from tachometry.spec import AxesSpec
 from tachometry.spec.language.units import plural
 from tachometry.spec.registers.manifest import manifest
@@ -13,7 +14,7 @@ def print_axes_core(spec: AxesSpec) -> None:
     greatest = axis.widths.max_velocity * alone.scale.unit_velocity
     latencies = manifest(spec)["latency_cycles"]
     own = {
-        "greatest speed": f"{speed_text(greatest)} ({axis.widths.max_velocity} counts per tick)",
+        "greatest speed": f"{speed_text(alone, greatest)} ({axis.widths.max_velocity} counts per tick)",
         "full scale": full_scale_text(alone, axis.scale.full_scale),
         "widths": ", ".join(f"{port.name} {port.width}" for port in axis.ports.outputs if port.width > 1),
         **_reciprocal(spec),
@@ -25,6 +26,7 @@ def print_axes_core(spec: AxesSpec) -> None:
         f"{plural(spec.turn_cycles, 'clock')} of a tick"
     )
     rows = [(name, own.get(name, value)) for name, value in configuration(alone) if name != "note"]
+    rows += measured(alone, Plans.of(alone, greatest))
     print_rows([rows[0], ("axes", turns), *rows[1:], *(("note", note) for note in spec.words.notes)])
 
 

@@ -1,22 +1,24 @@
 """`generate` and `plan` print what a core is, what it measures, and how wide and late its outputs are."""
 
-import math
+import numpy as np
 
 from tachometry.cli.reports.terminal import print_rows
 from tachometry.sim.studies.plan import Plans
+from tachometry.sim.theory.performance import REAL_DISC
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control import AnySpec
 from tachometry.spec.formats.velocity_output import NATIVE
-from tachometry.spec.language.units import SPEED, SpeedUnit, plural, short_time
+from tachometry.spec.language.units import SpeedUnit, plural, short_time
 from tachometry.spec.registers.loop import registers_of
 from tachometry.spec.registers.manifest import manifest
 from tachometry.spec.registers.map import WORD
 
 
-def print_core(spec: TachometerSpec, plans: Plans, bus: str = "none") -> None:
-    """Print the configuration of a core, its errors at worst and at the ends, and its registers on a bus."""
+def print_core(spec: TachometerSpec, bus: str = "none") -> None:
+    """Print the configuration of a core, what it measures, and its registers on a bus."""
     registers = [] if bus == "none" else [registers_row(spec, bus)]
-    print_rows([*configuration(spec), *_resolution(spec, plans), *registers])
+    plans = Plans.of(spec)
+    print_rows([*configuration(spec), *measured(spec, plans), *advice(plans), *registers])
 
 
 def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
@@ -24,7 +26,7 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
     encoder, timing = spec.encoder, spec.timing
     counts = f"{encoder.pulses_per_rev} pulses per revolution x{encoder.decoding}: {encoder.counts_per_rev} counts"
     fastest = spec.scale.greatest_speed
-    greatest = f"{speed_text(fastest)} ({fastest / spec.scale.unit_velocity:.6g} counts per tick)"
+    greatest = f"{speed_text(spec, fastest)} ({fastest / spec.scale.unit_velocity:.6g} counts per tick)"
     latencies = manifest(spec)["latency_cycles"]
     memory = spec.words.memory
     return [
@@ -36,13 +38,13 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
         ("clock", f"{timing.clock_hz:,} Hz"),
         ("tick", f"{short_time(timing.tick_seconds)} ({plural(timing.tick_cycles, 'clock')})"),
         ("maximum time", f"{short_time(timing.max_ticks * timing.tick_seconds)} ({timing.max_ticks} ticks)"),
-        ("unit velocity", f"{speed_text(spec.scale.unit_velocity)} (1 count per tick)"),
+        ("unit velocity", f"{speed_text(spec, spec.scale.unit_velocity)} (1 count per tick)"),
         ("greatest speed", greatest),
         ("full scale", _full_scale(spec)),
         (
             "one LSB of velocity",
-            f"2^{-spec.widths.frac_bits} {spec.unit} = {spec.scale.rad_per_s_per_lsb:.6g} rad/s; rounding adds up to "
-            f"{spec.scale.rounding_lsb} of it",
+            f"2^{-spec.widths.frac_bits} {spec.unit} = {speed_text(spec, spec.scale.rad_per_s_per_lsb)}; "
+            f"rounding adds up to {spec.scale.rounding_lsb} of it",
         ),
         ("widths", ", ".join(f"{port.name} {port.width}" for port in spec.ports.outputs if port.width > 1)),
         *([] if memory is None else [("reciprocal", memory_text(*memory))]),
@@ -59,10 +61,10 @@ def choice(spec: TachometerSpec) -> list[tuple[str, str]]:
 
 
 def full_scale_text(spec: TachometerSpec, full_scale: int) -> str:
-    """Return a greatest velocity in LSB, in the unit of a core and in rad/s."""
+    """Return a greatest velocity in LSB, in the unit of a core, and in that of speeds where it has none."""
     value = f"{full_scale * 2.0**-spec.widths.frac_bits:.9g} {spec.unit}"
     if spec.unit == NATIVE:
-        value += f" = {full_scale * spec.scale.rad_per_s_per_lsb:.6g} rad/s"
+        value += f" = {speed_text(spec, full_scale * spec.scale.rad_per_s_per_lsb)}"
     return f"{value}, either way"
 
 
@@ -75,17 +77,50 @@ def _full_scale(spec: TachometerSpec) -> str:
     return f"{held}, counted is up to {counted:.6g} {spec.scale.shown_unit.name}"
 
 
-def worst_error(spec: TachometerSpec, plans: Plans) -> list[tuple[str, str]]:
-    """Return the row that says how great the error may be at constant speed, and where; none if it is not known."""
+def measured(spec: TachometerSpec, plans: Plans) -> list[tuple[str, str]]:
+    """Return the rows that say what a core measures: range, worst error and delay; none if it is not known."""
     if (worst := plans.worst) is None:
         return []
-    unit = typed_unit(spec)
-    (speed,), (resolution,), (time,) = worst.speed, worst.resolution, worst.measurement_time
-    error = resolution + spec.scale.rounding_lsb * spec.scale.rad_per_s_per_lsb
-    at = f"{unit.of(speed):.6g} {unit.name}, measured in {short_time(float(time))}"
-    speeds = f"{unit.of(plans.low):.4g} to {unit.of(plans.high):.6g} {unit.name}"
-    shown = f"{unit.of(error):.4g} {unit.name} at {at}; at constant speeds from {speeds}, with an ideal disc"
-    return [("worst error", shown)]
+    low, high = plans.range
+    below = "; below, a count may take longer than the maximum time" * (low > plans.low)
+    rounding = spec.scale.rounding_lsb * spec.scale.rad_per_s_per_lsb
+    ideal = float(worst.resolution[0]) + rounding
+    error = speed_text(spec, ideal + float(worst.disc[0]), 3)
+    at, time = speed_text(spec, float(worst.speed[0]), 4), short_time(float(worst.measurement_time[0]))
+    return [
+        ("range", f"{speed_text(spec, low, 4)} to {speed_text(spec, high)}{below}"),
+        ("worst error", f"{error} at a constant {at}, measured in {time}, with a real disc"),
+        ("real disc", f"{_REAL}; an ideal one has {speed_text(spec, ideal, 3)} there"),
+        ("delay", _delay(spec, plans)),
+    ]
+
+
+_REAL = (
+    f"{100 * REAL_DISC['jitter']:g} % jitter, edges off by {REAL_DISC['nonuniformity']:g} of their pitch, phase by "
+    f"{REAL_DISC['phase_error_deg']:g} degrees"
+)
+
+
+def _delay(spec: TachometerSpec, plans: Plans) -> str:
+    late = short_time(spec.times.seconds(spec.latency.tick_to_velocity))
+    if spec.words.on_ramps:
+        return f"{late} from tick to velocity; {spec.words.on_ramps}"
+    times = plans.line.measurement_time / 2
+    halves = dict.fromkeys(short_time(float(find(times))) for find in (np.nanmin, np.nanmax))
+    return f"{late} from tick to velocity, and half of the time it is measured in: {' to '.join(halves)}"
+
+
+def advice(plans: Plans) -> list[tuple[str, str]]:
+    """Return the row that names a method that would be much better, or much smaller and as good; none if none is."""
+    if (found := plans.advice) is None:
+        return []
+    gain = found.gain
+    if gain >= 2:
+        error = f"{float(f'{gain:.1g}'):,.0f} times less error at a constant speed"
+    else:
+        error = f"{1 / gain:.1f} times the error" if gain < 1 / 1.05 else "no more error"
+    cells = f"{float(f'{abs(found.cells):.2g}'):,.0f} cells {'more' if found.cells > 0 else 'fewer'}"
+    return [("advice", f"{found.method}: {error}, {cells} (--method {found.method})")]
 
 
 def typed_unit(spec: TachometerSpec) -> SpeedUnit:
@@ -93,24 +128,6 @@ def typed_unit(spec: TachometerSpec) -> SpeedUnit:
     if spec.unit == NATIVE and spec.max_speed is not None:
         return SpeedUnit(spec.max_speed.unit)
     return spec.scale.shown_unit
-
-
-def _resolution(spec: TachometerSpec, plans: Plans) -> list[tuple[str, str]]:
-    """Return what the equations of the method promise at the ends of its range."""
-    unit, ends = typed_unit(spec), plans.ends
-    rows = worst_error(spec, plans)
-    columns = zip(("low", "high"), ends.speed, ends.resolution, ends.measurement_time, strict=True)
-    for name, speed, resolution, time in columns:
-        if math.isnan(resolution):
-            shown = "unknown: there are no equations for the method, or it is too fast for it"
-        else:
-            rounding = spec.scale.rounding_lsb * spec.scale.rad_per_s_per_lsb
-            shown = (
-                f"{unit.of(resolution):.4g} {unit.name} and {unit.of(rounding):.2g} by rounding, at "
-                f"{unit.of(speed):.6g} {unit.name}, measured in {short_time(float(time))}"
-            )
-        rows.append((f"resolution, {name}", shown))
-    return rows
 
 
 def registers_row(spec: AnySpec, bus: str) -> tuple[str, str]:
@@ -131,6 +148,7 @@ def _standstill(spec: TachometerSpec) -> str:
     return f"reads 0 at most {time} ({plural(rest, 'tick')}) after the last count's tick"
 
 
-def speed_text(rad_per_s: float) -> str:
-    """Return a speed in all units."""
-    return " = ".join(f"{SpeedUnit(unit).of(rad_per_s):.6g} {unit}" for unit in SPEED)
+def speed_text(spec: TachometerSpec, rad_per_s: float, digits: int = 6) -> str:
+    """Return a speed in the unit that was typed."""
+    unit = typed_unit(spec)
+    return f"{unit.of(rad_per_s):.{digits}g} {unit.name}"

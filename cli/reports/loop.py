@@ -1,7 +1,8 @@
 """`generate` prints these lines of a core with a control loop."""
 
-from tachometry.cli.reports.core import configuration, registers_row
+from tachometry.cli.reports.core import configuration, measured, registers_row
 from tachometry.cli.reports.terminal import print_rows
+from tachometry.sim.studies.plan import Plans
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.language.units import plural, short_time
 
@@ -34,4 +35,6 @@ def print_loop_core(spec: LoopSpec, bus: str = "none") -> None:
         ),
         ("widths of the loop", widths),
     ]
-    print_rows([*configuration(spec.tachometer), *rows, *([] if bus == "none" else [registers_row(spec, bus)])])
+    registers = [] if bus == "none" else [registers_row(spec, bus)]
+    alone = spec.tachometer
+    print_rows([*configuration(alone), *measured(alone, Plans.of(alone)), *rows, *registers])

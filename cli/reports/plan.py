@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 from rich.text import Text
 
-from tachometry.cli.reports.core import configuration, worst_error
+from tachometry.cli.reports.core import advice, configuration, measured
 from tachometry.cli.reports.terminal import print_rows, print_table, stdout_console
 from tachometry.sim.studies.plan import Plan, Plans
 from tachometry.spec import TachometerSpec
@@ -13,14 +13,14 @@ from tachometry.spec.language.units import SpeedUnit, short_time
 
 
 def print_plan(spec: TachometerSpec, plans: Plans, unit: str) -> None:
-    """Print the configuration of a core, its worst error and its plan, speeds in `unit`."""
+    """Print the configuration of a core, what it measures and its plan, speeds in `unit`."""
     expected = plans.table
-    print_rows([*configuration(spec), *worst_error(spec, plans)])
+    print_rows([*configuration(spec), *measured(spec, plans), *advice(plans)])
     per_unit = SpeedUnit(unit).rad_per_s
     heads = (f"speed ({unit})", "counts/tick", "m_s (ticks)", "T_m", f"Q_V ({unit})", "error/V (%)", "update by")
     rows = []
     columns = zip(*(column.tolist() for column in vars(expected).values()), strict=True)
-    for speed, counts, m_s, t_m, q_v, forced in columns:
+    for speed, counts, m_s, t_m, q_v, forced, _ in columns:
         cells = (
             f"{speed / per_unit:.6g}",
             f"{counts:.6g}",
@@ -36,7 +36,7 @@ def print_plan(spec: TachometerSpec, plans: Plans, unit: str) -> None:
     print_table(heads, rows, left=(len(heads) - 1,))
     remark = f"{spec.words.remark} " if spec.words.remark else ""
     console.print(
-        f"\n{remark}error/V is Q_V and the rounding together."
+        f"\n{remark}error/V is Q_V and the rounding together, with an ideal disc."
         + ("\nTimes are those of the nominal tick; an external one may be longer." if spec.external_tick else ""),
         soft_wrap=True,
     )

@@ -1,7 +1,9 @@
 """The equations alone say what the methods promise at each speed."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -10,13 +12,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tachometry.sim.signals.files import rows_of, write_csv
-from tachometry.sim.theory.performance import PERFORMANCES, unknown
+from tachometry.sim.theory.performance import PERFORMANCES, disc_counts, disc_error, unknown
 from tachometry.sim.theory.tsuji import unit_velocity
-from tachometry.spec import TachometerSpec
+from tachometry.spec import METHODS, ParameterError, TachometerSpec, TrackTachometer
+from tachometry.spec.formats.tracking_units import QUICK
 from tachometry.spec.language.units import SpeedUnit
 
 _ROWS = 12  # of a table
 _UNITS = 10  # of the default range
+# Cells of an ECP5 that the core of a method takes with the options of the reference core; `make size` writes them.
+CELLS: dict[str, int] = json.loads(Path(__file__).with_name("cells.json").read_text(encoding="utf-8"))
+_BETTER, _SMALLER, _ALIKE = 10, 2, 1.5  # ratios: of errors that are much less, of much fewer cells, of errors as good
 _STEADY, _MULTIPLES, _DISTANCES = 1000, 1000, 16  # samples: speeds, multiples of ω_u, distances from each of them
 
 
@@ -38,6 +44,8 @@ class Plan:
         ticks have counted alike). NaN, as the times, where the method cannot measure, or nothing is known of it.
     forced : bool array, shape (n,)
         The maximum time ends the measurement.
+    disc : float64 array, shape (n,), rad/s
+        What a real disc adds to the error, see `sim.theory.performance.disc_error`.
     """
 
     speed: NDArray[np.float64]
@@ -46,6 +54,7 @@ class Plan:
     measurement_time: NDArray[np.float64]
     resolution: NDArray[np.float64]
     forced: NDArray[np.bool_]
+    disc: NDArray[np.float64]
 
     @property
     def relative(self) -> NDArray[np.float64]:
@@ -74,6 +83,7 @@ def plan_at(spec: TachometerSpec, speed: ArrayLike | None = None) -> Plan:
         measurement_time=found.time,
         resolution=found.resolution,
         forced=found.forced,
+        disc=disc_error(spec, speed, found),
     )
 
 
@@ -122,6 +132,12 @@ class Plans:
     low: float
     high: float
 
+    @staticmethod
+    def of(spec: TachometerSpec, greatest: float = math.inf) -> "Plans":
+        """Return those of a core alone, over the range that is of interest, up to a greatest speed in rad/s."""
+        low, high = default_range(spec)
+        return Plans(spec, {}, low, min(high, greatest))
+
     @cached_property
     def table(self) -> Plan:
         """The plan of the core at a few speeds."""
@@ -133,17 +149,50 @@ class Plans:
         return {name: plan_at(spec, self.table.speed) for name, spec in self.methods.items()}
 
     @property
-    def ends(self) -> Plan:
-        """The plan of the core at the least and the greatest speed."""
-        return plan_at(self.spec, [self.low, self.high])
+    def range(self) -> tuple[float, float]:
+        """The least and the greatest speed, in rad/s, that the core measures with a real disc.
+
+        Below the least a count may take longer than the maximum time.
+        """
+        measured = self.line.speed[~np.isnan(self.line.resolution)]
+        slowest = self.spec.scale.unit_velocity / self.spec.timing.max_ticks
+        ends = plan_at(self.spec, slowest / 2).forced[0]
+        low = max(self.low, slowest * (1 + disc_counts(self.spec))) if ends else self.low
+        return low, float(measured[-1]) if len(measured) else self.high
+
+    @cached_property
+    def worst(self) -> Plan | None:
+        """The plan at the speed of the range where the error with a real disc may be greatest; None where nothing is
+        known of the method.
+        """
+        return self._worst(self.spec)
+
+    def _worst(self, spec: TachometerSpec) -> Plan | None:
+        speed = self.line.speed
+        plan = self.line if spec is self.spec else plan_at(spec, speed)
+        error = (plan.resolution + plan.disc)[(speed >= self.range[0]) & (speed <= self.range[1])]
+        known = len(error) and not np.isnan(error).any()
+        return plan_at(spec, speed[speed >= self.range[0]][np.argmax(error)]) if known else None
 
     @property
-    def worst(self) -> Plan | None:
-        """The plan at the speed where the error may be greatest; None where nothing is known of the method."""
-        resolution = self.line.resolution
-        if np.isnan(resolution).all():
+    def advice(self) -> "Advice | None":
+        """Another method that would be much better, or much smaller and as good; None: no other is.
+
+        It has all that methods have alike as this core, and measures all of its range.
+        """
+        here, own = CELLS.get(_measured_as(self.spec)), _error(self.spec, self.worst)
+        if here is None or own is None:
             return None
-        return plan_at(self.spec, self.line.speed[np.nanargmax(resolution)])
+        better, smaller = [], []
+        for spec in _others(self.spec):
+            error, cells = _error(spec, self._worst(spec)), CELLS.get(_measured_as(spec))
+            if error is None or cells is None:
+                continue
+            one = Advice(spec.method, own / error, cells - here)
+            better += [one] if one.gain >= _BETTER else []
+            smaller += [one] if one.gain >= 1 / _ALIKE and cells * _SMALLER <= here else []
+        best = max(better, key=lambda one: one.gain, default=None)
+        return best or min(smaller, key=lambda one: one.cells, default=None)
 
     @cached_property
     def line(self) -> Plan:
@@ -167,6 +216,49 @@ class Plans:
         write_csv(path, ("method", *next(iter(each.values()))), rows)
 
 
+@dataclass(frozen=True)
+class Advice:
+    """Says what another method would be.
+
+    Parameters
+    ----------
+    method : str
+    gain : float
+        How many times less its greatest error is, with a real disc.
+    cells : int
+        How many more cells it takes.
+    """
+
+    method: str
+    gain: float
+    cells: int
+
+
+def _others(spec: TachometerSpec) -> Iterator[TachometerSpec]:
+    """Yield the cores of other methods that can be, with all that methods have alike as in this one."""
+    common = {one.name: getattr(spec, one.name) for one in fields(TachometerSpec) if one.name != "chosen"}
+    for other in METHODS.values():
+        if other is not type(spec):
+            try:
+                yield other(**common)
+            except ParameterError:
+                continue
+
+
+def _error(spec: TachometerSpec, worst: Plan | None) -> float | None:
+    """Return the greatest error with a real disc, rounding included, in rad/s."""
+    return None if worst is None else float(worst.resolution[0] + worst.disc[0]) + _rounding(spec)
+
+
+def _rounding(spec: TachometerSpec) -> float:
+    return spec.scale.rounding_lsb * spec.scale.rad_per_s_per_lsb
+
+
+def _measured_as(spec: TachometerSpec) -> str:
+    block = isinstance(spec, TrackTachometer) and spec.program.times is QUICK
+    return f"{spec.method}{'-block' * block}"
+
+
 def _columns(plan: Plan, unit: SpeedUnit) -> dict[str, NDArray[Any]]:
     return {
         f"speed_{unit.suffix}": unit.of(plan.speed),
@@ -174,6 +266,7 @@ def _columns(plan: Plan, unit: SpeedUnit) -> dict[str, NDArray[Any]]:
         "interval_ticks": plan.interval,
         "measurement_time_s": plan.measurement_time,
         f"resolution_{unit.suffix}": unit.of(plan.resolution),
+        f"disc_{unit.suffix}": unit.of(plan.disc),
         "relative_resolution": plan.relative,
         "forced": plan.forced.astype(np.int64),
     }

@@ -1,4 +1,4 @@
-"""At a constant speed the methods of both papers have a resolution Q_V and a measurement time T_m, computed here.
+"""At a constant speed each method has a resolution Q_V and a measurement time T_m, and an error with a real disc.
 
 All are vectorised over the speeds, in rad/s and greater than 0. `max_ticks` is the maximum measurement time, after
 which a value is given by force (Sec. V-B); None: there is none.
@@ -26,6 +26,10 @@ from tachometry.spec import (
 
 # An interval of just `max_ticks` is to be no longer for the rounding of a double.
 _SLACK = 1e-9
+
+# A real disc, with the options of the virtual encoder: what `tachometry compare` calls a real encoder.
+REAL_DISC = {"jitter": 0.05, "nonuniformity": 0.1, "phase_error_deg": 10.0}
+_DEVIATIONS = 3  # of what is random and has no bound
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,3 +238,42 @@ PERFORMANCES: dict[str, Callable[[Any, Floats], Performance]] = {
     "rairan": _of_rairan,
     "track": _of_track,
 }
+
+
+def disc_counts(spec: TachometerSpec) -> float:
+    """Return by how many counts the distance of two edges of a real disc may be wrong.
+
+    Random parts count three standard deviations. The phase of B matters where edges of both lines are counted, and not
+    where windows last whole cycles.
+    """
+    decoding = spec.encoder.decoding
+    both = decoding == 4 and not (isinstance(spec, MTTachometer) and spec.whole_cycles)
+    quarters = 2 * REAL_DISC["nonuniformity"] + _DEVIATIONS * math.sqrt(2) * REAL_DISC["jitter"]
+    return quarters * decoding / 4 + (REAL_DISC["phase_error_deg"] / 90 if both else 0)
+
+
+def disc_error(spec: TachometerSpec, speed: Floats, found: Performance) -> Floats:
+    """Return how much a real disc adds to the greatest error, in rad/s, shape (n,); NaN where a method cannot measure.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+    speed : float64 array, shape (n,), rad/s
+    found : Performance
+        Of the core at these speeds, with an ideal disc.
+
+    Notes
+    -----
+    With windows of ticks the distance is wrong, and their time is right; over all speeds no error is greater, though
+    it may be at some. With windows from count to count the time is wrong: of c counts c - d are measured. The tracking
+    method learns the phase, and its least squares take the mean of the rest.
+    """
+    counts, off = spec.encoder.counts_per_rev, disc_counts(spec)
+    pitch = 2 * math.pi / counts
+    if isinstance(spec, TrackTachometer):
+        spread = math.hypot(REAL_DISC["nonuniformity"] / math.sqrt(3), REAL_DISC["jitter"]) * spec.encoder.decoding / 4
+        tick_seconds, memory = float(spec.timing.tick_seconds), float(spec.form.memory_seconds)
+        return _DEVIATIONS * tracking.errors(speed, spread, counts, tick_seconds, memory)[0]
+    if isinstance(spec, TTachometer | MTTachometer):
+        return speed * off / (np.maximum(speed * found.time / pitch, 1) - off)
+    return off * pitch / found.time

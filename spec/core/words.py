@@ -23,6 +23,11 @@ class Words(Follows[S]):
         return ", ".join(filter(None, (self.spec.method, self.spec.chosen)))
 
     @property
+    def on_ramps(self) -> str:
+        """How it follows a constant acceleration without delay; empty: it lags by half of its measurement."""
+        return ""
+
+    @property
     def remark(self) -> str:
         """A remark below the plan of the method; empty: none."""
         return ""

@@ -127,6 +127,10 @@ class TrackWords(Words["TrackTachometer"]):
         return f"{super().heading}{self._bound}"
 
     @property
+    def on_ramps(self) -> str:
+        return "it does not lag at constant acceleration"
+
+    @property
     def _bound(self) -> str:
         longest = self.spec.max_memory
         return "" if longest is None else f", memory of at most {format_time(self.spec.times.seconds(longest))}"

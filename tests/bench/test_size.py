@@ -8,6 +8,7 @@ from support.script import load
 
 from tachometry.hdl.export import export
 from tachometry.sim.studies import size as synthesis
+from tachometry.sim.studies.plan import CELLS
 from tachometry.spec import METHODS, Encoder, STachometer, Timing
 from tachometry.spec.control import LoopSpec
 
@@ -370,3 +371,10 @@ def test_latency_of_a_core(monkeypatch: pytest.MonkeyPatch) -> None:
     for spec, latency in ((SPEC, SPEC.latency.tick_to_velocity), (loop, loop.tick_to_result)):
         found = synthesis.measure_core(spec, size.TARGETS["HX8K"], "", {})
         assert found.figures == {"LC": 1, "latency": latency}
+
+
+def test_the_cells_that_commands_know_are_those_of_the_page() -> None:
+    page = size.PAGE.read_text(encoding="utf-8").split("\n## ")[1]
+    rows = dict(re.findall(r"^\| (\S+) \| [^|]+ \| (\d+) \|", page, re.MULTILINE))
+    assert {name: int(rows[row]) for name, row in size.METHOD_CELLS.items()} == CELLS
+    assert {name.removesuffix("-block") for name in CELLS} == set(METHODS)

@@ -41,8 +41,8 @@ def test_configuration_agrees_with_the_manifest(capsys: pytest.CaptureFixture[st
     assert rows["clock"] == "48,000,000 Hz"
     assert rows["tick"] == "20us (960 clocks)"
     assert rows["maximum time"] == "10ms (500 ticks)"
-    assert rows["unit velocity"] == "314.159 rad/s = 50 rev/s = 3000 rpm (1 count per tick)"
-    assert rows["greatest speed"] == "628.319 rad/s = 100 rev/s = 6000 rpm (2 counts per tick)"
+    assert rows["unit velocity"] == "314.159 rad/s (1 count per tick)"
+    assert rows["greatest speed"] == "628.319 rad/s (2 counts per tick)"
     assert float(rows["one LSB of velocity"].split()[3]) == pytest.approx(100 * math.pi / 65536, rel=1e-5)
     assert rows["full scale"] == "2 count/tick = 628.319 rad/s, either way"
     assert {name: int(bits) for name, bits in (pair.split() for pair in rows["widths"].split(", "))} == {
@@ -88,20 +88,30 @@ def test_the_worst_error_is_told_with_where_it_is(
 ) -> None:
     """No row of the CSV has a greater one, in the unit of the greatest speed that was typed."""
     core = ["--ppr", "500", "--max-speed", "3000rpm", "--method", method]
-    assert run("plan", *core, "--csv", tmp_path / "p.csv") == 0
-    (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("worst error"))
-    match = re.match(
-        r"worst error +(\S+) rpm at (\S+) rpm, measured in .* from \S+ to 3000 rpm, with an ideal disc", line
-    )
-    assert match is not None
-    with (tmp_path / "p.csv").open() as file:
-        rows = [(float(row["resolution_rad_s"]), float(row["speed_rad_s"])) for row in csv.DictReader(file)]
-    greatest = max(value for value, _ in rows if not math.isnan(value))
-    worst, speed = (float(match[number]) * math.pi / 30 for number in (1, 2))
-    assert worst == pytest.approx(greatest, rel=0.1)
-    assert any(value > 0.999 * greatest and at == pytest.approx(speed, rel=1e-4) for value, at in rows)
     assert run("generate", *core, "-o", tmp_path / "core") == 0
-    assert " ".join(line.split()) in " ".join(capsys.readouterr().out.split())
+    generated = capsys.readouterr().out.split()
+    assert run("plan", *core, "--csv", tmp_path / "p.csv") == 0
+    told = capsys.readouterr().out
+    assert told.split("\n\n")[0].split() == generated[generated.index("method") :]
+    rows = tables(told)[0]
+    match = re.match(r"(\S+) rpm at a constant (\S+) rpm, measured in \S+, with a real disc$", rows["worst error"])
+    ideal = re.search(r"an ideal one has (\S+) rpm there$", rows["real disc"])
+    least = re.match(r"(\S+) rpm to 3000 rpm; below, ", rows["range"])
+    assert match is not None
+    assert ideal is not None
+    assert least is not None
+    with (tmp_path / "p.csv").open() as file:
+        shown = [
+            (*(float(row[f"{name}_rad_s"]) for name in ("speed", "resolution", "disc")),)
+            for row in csv.DictReader(file)
+        ]
+    rpm = math.pi / 30
+    errors = {speed: (q_v + disc, q_v) for speed, q_v, disc in shown if speed >= float(least[1]) * rpm}
+    greatest = max(errors, key=lambda speed: errors[speed][0])
+    assert float(match[2]) * rpm == pytest.approx(greatest, rel=1e-3)
+    lsb = json.loads((tmp_path / "core" / "tachometer.json").read_text())["velocity"]["rad_per_s_per_lsb"]
+    for told_error, error in zip((match[1], ideal[1]), errors[greatest], strict=True):
+        assert float(told_error) * rpm == pytest.approx(error, rel=0.005, abs=1.1 * lsb)
 
 
 def test_a_multiple_of_the_unit_velocity_is_forced(capsys: pytest.CaptureFixture[str]) -> None:

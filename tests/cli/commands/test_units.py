@@ -81,5 +81,6 @@ def test_the_core_is_described_when_it_is_generated(tmp_path: Path, capsys: pyte
     assert rows["one LSB of velocity"].startswith("2^-5 rpm = ")
     assert rows["widths"].startswith("velocity 18, interval 7, ")
     assert rows["tick_to_velocity"].startswith(f"{described['latency_cycles']['tick_to_velocity']} clocks")
-    assert rows["resolution, low"].endswith("at 0.6 rpm, measured in 10ms")
-    assert "at 4000 rpm, measured in " in rows["resolution, high"]
+    assert rows["range"].startswith("0.9139 rpm to 4000 rpm; ")
+    assert rows["worst error"] == "45.7 rpm at a constant 30 rpm, measured in 200us, with a real disc"
+    assert rows["advice"].startswith("track: ")
