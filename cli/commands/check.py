@@ -11,7 +11,7 @@ from tachometry.cli.reports.check import print_checked
 from tachometry.cli.reports.terminal import activity
 from tachometry.hdl.export import export
 from tachometry.hdl.export.ci import ci_files
-from tachometry.hdl.export.targets.target import TARGETS
+from tachometry.hdl.export.targets.target import targets_for
 from tachometry.sim.testbench.check import Make, manifests
 from tachometry.sim.testbench.check import check as check_core
 
@@ -59,7 +59,7 @@ def check(places: tuple[Path, ...], simulation: bool, netlists: tuple[Path, ...]
     found = manifests(places)
     if netlists and (len(found) > 1 or not simulation):
         raise ValueError("--verilog must be given for one core, and not together with --no-simulation")
-    make = Make(export, {name: target.bus for name, target in TARGETS.items()}, ci_files)
+    make = Make(export, targets_for, ci_files)
     results = []
     with activity() as say:
         for number, path in enumerate(found, 1):

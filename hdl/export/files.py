@@ -70,4 +70,5 @@ def export(
         top = BusTachometer(registers, on)
         files = register_files(registers, name)
     core = {f"{name}.v": verilog_of(top, described), f"{name}.json": json.dumps(described, indent=2) + "\n"}
-    return core | kit(spec, name, on) | files | target_files(target, spec, name, core[f"{name}.v"])
+    core |= kit(spec, name, on) | files
+    return core | target_files(target, spec, name, on, core)

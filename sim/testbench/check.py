@@ -63,14 +63,14 @@ class Make:
     ----------
     export : callable
         Those of a core, its name, its bus and the bus's bits a second, and a framework, or "none".
-    targets : mapping of str to str
-        Frameworks, and the bus that the core has for each.
+    targets : callable
+        Frameworks that a core on a bus of this name can go into.
     jobs : callable
         Those of continuous integration, for the name of a core.
     """
 
     export: Callable[[AnySpec, str, str, int | None, str], Mapping[str, str]]
-    targets: Mapping[str, str]
+    targets: Callable[[AnySpec, str], Sequence[str]]
     jobs: Callable[[str], Mapping[str, str]]
 
 
@@ -175,11 +175,10 @@ def _expected(spec: AnySpec, name: str, written: Mapping[str, Any], folder: Path
     """Return all files; those of a framework, a bench or a job only if they are there."""
     bus, baud = written.get("bus", "none"), written.get("baud")
     files = dict(make.export(spec, name, bus, baud, "none"))
-    for target, needed in make.targets.items():
-        if needed == bus and spec is spec.tachometer:
-            more = make.export(spec, name, bus, baud, target)
-            if any((folder / file).exists() for file in more.keys() - files.keys()):
-                files |= more
+    for target in make.targets(spec, bus):
+        more = make.export(spec, name, bus, baud, target)
+        if any((folder / file).exists() for file in more.keys() - files.keys()):
+            files |= more
     files |= {file: text for file, text in make.jobs(name).items() if (folder / file).exists()}
     vectors = folder / f"{name}_vectors.json"
     if vectors.exists() or (folder / f"test_{name}.py").exists():

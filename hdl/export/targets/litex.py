@@ -1,11 +1,14 @@
 """A module for LiteX: the core with its registers on the Wishbone bus of a SoC."""
 
+from collections.abc import Mapping
+
 from tachometry.hdl.export.render import render_files
 from tachometry.spec.control import AnySpec
+from tachometry.spec.registers.buses import Bus
 from tachometry.spec.registers.loop import registers_of
 
 
-def litex(spec: AnySpec, name: str, verilog: str) -> dict[str, str]:
+def litex(spec: AnySpec, name: str, bus: Bus | None, made: Mapping[str, str]) -> dict[str, str]:
     """Return the text of `NAME_litex.py` by its name.
 
     Parameters
@@ -13,7 +16,9 @@ def litex(spec: AnySpec, name: str, verilog: str) -> dict[str, str]:
     spec : TachometerSpec or AxesSpec
     name : str
         Of the Verilog module.
-    verilog : str
+    bus : Bus
+        Wishbone.
+    made : mapping of str to str
         The core, which the module reads from the file beside it.
     """
     return render_files(["NAME_litex.py"], name, spec=spec.tachometer, registers=registers_of(spec))

@@ -5,7 +5,7 @@ puts into its HAL component: `position-scale`, `index-enable`, and counting on w
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from tachometry.hdl.export.render import render_files
@@ -13,6 +13,7 @@ from tachometry.spec.core.ports import bound_ports
 from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import INDEX, TICK, UPDATE, Port
+from tachometry.spec.registers.buses import Bus
 from tachometry.spec.registers.map import RegisterMap
 
 WORD = 32  # bits of the widest number that RIO's component takes as it is
@@ -42,7 +43,7 @@ class HalPin:
     source: str = ""
 
 
-def rio(spec: TachometerSpec, name: str, verilog: str) -> dict[str, str]:
+def rio(spec: TachometerSpec, name: str, bus: Bus | None, made: Mapping[str, str]) -> dict[str, str]:
     """Return the plugin, the Verilog between RIO and the core, and the core, as texts by file name.
 
     Parameters
@@ -50,8 +51,9 @@ def rio(spec: TachometerSpec, name: str, verilog: str) -> dict[str, str]:
     spec : TachometerSpec
     name : str
         Of the module of the core.
-    verilog : str
-        The core.
+    bus : None
+    made : mapping of str to str
+        The core, and what lies beside it.
 
     Raises
     ------
@@ -77,7 +79,7 @@ def rio(spec: TachometerSpec, name: str, verilog: str) -> dict[str, str]:
         sent_as=_sent_as,
         **_connections(spec, values, counted.values()),
     )
-    return files | {f"{name}_rio/{name}.v": verilog}
+    return files | {f"{name}_rio/{name}.v": made[f"{name}.v"]}
 
 
 def _check(spec: TachometerSpec, values: Iterable[Port]) -> None:

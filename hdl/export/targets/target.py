@@ -1,13 +1,15 @@
 """Frameworks into which a core goes with files of their own."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from tachometry.hdl.export.targets import vivado
 from tachometry.hdl.export.targets.litex import litex
 from tachometry.hdl.export.targets.rio import rio
 from tachometry.spec.control import AnySpec
 from tachometry.spec.language.option import ParameterError
+from tachometry.spec.registers.buses import Bus
 
 
 @dataclass(frozen=True)
@@ -18,23 +20,30 @@ class Target:
     ----------
     help : str
         What is made for it, for --help.
-    bus : str
-        The bus that the core has for it.
+    buses : tuple of str
+        The buses that the core can have for it, first that which it has if none is asked for.
     files : callable
-        Texts by file name, of the spec, the name and the Verilog of the core.
-    axes : bool
-        Cores of many axes can go into it.
+        Texts by file name, of the spec, the name and the bus of the core, and of its files without a target.
+    axes, loops : bool
+        Cores of many axes, and with a control loop, can go into it.
     """
 
     help: str
-    bus: str
-    files: Callable[[Any, str, str], dict[str, str]]
-    axes: bool
+    buses: tuple[str, ...]
+    files: Callable[[Any, str, Bus | None, Mapping[str, str]], dict[str, str]]
+    axes: bool = True
+    loops: bool = False
 
 
 TARGETS = {
-    "rio": Target("plugin for RIO, with pins for LinuxCNC, in DIR/NAME_rio", "none", rio, axes=False),
-    "litex": Target("module for LiteX in DIR/NAME_litex.py, with --bus wishbone", "wishbone", litex, axes=True),
+    "rio": Target("plugin for RIO, with pins for LinuxCNC, in DIR/NAME_rio", ("none",), rio, axes=False),
+    "litex": Target("module for LiteX in DIR/NAME_litex.py, with --bus wishbone", ("wishbone",), litex),
+    "vivado": Target(
+        "IP for Vivado (IP-XACT) in DIR/NAME_ip, with --bus axi-lite, apb or none",
+        vivado.BUSES,
+        vivado.vivado,
+        loops=True,
+    ),
 }
 
 
@@ -48,22 +57,34 @@ def bus_for(target: str, bus: str | None) -> str:
     """
     if target != "none" and target not in TARGETS:
         raise ParameterError("target", f"must be one of none, {', '.join(TARGETS)}, not {target!r}")
-    needed = TARGETS[target].bus if target in TARGETS else bus or "none"
-    if bus not in (None, needed):
-        raise ParameterError("bus", f"must be {needed} for {target}, not {bus}")
-    return needed
+    buses = TARGETS[target].buses if target in TARGETS else (bus or "none",)
+    if bus not in (None, *buses):
+        raise ParameterError("bus", f"must be {' or '.join(buses)} for {target}, not {bus}")
+    return bus or buses[0]
 
 
 def check_core(target: str, spec: AnySpec) -> None:
     """Refuse a core that is not for this target, with a ParameterError."""
     if target not in TARGETS or spec is spec.tachometer:
         return
-    if spec.axes is None:
-        raise ParameterError("target", "must not be given together with loop: targets are for a tachometer alone")
-    if not TARGETS[target].axes:
+    if spec.axes is None and not TARGETS[target].loops:
+        raise ParameterError("target", f"must not be {target} with a loop: it is for a tachometer alone")
+    if spec.axes is not None and not TARGETS[target].axes:
         raise ParameterError("target", f"must be another than {target} with axes: its plugin is for one encoder each")
 
 
-def target_files(target: str, spec: AnySpec, name: str, verilog: str) -> dict[str, str]:
-    """Return texts by file name, of the name and the Verilog of the core; none without a target."""
-    return TARGETS[target].files(spec, name, verilog) if target in TARGETS else {}
+def targets_for(spec: AnySpec, bus: str) -> list[str]:
+    """Return targets that a core on this bus can go into."""
+    found = []
+    for name, target in TARGETS.items():
+        try:
+            check_core(name, spec)
+        except ParameterError:
+            continue
+        found += [name] if bus in target.buses else []
+    return found
+
+
+def target_files(target: str, spec: AnySpec, name: str, bus: Bus | None, made: Mapping[str, str]) -> dict[str, str]:
+    """Return texts by file name, of a core and of the files that it has without a target; none without a target."""
+    return TARGETS[target].files(spec, name, bus, made) if target in TARGETS else {}

@@ -15,7 +15,7 @@ from support.nightly import only
 
 from tachometry.hdl.export import export
 from tachometry.hdl.export.ci import HOSTS, ci_files
-from tachometry.hdl.export.targets.target import TARGETS
+from tachometry.hdl.export.targets.target import targets_for
 from tachometry.sim.engines.verilator import home
 from tachometry.sim.testbench.check import Make, check
 from tachometry.spec.language import provenance
@@ -29,9 +29,9 @@ CORES = {
     "loop": f"{SMALL} m --tick 200us --max-time 2ms --loop --gains inputs --bus uart --baud 50000",
     "bench of a loop": f"{SMALL} m --tick 200us --max-time 2ms --loop --testbench cocotb",
     "external ticks": f"{SMALL} m --external-tick --testbench cocotb",
+    "vivado": f"{SMALL} m --for vivado",
     "track": f"{SMALL} track --tick 1ms --max-time 10ms --bus apb",
 }
-BUSES = {name: target.bus for name, target in TARGETS.items()}
 Generated = Callable[..., Path]
 
 
@@ -41,7 +41,7 @@ def test_what_is_generated_is_right_and_a_change_of_any_file_is_found(core: str,
     made = cache(export)  # once, not for every change
 
     def right() -> bool:
-        return check(folder / "core.json", Make(made, BUSES, ci_files), simulation=False).right
+        return check(folder / "core.json", Make(made, targets_for, ci_files), simulation=False).right
 
     assert right()
     files = sorted(path for path in folder.rglob("*") if path.is_file())

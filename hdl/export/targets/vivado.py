@@ -1,0 +1,103 @@
+"""An IP for Vivado: IP-XACT (IEEE 1685-2009), and a module whose interfaces have the names that Vivado knows."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from tachometry.hdl.export.registers.values import is_whole, sentences
+from tachometry.hdl.export.render import render_files
+from tachometry.spec.control import AnySpec
+from tachometry.spec.registers.buses import Bus, ports_on
+from tachometry.spec.registers.loop import registers_of
+
+_FILES = ("NAME_ip/component.xml", "NAME_ip/NAME_ip.v")
+_VIEWS = {"xilinx_anylanguagesynthesis": "synthesis", "xilinx_anylanguagebehavioralsimulation": "simulation"}
+_ACCESS = {"ro": "read-only", "rw": "read-write", "wo": "write-only"}
+_LEAST_RANGE = 4096  # bytes, of a segment of Vivado's address map
+# An IP that names no family fits none.
+_FAMILIES = (
+    "spartan7 artix7 kintex7 virtex7 zynq spartanuplus artixuplus kintexu virtexu kintexuplus virtexuplus "
+    "virtexuplusHBM zynquplus versal"
+).split()
+
+
+@dataclass(frozen=True)
+class _Interface:
+    """Names in Vivado of a bus, of its clock and of its reset.
+
+    Parameters
+    ----------
+    name : str
+        Of the interface; ports begin with it.
+    kind : str
+        Of its definition.
+    clock, reset : str
+        Names of ports; the reset is active low.
+    """
+
+    name: str
+    kind: str
+    clock: str
+    reset: str
+
+
+_INTERFACES = {
+    "axi-lite": _Interface("s_axi", "aximm", "aclk", "aresetn"),
+    "apb": _Interface("s_apb", "apb", "pclk", "presetn"),
+}
+BUSES = (*_INTERFACES, "none")
+
+
+def vivado(spec: AnySpec, name: str, bus: Bus | None, made: Mapping[str, str]) -> dict[str, str]:
+    """Return texts by file name: an IP in the folder `NAME_ip`, with copies of the core and its constraints.
+
+    Parameters
+    ----------
+    spec : TachometerSpec, AxesSpec or LoopSpec
+    name : str
+        Of the Verilog module, which the module of the IP, `NAME_ip`, contains.
+    bus : Bus or None
+        One of `BUSES`.
+    made : mapping of str to str
+        The core and what lies beside it.
+    """
+    ports = ports_on(spec, bus)
+    there = _INTERFACES[bus.name] if bus else None
+    outer = {port.name: port.name for port in ports}
+    holes: dict[str, Any] = {"clock": "clk", "reset": "rst", "polarity": "ACTIVE_HIGH", "bus": "", "associated": ""}
+    associated: dict[str, str] = {}
+    if there is not None:
+        logical = {port.name: port.name for port in ports if port.name.startswith(f"{there.name}_")}
+        logical = {port: port.removeprefix(f"{there.name}_").upper() for port in logical}
+        registers = registers_of(spec)
+        outer |= {"clk": there.clock, "rst": there.reset}
+        associated = {"ASSOCIATED_BUSIF": there.name}
+        holes = {
+            "clock": there.clock,
+            "reset": there.reset,
+            "polarity": "ACTIVE_LOW",
+            "bus": there.name,
+            "kind": there.kind,
+            "logical": logical,
+            "associated": f"ASSOCIATED_BUSIF {there.name}, ",
+            "registers": registers,
+            "range": max(_LEAST_RANGE, 1 << registers.address_width),
+        }
+    clock_hz = spec.timing.clock_hz
+    files = render_files(
+        _FILES,
+        name,
+        **{"logical": {}, **holes},
+        method=spec.tachometer.method,
+        ports=ports,
+        outer=outer,
+        clock_hz=clock_hz,
+        clock_parameters={**associated, "ASSOCIATED_RESET": holes["reset"], "FREQ_HZ": clock_hz},
+        views=_VIEWS,
+        families=_FAMILIES,
+        access=_ACCESS,
+        sentences=sentences,
+        is_whole=is_whole,
+        options={option.replace("-", "_"): text for option, text in spec.options.items()},
+    )
+    return files | {f"{name}_ip/{file}": made[file] for file in (f"{name}.v", f"{name}.xdc")}
