@@ -65,6 +65,7 @@ ALLOWED = {
     "boards/monitor": {"boards/host", "sim/golden", "spec"},
     "boards/simulated": set[str](),
     "cli": {"cli", "boards", "sim", "hdl", "spec"},
+    "cli/explore": {"cli", "boards", "sim", "hdl", "spec"},
     "cli/options": {"boards", "sim", "spec"},
     "cli/reports": {"boards", "sim", "spec"},
     "cli/commands": {"cli", "boards", "sim", "hdl", "spec"},

@@ -1,7 +1,8 @@
 """The command `tachometry` with all of its commands, and what their errors say."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from difflib import get_close_matches
 from importlib import import_module
 
@@ -25,6 +26,7 @@ COMMANDS = {
     "build": "Build a core for a board: a bitstream, or a project for the vendor's tools.",
     "program": "Load a bitstream into a board.",
     "monitor": "Show, record and test what a board measures, also a simulated one.",
+    "explore": "Configure a core in a page of the browser, with its curves, its files and a live board.",
     "completion": "Let the shell complete commands and options.",
     "help": "Say all there is to say of a command, or of one of its options.",
 }
@@ -106,12 +108,20 @@ def run(args: Sequence[str]) -> int:
     """
     if instruction := os.environ.get(_COMPLETE):
         return shell_complete(cli, {}, "tachometry", _COMPLETE, instruction)
+    with refusals():
+        try:
+            # Not `cli.main()`: it puts an empty line before the one on Ctrl-C.
+            with cli.make_context("tachometry", list(args)) as context:
+                return cli.invoke(context) or 0
+        except click.exceptions.Exit as exit:
+            return exit.exit_code
+
+
+@contextmanager
+def refusals() -> Iterator[None]:
+    """Raise `Refused`, with the line that the user reads, for what a command raises that cannot be done."""
     try:
-        # Not `cli.main()`: it puts an empty line before the one on Ctrl-C.
-        with cli.make_context("tachometry", list(args)) as context:
-            return cli.invoke(context) or 0
-    except click.exceptions.Exit as exit:
-        return exit.exit_code
+        yield
     except click.UsageError as error:
         command = error.ctx.command_path if error.ctx else "tachometry"
         raise Refused(f"{error.format_message()} (see {command} --help)") from error

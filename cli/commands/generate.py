@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
 from functools import singledispatch
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -13,13 +15,14 @@ from tachometry.cli.options.axes import AXES
 from tachometry.cli.options.core import core_options
 from tachometry.cli.options.loop import LOOP
 from tachometry.cli.options.motion import FORMS, OPTIONAL_MOTION_OPTIONS
-from tachometry.cli.options.option import FilePath, GroupedCommand, option
-from tachometry.cli.reports.axes import print_axes_core
-from tachometry.cli.reports.core import print_core
-from tachometry.cli.reports.loop import print_loop_core
+from tachometry.cli.options.option import FilePath, Group, GroupedCommand, option
+from tachometry.cli.reports.axes import axes_rows
+from tachometry.cli.reports.core import core_rows
+from tachometry.cli.reports.loop import loop_rows
+from tachometry.cli.reports.terminal import print_rows
 from tachometry.hdl.export import export
 from tachometry.hdl.export.ci import HOSTS, ci_files
-from tachometry.hdl.export.files import CORE_FILES
+from tachometry.hdl.export.files import CORE_FILES, manifest_of
 from tachometry.hdl.export.registers.files import REGISTER_FILES
 from tachometry.hdl.export.targets.target import TARGETS, bus_for
 from tachometry.sim.encoder.virtual import Encoding
@@ -52,6 +55,122 @@ the manifest names both.
 """
 
 
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """Holds what `generate` is asked for.
+
+    Parameters
+    ----------
+    spec : AnySpec
+    name, bus, baud, target
+        See `hdl.export.export`.
+    testbench, ci : str or None
+        What is written beside the core.
+    record : callable or None
+        Gives what an encoder records of the motion of the testbench.
+    tables : list of Path
+        The files that the motion reads.
+
+    Raises
+    ------
+    ValueError
+        If there cannot be such a module or bus, or a motion has no testbench.
+    """
+
+    spec: AnySpec
+    name: str
+    testbench: str | None
+    bus: str
+    baud: int | None
+    target: str
+    ci: str | None
+    record: Callable[..., Encoding] | None
+    tables: list[Path]
+
+    def __post_init__(self) -> None:
+        check_module_name(self.name)
+        if self.testbench is None and self.record is not None:
+            raise ValueError("--motion must be given together with --testbench")
+        if self.testbench is not None and self.spec is not self.spec.tachometer and self.bus != "none":
+            raise ValueError("--testbench must not be given together with --loop and --bus: it drives no bus")
+
+    @property
+    def manifest(self) -> dict[str, Any]:
+        """The content of NAME.json; ValueError if there cannot be such a core."""
+        return manifest_of(self.spec, self.name, self.bus, self.baud, self.target)
+
+    def texts(self) -> dict[str, str]:
+        """Return all files by their names."""
+        bench = {} if self.testbench is None else _bench(self.spec, self.name, self.record)
+        texts = export(self.spec, self.name, self.bus, self.baud, self.target)
+        jobs = {file: text for file, text in ci_files(self.name).items() if file == f"{self.name}_{self.ci}.yml"}
+        return texts | bench | jobs
+
+    @property
+    def rows(self) -> list[tuple[str, str]]:
+        """The names and values that are printed of the core."""
+        return _rows(self.spec, self.bus)
+
+
+def _read(*, bus: str | None, target: str, **given: Any) -> dict[str, Any]:
+    names = {field.name for field in fields(Asked)}
+    asked = {name: given.pop(name) for name in names & given.keys()}
+    return dict(asked=Asked(bus=bus_for(target, bus), target=target, **asked), **given)
+
+
+ASKED = Group(
+    [
+        core_options(AXES, LOOP),
+        option(
+            "Files", "--name", default="tachometer", metavar="NAME", help="Name of the Verilog module and of the files."
+        ),
+        option(
+            "Files",
+            "--testbench",
+            type=click.Choice(["cocotb"], case_sensitive=False),
+            help="Also write a bench that checks the core in Icarus, Verilator and others: python DIR/test_NAME.py. "
+            "Without a --motion the shaft goes fast and slow, to and fro, and stops, at speeds that fit the core.",
+        ),
+        option(
+            "Files",
+            "--bus",
+            type=click.Choice(["none", *BUSES], case_sensitive=False),
+            help="Give the core registers on a bus: "
+            + "; ".join(f"{bus.name}: {bus.help}" for bus in BUSES.values())
+            + ". Files that describe and read the registers are written, too. Without it: none, or what --for needs.",
+        ),
+        option(
+            "Files",
+            "--baud",
+            type=click.IntRange(min=1),
+            metavar="BITS",
+            help="Bits a second of --bus uart, which the clock must make within 2 %, with at least 8 clocks a bit; "
+            f"{DEFAULT_BAUD}, if it is not given.",
+        ),
+        option(
+            "Files",
+            "--for",
+            "target",
+            type=click.Choice(["none", *TARGETS], case_sensitive=False),
+            default="none",
+            help="Also write what a framework needs; "
+            + "; ".join(f"{name}: {target.help}" for name, target in TARGETS.items())
+            + ".",
+        ),
+        option(
+            "Files",
+            "--ci",
+            type=click.Choice(HOSTS),
+            help="Also write DIR/NAME_github.yml or DIR/NAME_gitlab.yml, a job that runs tachometry check and a linter "
+            "on all cores of the repository; the file says where it goes.",
+        ),
+        OPTIONAL_MOTION_OPTIONS,
+    ],
+    _read,
+)
+"""All options of `generate` but where to write; handed over as `asked`."""
+
+
 @click.command(
     cls=GroupedCommand,
     help=_HELP,
@@ -70,8 +189,7 @@ Examples:
   tachometry generate --ppr 500 --max-speed 1000rad/s --loop \\
       --gains inputs --command generator --bus axi-lite -o drive""",
 )
-@core_options(AXES, LOOP)
-@option("Files", "--name", default="tachometer", metavar="NAME", help="Name of the Verilog module and of the files.")
+@ASKED
 @option(
     "Files",
     "--output",
@@ -82,87 +200,22 @@ Examples:
     metavar="DIR",
     help="Directory to write to; it is made if it does not exist, and files in it are overwritten.",
 )
-@option(
-    "Files",
-    "--testbench",
-    type=click.Choice(["cocotb"], case_sensitive=False),
-    help="Also write a bench that checks the core in Icarus, Verilator and others: python DIR/test_NAME.py. Without a "
-    "--motion the shaft goes fast and slow, to and fro, and stops, at speeds that fit the core.",
-)
-@option(
-    "Files",
-    "--bus",
-    type=click.Choice(["none", *BUSES], case_sensitive=False),
-    help="Give the core registers on a bus: "
-    + "; ".join(f"{bus.name}: {bus.help}" for bus in BUSES.values())
-    + ". Files that describe and read the registers are written, too. Without it: none, or what --for needs.",
-)
-@option(
-    "Files",
-    "--baud",
-    type=click.IntRange(min=1),
-    metavar="BITS",
-    help="Bits a second of --bus uart, which the clock must make within 2 %, with at least 8 clocks a bit; "
-    f"{DEFAULT_BAUD}, if it is not given.",
-)
-@option(
-    "Files",
-    "--for",
-    "target",
-    type=click.Choice(["none", *TARGETS], case_sensitive=False),
-    default="none",
-    help="Also write what a framework needs; "
-    + "; ".join(f"{name}: {target.help}" for name, target in TARGETS.items())
-    + ".",
-)
-@option(
-    "Files",
-    "--ci",
-    type=click.Choice(HOSTS),
-    help="Also write DIR/NAME_github.yml or DIR/NAME_gitlab.yml, a job that runs tachometry check and a linter on all "
-    "cores of the repository; the file says where it goes.",
-)
-@OPTIONAL_MOTION_OPTIONS
-def generate(
-    spec: AnySpec,
-    name: str,
-    directory: Path,
-    testbench: str | None,
-    bus: str | None,
-    baud: int | None,
-    target: str,
-    ci: str | None,
-    record: Callable[..., Encoding] | None,
-    tables: list[Path],
-) -> int:
+def generate(asked: Asked, directory: Path) -> int:
     """Write a core as Verilog, with its manifest and all that it takes to build it into a design."""
-    check_module_name(name)
-    bus = bus_for(target, bus)
-    bench: dict[str, str] = {}
-    if testbench is not None:  # first: what is wrong with a motion is found at once
-        bench = _bench(spec, name, bus, record)
-    elif record is not None:
-        raise ValueError("--motion must be given together with --testbench")
-    core = f"{name}.v"
-    with Outputs(
-        {core: directory / core}, inputs=tables
-    ) as outputs:  # a folder that cannot be written is found at once
-        jobs = {file: text for file, text in ci_files(name).items() if file == f"{name}_{ci}.yml"}
-        texts = export(spec, name, bus, baud, target) | bench | jobs
+    core = f"{asked.name}.v"
+    with Outputs({core: directory / core}, inputs=asked.tables) as outputs:  # a folder that cannot be written is found
+        texts = asked.texts()  # at once
         outputs.add({file: directory / file for file in texts})
         for file, text in texts.items():
             outputs[file].write_text(text, encoding="utf-8", newline="\n")
     for file in texts:
         click.echo(click.format_filename(directory / file))
     click.echo()
-    _print(spec, bus)
+    print_rows(asked.rows)
     return 0
 
 
-def _bench(spec: AnySpec, name: str, bus: str, record: Callable[..., Encoding] | None) -> dict[str, str]:
-    if spec is not spec.tachometer and bus != "none":
-        raise ValueError("--testbench must not be given together with --loop and --bus: it drives no bus")
-
+def _bench(spec: AnySpec, name: str, record: Callable[..., Encoding] | None) -> dict[str, str]:
     recordings = None
     if record is not None:
         recordings = [record(spec.tachometer, axis, spec.axes).recording for axis in range(spec.axes or 1)]
@@ -170,13 +223,13 @@ def _bench(spec: AnySpec, name: str, bus: str, record: Callable[..., Encoding] |
 
 
 @singledispatch
-def _print(spec: AnySpec, bus: str) -> None:
-    print_core(spec.tachometer, bus)
+def _rows(spec: AnySpec, bus: str) -> list[tuple[str, str]]:
+    return core_rows(spec.tachometer, bus)
 
 
-@_print.register
-def _(spec: AxesSpec, bus: str) -> None:
-    print_axes_core(spec)
+@_rows.register
+def _(spec: AxesSpec, bus: str) -> list[tuple[str, str]]:
+    return axes_rows(spec)
 
 
-_print.register(LoopSpec, print_loop_core)
+_rows.register(LoopSpec, loop_rows)

@@ -1,15 +1,14 @@
 """`generate` prints these lines of a core of many axes."""
 
 from tachometry.cli.reports.core import configuration, full_scale_text, measured, memory_text, speed_text
-from tachometry.cli.reports.terminal import print_rows
 from tachometry.sim.studies.plan import Plans
 from tachometry.spec import AxesSpec
 from tachometry.spec.language.units import plural
 from tachometry.spec.registers.manifest import manifest
 
 
-def print_axes_core(spec: AxesSpec) -> None:
-    """Print the configuration of a core of many axes."""
+def axes_rows(spec: AxesSpec) -> list[tuple[str, str]]:
+    """Return the configuration of a core of many axes."""
     alone, axis = spec.tachometer, spec.axis
     greatest = axis.widths.max_velocity * alone.scale.unit_velocity
     latencies = manifest(spec)["latency_cycles"]
@@ -27,7 +26,7 @@ def print_axes_core(spec: AxesSpec) -> None:
     )
     rows = [(name, own.get(name, value)) for name, value in configuration(alone) if name != "note"]
     rows += measured(alone, Plans.of(alone, greatest))
-    print_rows([rows[0], ("axes", turns), *rows[1:], *(("note", note) for note in spec.words.notes)])
+    return [rows[0], ("axes", turns), *rows[1:], *(("note", note) for note in spec.words.notes)]
 
 
 def _reciprocal(spec: AxesSpec) -> dict[str, str]:

@@ -1,8 +1,7 @@
-"""`generate` and `plan` print what a core is, what it measures, and how wide and late its outputs are."""
+"""`generate` and `plan` show what a core is, what it measures, and how wide and late its outputs are."""
 
 import numpy as np
 
-from tachometry.cli.reports.terminal import print_rows
 from tachometry.sim.studies.plan import Plans
 from tachometry.sim.theory.performance import REAL_DISC
 from tachometry.spec import TachometerSpec
@@ -14,11 +13,11 @@ from tachometry.spec.registers.manifest import manifest
 from tachometry.spec.registers.map import WORD
 
 
-def print_core(spec: TachometerSpec, bus: str = "none") -> None:
-    """Print the configuration of a core, what it measures, and its registers on a bus."""
+def core_rows(spec: TachometerSpec, bus: str = "none") -> list[tuple[str, str]]:
+    """Return the configuration of a core, what it measures, and its registers on a bus."""
     registers = [] if bus == "none" else [registers_row(spec, bus)]
     plans = Plans.of(spec)
-    print_rows([*configuration(spec), *measured(spec, plans), *advice(plans), *registers])
+    return [*configuration(spec), *measured(spec, plans), *advice(plans), *registers]
 
 
 def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:

@@ -1,14 +1,13 @@
 """`generate` prints these lines of a core with a control loop."""
 
 from tachometry.cli.reports.core import configuration, measured, registers_row
-from tachometry.cli.reports.terminal import print_rows
 from tachometry.sim.studies.plan import Plans
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.language.units import plural, short_time
 
 
-def print_loop_core(spec: LoopSpec, bus: str = "none") -> None:
-    """Print the configuration of tachometer and loop, and the registers on a bus."""
+def loop_rows(spec: LoopSpec, bus: str = "none") -> list[tuple[str, str]]:
+    """Return the configuration of tachometer and loop, and the registers on a bus."""
     form, period, late = spec.form, spec.units.seconds, spec.tick_to_result
     filtered = "none" if spec.filter is None else f"{float(spec.filter):.6g} rad/s"
     when = "at updates of the velocity" if spec.synchronised else "at every control tick"
@@ -37,4 +36,4 @@ def print_loop_core(spec: LoopSpec, bus: str = "none") -> None:
     ]
     registers = [] if bus == "none" else [registers_row(spec, bus)]
     alone = spec.tachometer
-    print_rows([*configuration(alone), *measured(alone, Plans.of(alone)), *rows, *registers])
+    return [*configuration(alone), *measured(alone, Plans.of(alone)), *rows, *registers]

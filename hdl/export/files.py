@@ -1,6 +1,7 @@
 """All files of a core: Verilog, manifest, kit, and those for its registers and for a framework."""
 
 import json
+from typing import Any
 
 from amaranth.lib import wiring
 
@@ -57,18 +58,22 @@ def export(
         the target needs another bus or another core; if the bus cannot reach all registers.
     """
     on = bus_of(bus_for(target, bus), baud)
-    check_core(target, spec)
-    described = entries()
+    described = manifest_of(spec, name, bus, baud, target)
     files: dict[str, str] = {}
     top: wiring.Component
     if on is None:
-        described |= manifest(spec, name)
         top = core_of(spec)
     else:
         registers = registers_of(spec)
-        described |= manifest_on(registers, on, name)
         top = BusTachometer(registers, on)
         files = register_files(registers, name)
     core = {f"{name}.v": verilog_of(top, described), f"{name}.json": json.dumps(described, indent=2) + "\n"}
     core |= kit(spec, name, on) | files
     return core | target_files(target, spec, name, on, core)
+
+
+def manifest_of(spec: AnySpec, name: str, bus: str | None, baud: int | None, target: str) -> dict[str, Any]:
+    """Return what the manifest of a core says; arguments and errors are those of `export`."""
+    on = bus_of(bus_for(target, bus), baud)
+    check_core(target, spec)
+    return entries() | (manifest(spec, name) if on is None else manifest_on(registers_of(spec), on, name))

@@ -1,0 +1,136 @@
+"""The server of the page: on this machine alone, for those who know its address, and for no page of another origin."""
+
+import json
+import secrets
+import socket
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from importlib.resources import files
+from typing import Any
+
+import anyio
+import uvicorn
+from anyio import CapacityLimiter, to_thread
+from starlette.datastructures import Headers
+from starlette.requests import Request
+from starlette.responses import JSONResponse, PlainTextResponse, Response
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+HOST = "127.0.0.1"
+MOST_BYTES = 16 << 20  # that are asked with: a capture, in base64
+_SECONDS = 20.0  # in which what is asked must have come
+_MOST_CLIENTS = 200  # at once; those beyond are told to come again
+_LIGHT = ("options", "check")  # what is answered at once, beside what takes seconds
+_TYPES = {"html": "text/html", "css": "text/css", "js": "text/javascript", "LICENSE": "text/plain"}
+# Nothing but what comes from here is loaded, run, or asked; the page stands in no other one, and no address leaks.
+_HEADERS = {
+    "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "referrer-policy": "no-referrer",
+    "x-content-type-options": "nosniff",
+    "cache-control": "no-store",
+}
+
+Answer = Callable[[str, Mapping[str, Any]], Mapping[str, Any]]
+
+
+def page(token: str, hosts: tuple[str, ...], answer: Answer) -> ASGIApp:
+    """Return the application that serves the page, and answers what it asks.
+
+    Parameters
+    ----------
+    token : str
+        Without which nothing is served.
+    hosts : tuple of str
+        Names with ports by which a browser may call it; another name may be that of a foreign page.
+    answer : callable
+        Takes the name of a function and its arguments, see `cli.explore.answers`.
+    """
+    served = {file.name: file.read_bytes() for file in (files(__package__) / "static").iterdir()}
+    served[""] = served["page.html"]
+    limits = dict.fromkeys(_LIGHT, CapacityLimiter(4))
+    heavy = CapacityLimiter(1)
+
+    async def respond(request: Request) -> Response:
+        host, path = request.headers.get("host", ""), request.scope["path"].split("/")
+        if host not in hosts:
+            return _plain(421, "this page is served by another name")
+        if not secrets.compare_digest(path[1].encode(), token.encode()):
+            return _plain(404, "there is no such page: the address that tachometry explore printed has a token")
+        if path[2:3] == ["ask"] and len(path) == 4:
+            return await ask(request, path[3])
+        name = "/".join(path[2:])
+        if request.method not in ("GET", "HEAD") or len(path) < 3 or name not in served:
+            return _plain(404, "there is no such file")
+        return Response(served[name], media_type=_TYPES[(name or "page.html").rpartition(".")[2]])
+
+    async def ask(request: Request, name: str) -> Response:
+        headers: Headers = request.headers
+        if headers.get("origin") != f"http://{headers['host']}":
+            return _plain(403, "only the page itself may ask")
+        if request.method != "POST" or headers.get("content-type") != "application/json":
+            return _plain(405, "what is asked must be posted as application/json")
+        body = bytearray()
+        try:
+            with anyio.fail_after(_SECONDS):
+                async for part in request.stream():
+                    body += part
+                    if len(body) > MOST_BYTES:
+                        return _plain(413, f"what is asked must have at most {MOST_BYTES} bytes")
+            args = json.loads(body)
+            if not isinstance(args, dict):
+                raise ValueError("it must be an object")
+        except TimeoutError:
+            return _plain(408, "what is asked must come at once")
+        except (ValueError, RecursionError) as error:
+            return _plain(400, f"what is asked must be JSON: {error}")
+        try:
+            found = await to_thread.run_sync(answer, name, args, limiter=limits.get(name, heavy))
+        except Exception as error:
+            line = f"internal error: {type(error).__name__}: {error}; this is a fault of tachometry: please report it"
+            return JSONResponse({"error": line, "field": ""}, 500)
+        return JSONResponse(found)
+
+    async def application(scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "http":
+            response = await respond(Request(scope, receive))
+            response.headers.update(_HEADERS)
+            await response(scope, receive, send)
+
+    return application
+
+
+def _plain(status: int, text: str) -> Response:
+    return PlainTextResponse(f"{text}\n", status)
+
+
+def serve(port: int, answer: Answer, told: Callable[[str], None]) -> None:
+    """Serve the page until Ctrl-C; `told` is given its address, when it can be opened.
+
+    Raises
+    ------
+    OSError
+        If the port is taken.
+    """
+    token = secrets.token_urlsafe(24)
+    with socket.create_server((HOST, port), backlog=128) as listening:
+        port = listening.getsockname()[1]
+        hosts = (f"{HOST}:{port}", f"localhost:{port}")
+        config = uvicorn.Config(
+            page(token, hosts, answer),
+            http="h11",
+            ws="none",
+            lifespan="off",
+            interface="asgi3",
+            log_config=None,
+            log_level="critical",
+            access_log=False,
+            server_header=False,
+            limit_concurrency=_MOST_CLIENTS,
+            timeout_graceful_shutdown=2,
+        )
+        told(f"http://{HOST}:{port}/{token}/")
+        with suppress(KeyboardInterrupt):  # which is how it ends
+            uvicorn.Server(config).run(sockets=[listening])
