@@ -2,7 +2,8 @@
 
 The machine has one adder with an accumulator, the *sum*; a memory of words; and a unit that takes products,
 logarithms, powers and shifts, and whose result is read as `~`. An instruction takes a clock. It waits while the unit
-works and it needs it. A word is read one instruction before its use, so none is read right behind its change.
+works and it needs it. A word is read one instruction before its use, so none is read right behind its change. A jump
+tests the sum that was before it, and meanwhile adds a term as others do; it stores nothing.
 """
 
 from collections.abc import Callable, Mapping
@@ -140,6 +141,8 @@ def _chain(words: list[str]) -> list[Instruction]:
             last(start=Start[word.upper()])
         elif word in ("over", "gain"):
             last(start=Start[word.upper()], how=next(rest))
+        elif word == "product":
+            last(start=Start.TIMES, how=next(rest))
         elif word == "times":
             done.append(Instruction(Left.ZERO, start=Start.TIMES, **_operand(next(rest)), how=next(rest)))  # type: ignore[arg-type]
         elif word == "out":
@@ -184,7 +187,53 @@ def assembled(listing: str = LISTING) -> Code:
                 if code and code[-1].store and one.source == Source.WORD and _same(code[-1].store, one.word):
                     code.append(Instruction())
                 code.append(one)
-    return Code(tuple(code), labels)
+    return _joined(code, labels)
+
+
+def _joined(code: list[Instruction], labels: dict[str, int]) -> Code:
+    """Return a code in which a jump also adds the term behind it, or the one at its target; it tests the sum before."""
+
+    def is_term(place: int) -> bool:
+        one = replace(code[place], left=Left.SUM, source=Source.NONE, word="", subtract=False, by_sign=False)
+        return replace(one, keep=False) == Instruction() != code[place]
+
+    def takes_sum(place: int) -> bool:
+        one = code[place]
+        if one.jump == Jump.ALWAYS:
+            return takes_sum(labels[one.target])
+        return one.jump in (Jump.NEG, Jump.POS) or (one.jump != Jump.END and one.left != Left.ZERO)
+
+    def takes_sign(place: int) -> bool:
+        one = code[place]
+        if one.by_sign or one.keep or one.jump == Jump.END:
+            return one.by_sign
+        ahead = [] if one.jump == Jump.ALWAYS else [place + 1]
+        return any(takes_sign(following) for following in [*ahead, *([labels[one.target]] if one.target else [])])
+
+    made: list[Instruction] = []
+    places: list[int] = []  # where each one is among those that are made
+    entered = {*labels.values()}
+    labels = dict(labels)
+    skipped: set[int] = set()
+    for place, one in enumerate(code):
+        always = one.jump == Jump.ALWAYS
+        if one.target and one == Instruction(jump=one.jump, target=one.target):
+            at = labels[one.target]
+            term = at if always else place + 1
+            free = always or not (term in entered or takes_sum(at) or (code[term].keep and takes_sign(at)))
+            stored = code[place - 1].store
+            if free and is_term(term) and not (stored and _same(stored, code[term].word)):
+                target = f"{one.target}+1" if always else one.target
+                labels.setdefault(target, term + 1)
+                code[place] = replace(code[term], jump=one.jump, target=target)
+                skipped |= set() if always else {term}
+    entered = {labels[one.target] for one in code if one.target}
+    for place, one in enumerate(code):
+        places.append(len(made))
+        ended = place and code[place - 1].jump in (Jump.ALWAYS, Jump.END) and place not in entered
+        if place not in skipped and not ended:
+            made.append(one)
+    return Code(tuple(made), {label: places[place] for label, place in labels.items()})
 
 
 def _same(stored: str, read: str) -> bool:

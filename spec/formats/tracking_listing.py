@@ -11,6 +11,7 @@ One line is one chain of the adder, from left to right: `word = first term, furt
     keep          the sign of the sum         log, exp      begin log2|sum|, 2^sum
     gain k        begin: logarithm of the gain of p (0), v (1) or a (2)
     by            the second factor of products              times w name  begin w·factor/2^shift of that name
+    product name  begin: the sum times the factor, as `times` does with a word
     over n        begin: shift right by n     over by       by ⌊log2⌋ of the factor's whole part
     chance        the number that decides how results are rounded
     out name      an output
@@ -26,167 +27,199 @@ reset:                                  # before the first tick
     o2 = zero
     o3 = zero
     p = zero
-    phase = zero
+    phase = minus_two
     quiet = zero
     since = zero
+    doubt = log_4 - order
 tick:
-    after = minus_one
-    since = $length + since min most_since
-    quiet = $length + quiet min most
     if empty goto silent
-    quiet = $last
     if several goto many
-    tau = $times
     $places keep
+    tau = $times
     raw = zero s+ half
-    c = raw - o@last
+    c = sum - o@last
+    after = minus_one
+    quiet = $last
+    since = $length + since min most_since
+    dt = sum - tau max clock log
+    turn = turn + one chance
+    moved = $moved
+    room = $counts + almost_half
     goto known
 many:                                   # about the mean time, by logarithms; what is left goes into e
     $number log
-    off = o@m1 + o@m2 + o@m3
+    t = o@m1 + o@m2 + o@m3
     log_n = ~
     $times log
-    ~ - log_n exp
+    after = minus_one
+    quiet = $last
+    zero - log_n + ~ exp
+    since = $length + since min most_since
     tau = ~
     $number by
+    turn = turn + one
     times tau time
+    dt = since - tau max clock
     left = $times - ~
-    off over 6
-    places = $places - ~
-    places keep log
-    ~ + log_64 - log_n exp
+    t over 6
+    places = $places - ~ keep log
+    log_64 - log_n + ~ exp
+    moved = $moved
+    room = $counts + almost_half
     raw = zero s+ ~
+    dt log
+    turn chance
     c = raw
 known:
-    turn = turn + one chance
-    phase - two
-    if neg goto young
-    dt = since - tau max clock log
-    moved = $moved
-    room = $counts + half
     log_dt = ~
     dt by
+    phase
+    if neg goto young
     times a half_velocity
-    w = raw - edge keep
-    near = zero s+ w - sixteenth
+    near = raw - edge keep
     t = v + ~
-    V = t + ~
+    V = sum + ~
     times t place
     w = log_dt - log_T lo+ log_T + log_growth
-    near
+    P = p + ~
+    zero s+ near - sixteenth
     if neg goto same
 event:
-    P = p + ~
-    w exp                               # memory grows by g·min(dt, T)
-    edge = raw - moved
-    e = c - P
-    log_dt - log_T + log_4096
-    if neg goto full
-grow:
+    w exp                               # memory grows by g·min(dt, T), if it grows or 4096·dt ≥ T
     growth keep
-    memory = T s+ ~ min most_memory
+    log_dt - log_T + least_log
+    if neg goto full
+    step = zero s+ ~
 grown:
-    since = tau
     if several goto mean
-located:
-    e keep log
-    zero s+ e - room
-    if pos goto slip
+    e = c - P keep log
+    edge = raw - moved
+    since = tau
+    memory = T + step min most_memory
+    goto heard
+mean:
+    $number by
+    since = tau
+    times P mean
+    left keep
+    w = zero s+ left
+    t = places - ~
+    w by
+    edge = raw - moved
+    times V place_64
+    t s+ ~ keep log
+    log_64 - log_n + ~ exp
+    memory = T + step min most_memory
+    e = zero s+ ~ keep log
+heard:
+    room s- e
+    if neg goto slip
     log_e = ~
     e - mu over 2
     slips = zero
     zero s+ e - D4
     if pos goto alone
     mu = mu + ~ keep
-    Ds - D4 s+ mu s+ mu
+    since + lead by
+    zero - D3 s+ mu s+ mu
     if pos goto four
     memory log
+    of_e = log_e - log_dt
+    goto sized
+alone:
+    mu = mu + ~
+    since + lead by
+    log_dt + log_8 exp
+    of_e = log_e - log_dt
+    goto fired
+four:
+    log_dt + log_32 exp
+    of_e = log_e - log_dt
+fired:
+    slow_T = zero
+    memory = memory - ~ lo+ ~ log
 sized:
+    e keep
     T = memory
     log_T = ~
     log_X = log_dt - log_T min log_quarter gain 1
-    e keep
-    of_v = log_e - log_dt + log_X + log_X
+    of_v = of_e + log_X + log_X
     sum + ~ exp
     of_a = of_v + log_X - log_dt
     v = V s+ ~
     log_X gain 2
-    change = e - before
-    before = e
+    vs = v
     of_a + ~ exp
-    a = a s+ ~
-    log_X gain 0
-    log_e + log_X + ~ exp
-    p = P - moved s+ ~
-    a keep log
-    phase = two
+    of_a = log_T - of_slope
     after = one
+    a = a s+ ~ keep log
     log_X + log_64                      # order one, where the acceleration is not seen
     if pos goto curved
-    log_aT = ~ + log_T
-    of_limit = log_aT + log_T
-    sum + of_limit - log_X - limit
+    log_T + log_T + log_T + log_T - log_X - limit + ~ + ~
     if neg goto straight
     sum - log_9_4
     if pos goto curved
     log_X + log_256
-    if pos goto curved
-straight:
-    quality = of_straight
-    log_aT - of_slope exp
-    as = zero
-    vs = v s- ~
-    goto show
+    if neg goto straight
 curved:
+    times a velocity                    # the velocity at the time when it is shown
+    as = sum
     quality = of_curve
-    vs = v
-    as = a
-show:                                   # the velocity at the time when it is shown
-    since + lead by
-    times as velocity
     velocity = vs + ~
+    goto placed
+straight:
+    of_a + ~ exp
+    as = zero
+    quality = of_straight
+    vs = v s- ~
+    velocity = sum
+placed:
+    e keep
+    log_X gain 0
+    log_e + log_X + ~ exp
+    noises = noises + noises_one
+    p = P - moved s+ ~
 place:                                  # and the place at the end of the tick
     since by
     times as half_velocity
-    t = vs + ~
-    times t place
-    z = p + ~
+    noises = noises min noises_most
+    vs + ~ product place
+    v = v min most
+    p + ~ out position_fine
 shown:
     tick by
+    w = doubt + log_X                   # D·√X, more if errors keep a sign
     times velocity shown
-    z out position_fine
-    ~ min most_shown max least_shown out velocity
-    trouble + log_4 max zero + limit - order + log_X over 1  # D·√X, more if errors keep a sign
-    ~ + quality - log_T exp
-    ~ min most_quality out quality
+    v = v max least
+    t = ~
+    w over 1
+    quality - log_T + ~ exp
+    t min most_shown max least_shown out velocity
+    t = ~
     slope by
     times as acceleration
+    t min most_quality out quality
     ~ out acceleration
     after
     if neg goto end
     sum - one
     if neg goto ready
 learn:                                  # nothing below is in a hurry
-    change keep
+    change = e - before keep
+    before = e
     log_X + log_256
     if pos goto short
-    e keep over 1
-    change = e + ~
+    e over 1
+    change = e + ~ keep
 short:
-    change keep
-    noises = noises + noises_one min noises_most max noises_first
-    sum min noises_offset by
+    noises max noises_first min noises_offset by
     w = D + D + D
     zero s+ change - D min w over by
+    a = a min most
     D = D + ~ max least_noise
-    v keep
-    t = zero s+ v min most
-    v = zero s+ t
-    a keep
-    t = zero s+ a min most
-    a = zero s+ t
-    t = e - lag keep log
-    ~ + log_X + log_3_2 exp
+    e - lag keep log
+    log_X + log_3_2 + ~ exp
+    a = a max least
     lag = lag s+ ~
     if several goto ready
     log_X + past_4
@@ -201,20 +234,24 @@ short:
     o3 = o3 s- ~
 ready:                                  # growth of the memory and noise, for the next event
     D log
+    Ds = D
     growth = zero
     log_growth = zero
+    least_log = log_4096
     limit = ~ + ~ + order
-    D over 1
-    t = log_X + limit - order_lag
-    Ds = D
+    lag log
+    w = log_X + limit - order_lag
+    trouble = ~ + ~ - w                 # lag² over 7/2 U
     log_X + log_256
     if pos goto scaled
+    D over 1
+    trouble = trouble - log_9_4
     Ds = D + ~
-    t = t + log_9_4
 scaled:
-    lag log
-    D4 = Ds + Ds + Ds + Ds
-    trouble = ~ + ~ - t                 # lag² over 7/2 U
+    doubt = trouble + log_4 max zero + limit - order
+    D3 = Ds + Ds + Ds
+    D4 = sum + Ds
+    trouble
     if pos goto lost
     T - slow_T
     if pos goto end
@@ -223,37 +260,20 @@ end:
     end
 lost:
     growth = minus_one
+    least_log = count
     log_growth = log_half
     trouble - log_4
     if neg goto end
     slow_T = T + T
-    goto end
-full:                                   # 4096·dt < T: memory does not grow
-    growth
-    if neg goto grow
-    memory = T
+    end
+full:
+    step = zero
     goto grown
-alone:
-    mu = mu + ~
-    log_dt + log_8 exp
-    goto fired
-four:
-    log_dt + log_32 exp
-fired:
-    slow_T = zero
-    memory = memory - ~ lo+ ~ log
-    goto sized
-mean:
-    $number by
-    times P mean
-    t = places - ~
-    left keep
-    zero s+ left by
-    times V place_64
-    t s+ ~ keep log
-    ~ + log_64 - log_n exp
-    e = zero s+ ~
-    goto located
+show:
+    since + lead by
+    times as velocity
+    velocity = vs + ~
+    goto place
 slip:                                   # counts were lost or added, or the offset was upset
     o@last = o@last min quarter max minus_quarter
     slips = slips + one
@@ -264,11 +284,10 @@ slip:                                   # counts were lost or added, or the offs
     p = c - moved
     goto show
 first:
-    moved = $moved
     p = c - moved
     edge = raw - moved
     since = tau
-    phase = one
+    phase = minus_one
     v = zero
     vs = zero
     a = zero
@@ -278,21 +297,18 @@ first:
     quality = none
     goto place
 young:
-    phase - one
+    phase + one
     if neg goto first
-    dt = since - tau max clock log
-    moved = $moved
-    log_dt = ~
 begin:
     e = c - p keep log
     slips = zero
-    ~ + of_velocity - log_dt exp
-    phase = two
     edge = raw - moved
+    of_velocity - log_dt + ~ exp
+    phase = zero
     since = tau
     p = c - moved
     v = zero s+ ~
-    vs = v
+    vs = sum
     a = zero
     as = zero
     mu = zero
@@ -313,21 +329,22 @@ same:                                   # the same edge again: no event, unless 
     p = p - moved
     goto show
 silent:
-    quiet = quiet max zero
+    after = minus_one
+    since = $length + since min most_since
+    quiet = $length + quiet max zero min most
     sum - forget
     if pos goto rest
-    phase - two
+    phase
     if neg goto nothing
     since + lead by
     times as velocity
     velocity = vs + ~
     since by
     times as half_velocity
-    t = vs + ~
-    times t place
+    vs + ~ product place
     z = p + ~ keep
     if neg goto below
-    z + o@up
+    sum + o@up
     goto beyond
 below:
     zero - z - o@down
@@ -337,29 +354,29 @@ beyond:
     if neg goto still
     z = z s- beyond
     quiet + lead log
-    share = zero
+    w = zero
     beyond - half
     if neg goto whole
-    share = log_5_8
+    w = log_5_8
 whole:
-    of_speed - ~ - share exp
-    t = ~
-    t = zero s+ velocity min t
+    of_speed - w - ~ exp
+    t = zero s+ velocity - ~ lo+ ~
     velocity = zero s+ t
 still:
+    z out position_fine
     quiet - max_time
     if neg goto shown
     velocity = zero
     goto quiet
 rest:
-    phase = zero
+    phase = minus_two
     since = zero
     quiet = zero
     p = zero
 nothing:
     quality = none
     velocity = zero
-    z = p
+    p out position_fine
 quiet:
     as = zero
     goto shown

@@ -63,18 +63,17 @@ class Interpreter:
             one: Instruction = code[place]
             self.met[place] += 1
             place += 1
-            if one.jump != Jump.NEVER:
-                if one.jump == Jump.END:
-                    return tuple(shown[name] for name in OUTPUTS[1:])
-                taken = {
-                    Jump.ALWAYS: True,
-                    Jump.NEG: sum_ < 0,
-                    Jump.POS: sum_ >= 0,
-                    Jump.EMPTY: number == 0,
-                    Jump.SEVERAL: number > 1,
-                }[one.jump]
-                place = self.program.code.labels[one.target] if taken else place
-                continue
+            if one.jump == Jump.END:
+                return tuple(shown[name] for name in OUTPUTS[1:])
+            taken = {
+                Jump.NEVER: False,
+                Jump.ALWAYS: True,
+                Jump.NEG: sum_ < 0,
+                Jump.POS: sum_ >= 0,
+                Jump.EMPTY: number == 0,
+                Jump.SEVERAL: number > 1,
+            }[one.jump]
+            place = self.program.code.labels[one.target] if taken else place
             match one.source:
                 case Source.NONE:
                     operand = 0

@@ -150,9 +150,8 @@ class Recursion:
         log_step = min(log_dt - self.log_memory, 0) + self.log_memory + self.log_growth
         step = self._power(log_step)
         if log_dt - self.log_memory + k["log_4096"] < 0 <= self.grows:
-            memory = self.memory
-        else:
-            memory = min(self.memory + (step if self.grows >= 0 else -step), k["most_memory"])
+            step = 0
+        memory = min(self.memory + (step if self.grows >= 0 else -step), k["most_memory"])
         self.since = tau
         if n > 1:
             rest_of = total - self._product(p, n, "mean")
