@@ -163,40 +163,46 @@ ENTRY __attribute__((flatten)) void loop_run(Loop *loop) {
     double slope = (course.speed[at + 1] - course.speed[at]) / (double(course.clocks) * core.clock_seconds);
     double speed = course.speed[at] + slope * within;
     if (act.at(clock)) driven = control.command;
-    if (tick.at(clock)) {
+    bool ticks = tick.at(clock), logs = log.at(clock);
+    int64_t position = ticks || logs ? watch.position() : 0;
+    if (ticks) {
       double angle = course.angle[at] + (course.speed[at] + slope * within / 2) * within;
 #if GATES
       watch.command(speed, slope, angle);
 #else
-      double error = angle - double(watch.position()) * core.rad_per_count;
+      double error = angle - double(position) * core.rad_per_count;
       control.tick(double(tick.every) * core.clock_seconds, speed, slope, error);
       if (loop->controller.delay == 0) driven = control.command;
 #endif
     }
-    if (log.at(clock)) {
+    if (logs) {
       const double values[] = {double(clock) * core.clock_seconds, speed, shaft.speed, shaft.angle, control.held,
-          control.y, control.z, control.disturbance, control.command, shaft.current, double(watch.position())};
+          control.y, control.z, control.disturbance, control.command, shaft.current, double(position)};
       row = std::copy(std::begin(values), std::end(values), row);
       loop->n_rows++;
     }
     int64_t until = std::min({clock + loop->step, (at + 1) * course.clocks, tick.next, act.next, log.next, loop->end});
     double before = shaft.angle;
     shaft.move(double(until - clock) * core.clock_seconds, driven + course.current[at], course.load[at]);
-    // Edges on the way, in order; each changes a line in the clock in which it is passed.
+    // Edges on the way, in order; each changes a line in the clock in which it is passed. The core stands in one place
+    // of this loop, as its text is long.
     int64_t most = 2 * (until - clock) + 2;  // no core counts as many, and far away none may be the last
-    while (int turn = shaft.passing()) {
-      if (most-- == 0) break;
-      double way = shaft.angle - before, part = way == 0 ? 0 : ((turn > 0 ? shaft.above : shaft.below) - before) / way;
-      int64_t change = clock + int64_t(std::clamp(part, 0.0, 1.0) * double(until - clock));
-      watch.to(std::min(change, until - 1));
+    while (true) {
+      int turn = shaft.passing();
+      if (turn ? most-- == 0 : !std::isfinite(shaft.angle)) {
+        loop->away = clock;
+        return;
+      }
+      int64_t stop = until;
+      if (turn) {
+        double way = shaft.angle - before, part = way == 0 ? 0 : ((turn > 0 ? shaft.above : shaft.below) - before) / way;
+        stop = std::min(clock + int64_t(std::clamp(part, 0.0, 1.0) * double(until - clock)), until - 1);
+      }
+      watch.to(stop);
+      if (!turn) break;
       shaft.pass(turn);
       watch.lines(shaft.lines());
     }
-    if (most < 0 || !std::isfinite(shaft.angle)) {
-      loop->away = clock;
-      return;
-    }
-    watch.to(until);
     clock = until;
   }
 }

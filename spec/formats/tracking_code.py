@@ -6,10 +6,10 @@ works and it needs it. A word is read one instruction before its use, so none is
 tests the sum that was before it, and meanwhile adds a term as others do; it stores nothing.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from functools import cached_property
+from functools import cache, cached_property
 
 from tachometry.spec.formats.tracking import GAINS_FROM, LOGS, POWER_BITS, POWERS, Tracking
 from tachometry.spec.formats.tracking_listing import LISTING
@@ -166,6 +166,7 @@ class Code:
     labels: Mapping[str, int]
 
 
+@cache
 def assembled(listing: str = LISTING) -> Code:
     """Return the instructions of a listing, with one that does nothing where a word would be read too early."""
     code: list[Instruction] = []
@@ -241,6 +242,40 @@ def _same(stored: str, read: str) -> bool:
     return stored == read or ("o@" in stored + read and {stored, read} <= {*OFFSETS, *CHOSEN})
 
 
+@cache
+def _longest(times: Times, output: str = "") -> int:
+    """Return the clocks of the longest way to an output or, without one, to the last instruction.
+
+    Nothing of how ways exclude each other is known.
+    """
+    code, labels = assembled().instructions, assembled().labels
+    entry: dict[int, tuple[int, int]] = {labels["tick"]: (0, 0)}  # clock, and when the unit has finished
+    longest, open_ = 0, {labels["tick"]}
+    while open_:
+        place = min(open_)  # ways that join go on together
+        open_.remove(place)
+        clock, free = entry[place]
+        one = code[place]
+        if one.needs_unit:
+            clock = max(clock, free)
+        if begun := times.of(one.start):
+            free = clock + begun
+        clock += 1
+        if one.output == output if output else one.jump == Jump.END:
+            longest = max(longest, clock)
+            continue
+        following = [(place + 1, clock)] if one.jump not in (Jump.ALWAYS, Jump.END) else []
+        if one.target:
+            following.append((labels[one.target], clock + TAKEN))
+        for after, at in following:
+            before = entry.get(after, (-1, -1))
+            now = max(before[0], at), max(before[1], free)
+            if now != before:
+                entry[after] = now
+                open_.add(after)
+    return longest
+
+
 @dataclass(frozen=True)
 class Program:
     """The program of a tracking recursion on a machine, its words, and its clocks.
@@ -272,40 +307,12 @@ class Program:
     @cached_property
     def clocks(self) -> int:
         """Clocks from the first instruction to the last output, by the longest way."""
-        return self._longest(lambda one: one.output == "acceleration")
+        return _longest(self.times, "acceleration")
 
     @cached_property
     def all_clocks(self) -> int:
         """Clocks from the first instruction to the last one."""
-        return self._longest(lambda one: one.jump == Jump.END)
-
-    def _longest(self, ends: Callable[[Instruction], bool]) -> int:
-        """Return the clocks of the longest way to an instruction; nothing of how ways exclude each other is known."""
-        code, labels = self.code.instructions, self.code.labels
-        entry: dict[int, tuple[int, int]] = {labels["tick"]: (0, 0)}  # clock, and when the unit has finished
-        longest, open_ = 0, [labels["tick"]]
-        while open_:
-            place = open_.pop()
-            clock, free = entry[place]
-            one = code[place]
-            if one.needs_unit:
-                clock = max(clock, free)
-            if begun := self.times.of(one.start):
-                free = clock + begun
-            clock += 1
-            if ends(one):
-                longest = max(longest, clock)
-                continue
-            following = [(place + 1, clock)] if one.jump not in (Jump.ALWAYS, Jump.END) else []
-            if one.target:
-                following.append((labels[one.target], clock + TAKEN))
-            for after, at in following:
-                before = entry.get(after, (-1, -1))
-                now = max(before[0], at), max(before[1], free)
-                if now != before:
-                    entry[after] = now
-                    open_.append(after)
-        return longest
+        return _longest(self.times)
 
     @cached_property
     def constants(self) -> dict[str, int]:

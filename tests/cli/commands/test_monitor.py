@@ -79,7 +79,7 @@ def test_a_recording(suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[
     """The emulator turns at the speed that was set; every frame is there once."""
     path = tmp_path / f"run.{suffix}"
     words = ["--set", "speed=100rad/s", "--every", "1ms", "--duration", "300ms", "--record", path]
-    assert run("monitor", SIM, *WORDS, *words) == 0
+    assert run("monitor", SIM, *WORDS, "--method", "m", *words) == 0
     if suffix == "csv":
         with path.open(newline="") as file:
             rows: list[dict[str, Any]] = list(csv.DictReader(file))
@@ -165,7 +165,7 @@ def test_a_full_disk_leaves_the_old_recording_and_keeps_the_rows(suffix: str, tm
 def test_a_board_that_is_served(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Another process runs it; the manifest that it wrote is what the monitor needs."""
     path = tmp_path / "sim.json"
-    with started(SIM, *WORDS, "--serve", path) as process:
+    with started(SIM, *WORDS, "--method", "m", "--serve", path) as process:
         assert process.stdout is not None
         port = process.stdout.readline().strip()
         assert run("monitor", port, "--manifest", path, "--plain", "--duration", "50ms") == 0
@@ -360,7 +360,10 @@ def blocks(language: str) -> list[str]:
 def test_the_commands_of_the_page(
     selftest: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """They are short here, and the package is installed already; those that need hardware are marked as text."""
+    """They are short here, with the method of the core that tests share, and the package is installed already.
+
+    Those that need hardware are marked as text.
+    """
     monkeypatch.chdir(tmp_path)
     commands = [shlex.split(line) for block in blocks("sh") for line in block.replace("\\\n", "").splitlines()]
     assert len(commands) >= 4
@@ -370,7 +373,7 @@ def test_the_commands_of_the_page(
             continue
         if "--selftest" in words and not selftest:
             continue
-        short = [] if "--selftest" in words else ["--duration", "20ms"]
+        short = [] if "--selftest" in words else ["--duration", "20ms", "--method", "m"]
         assert (program, run(*words, *short)) == ("tachometry", 0), words
     assert "speed " in capsys.readouterr().out
     assert (tmp_path / "run.csv").exists()

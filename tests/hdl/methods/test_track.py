@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from support import compiled
-from support.nightly import only
+from support.nightly import nightly, only
 from support.simulate import Player, Resettable, clock_by_clock
 from support.tracking import core, motions
 
@@ -26,9 +26,11 @@ SPEC = TrackTachometer(
     position_width=8,
     fine_bits=16,
 )
-EXTERNAL = replace(SPEC, timing=Timing(1_000_000, 1400, 10), external_tick=True, max_tick_cycles=1400)
+EXTERNAL = replace(
+    SPEC, timing=Timing(1_000_000, 1400, 10), external_tick=True, max_tick_cycles=1400, multiplier="serial"
+)
 NAMES = ["velocity", "acceleration", "position_fine", "quality", "interval", "forced"]
-COMPILED = compiled.clock_by_clock  # mutants, which end soon, are not worth a compilation
+COMPILED = compiled.clock_by_clock
 Update = tuple[int, ...]  # clock, and what the update says
 
 
@@ -74,24 +76,20 @@ def regular(spec: TrackTachometer, speed: float, n_ticks: int, begin: int = 0) -
     return Steps(clock, np.full(len(clock), 1 if speed > 0 else -1), none, none, none), last
 
 
-def check(spec: TrackTachometer, steps: Steps, last: NDArray[np.int64], play: Player = COMPILED) -> None:
+def check(spec: TrackTachometer, steps: Steps, last: NDArray[np.int64]) -> None:
     """Every update, in its clock, with every output."""
-    updates = updates_of(spec, rows_of(spec, steps, last), play)
+    updates = updates_of(spec, rows_of(spec, steps, last))
     for found, right in zip_longest(updates, golden(spec, steps, last)):
         assert found == right
 
 
-def check_speeds(play: Player = COMPILED) -> None:
+def test_speeds() -> None:
     """Both ways, fast and slow, and a rest behind each."""
     for speed in (0.3, -1.6):
         steps, last = regular(SPEC, speed, 24)
         kept = steps.clock < 11_000
         steps = Steps(steps.clock[kept], steps.step[kept], steps.errors, steps.index, steps.swallowed)
-        check(SPEC, steps, last, play)
-
-
-def test_speeds() -> None:
-    check_speeds()
+        check(SPEC, steps, last)
 
 
 def test_the_fine_position_wraps_as_the_position_does() -> None:
@@ -100,14 +98,12 @@ def test_the_fine_position_wraps_as_the_position_does() -> None:
     assert golden(SPEC, steps, last) != golden(replace(SPEC, position_width=16), steps, last)
 
 
-def check_motions(play: Player = COMPILED) -> None:
-    """Any counts."""
-    for spec in (EXTERNAL, SPEC):
-        check(spec, *motions(spec, np.random.default_rng(3), 200), play)
-
-
-def test_hostile_counts() -> None:
-    check_motions()
+# The quick unit takes half a minute to be compiled; tests/test_matrix.py and test_track_machine.py have it daily.
+@pytest.mark.parametrize(
+    "spec", [SPEC, EXTERNAL, pytest.param(replace(EXTERNAL, multiplier="block"), marks=nightly)], ids=range(3)
+)
+def test_hostile_counts(spec: TrackTachometer) -> None:
+    check(spec, *motions(spec, np.random.default_rng(3), 200))
 
 
 def test_latency() -> None:
