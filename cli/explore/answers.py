@@ -6,21 +6,44 @@ command line, by `Refused` with the same line.
 
 import base64
 import io
+import math
 import re
 import shlex
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any, TypeVar
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import click
+import numpy as np
+from numpy.typing import NDArray
 
 from tachometry.cli.commands import Refused, refusals
 from tachometry.cli.commands.generate import ASKED, Asked
+from tachometry.cli.options.capture import CAPTURE_OPTIONS
+from tachometry.cli.options.core import CORE_AND_MAKE_OPTIONS, Make
 from tachometry.cli.options.help import needed
+from tachometry.cli.options.methods import Methods, named_methods
+from tachometry.cli.options.motion import OPTIONAL_MOTION_OPTIONS
 from tachometry.cli.options.option import GroupedCommand, Option, options_named
 from tachometry.cli.options.settings import arguments
-from tachometry.spec import METHODS, methods_with
+from tachometry.cli.reports.compare import shown_scores, shown_time
+from tachometry.cli.reports.core import typed_unit
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.options import EncoderOptions
+from tachometry.sim.encoder.virtual import Encoding
+from tachometry.sim.signals.progress import no_bar
+from tachometry.sim.signals.recording import Recording
+from tachometry.sim.signals.scratch import scratch
+from tachometry.sim.studies.comparing.comparison import Source, comparison
+from tachometry.sim.studies.comparing.rivals import BASELINES
+from tachometry.sim.studies.plan import Plan, Plans, cells_of, default_range
+from tachometry.sim.studies.size import CORE, SEEDS, TARGETS, measure_core, versions
+from tachometry.sim.theory.performance import REAL_DISC
+from tachometry.spec import METHODS, TachometerSpec, methods_with
+from tachometry.spec.language.option import ParameterError, options_of
+from tachometry.spec.language.units import short_time
 from tachometry.spec.registers.buses import bus_of, ports_on
 
 Texts = Mapping[str, str]  # of options, by their names without dashes; empty: without the option
@@ -28,6 +51,8 @@ Answer = dict[str, Any]
 Made = TypeVar("Made")
 
 _LONGEST = 4000  # characters of a text
+_POINTS, _POINTS_OF_TIME = 300, 1500  # of a curve
+_MOST = 1_000_000  # counts, and ticks, of a motion
 # Groups that are no part of a core, by the part of the page that has them.
 _PARTS = {"Motion": "motion", "Encoder faults": "motion", "Capture": "capture"}
 _DEFAULT = re.compile(r"\s+\[(?:default: ([^\]]+?))?(?:(?:; )?\d*<?=?x[<>=]+\d+|required)?\]$")
@@ -44,6 +69,23 @@ def _generate(asked: Asked) -> Asked:
     return asked
 
 
+@click.command("compare", cls=GroupedCommand)
+@CORE_AND_MAKE_OPTIONS
+@OPTIONAL_MOTION_OPTIONS
+def _compare(spec: TachometerSpec, make: Make, **given: Any) -> tuple[Methods, Any, Any]:
+    return _beside(spec, make), given["record"], given["tables"]
+
+
+@click.command("replay", cls=GroupedCommand)
+@click.argument("capture", type=Path)
+@CORE_AND_MAKE_OPTIONS
+@CAPTURE_OPTIONS
+def _replay(
+    spec: TachometerSpec, make: Make, capture: Path, read: Callable[..., Recording]
+) -> tuple[Methods, Recording]:
+    return _beside(spec, make), read(capture, spec)
+
+
 def answer(name: str, args: Mapping[str, Any]) -> Answer:
     """Return what a function of `FUNCTIONS` answers; where it refuses, the line as `error` and the `field` it is of."""
     try:
@@ -51,8 +93,9 @@ def answer(name: str, args: Mapping[str, Any]) -> Answer:
         if function is None:
             raise Refused(f"the page must ask one of {', '.join(FUNCTIONS)}, not {name!r}")
         for given in args.values():
-            if not isinstance(given, dict) or not all(isinstance(text, str) for text in given.values()):
-                raise Refused("what the page asks must be texts by the names of options")
+            texts = given.values() if isinstance(given, dict) else [given]
+            if not all(isinstance(text, str) for text in texts):
+                raise Refused("what the page asks must be texts, and texts by the names of options")
         return function(**args)
     except TypeError as error:
         return {"error": f"the page must ask as it is written: {error}", "field": ""}
@@ -72,7 +115,8 @@ def options() -> Answer:
     return {
         "groups": [{"title": title, "part": _PARTS.get(title, "core"), "options": of} for title, of in groups.items()],
         "needed": [_name(one) for one in needed(found)],
-        "start": _START,
+        "start": _START
+        | {one.name: str(REAL_DISC[one.field]) for one in options_of(EncoderOptions) if one.field in REAL_DISC},
         "methods": {name: spec.facts.summary for name, spec in METHODS.items()},
     }
 
@@ -89,6 +133,7 @@ def check(options: Texts) -> Answer:
             "rows": asked.rows,
             "facts": _FACTS,
             "ports": [asdict(port) for port in ports],
+            "motions": _motions(asked.spec.tachometer),
         }
 
     return _run(_generate, options, of)
@@ -102,6 +147,172 @@ def files(options: Texts) -> Answer:
         for file, text in texts.items():
             archive.writestr(ZipInfo(file, _AGES), text.encode(), ZIP_DEFLATED)
     return {"name": f"{name}.zip", "files": [*texts], "zip": base64.b64encode(packed.getvalue()).decode()}
+
+
+def curves(options: Texts) -> Answer:
+    """Return error, delay and standstill of all methods over speed, that of the options first; its theory is `plan`'s.
+
+    The error is the greatest near each speed at constant speed, with a real disc. None: a method cannot measure there.
+    """
+    core, beside = _run(_generate, options, lambda asked: asked.spec.tachometer), _common(options)
+    methods, left_out = _run(_compare, beside, lambda found: (found[0].specs, found[0].left_out))
+    plans = Plans(
+        core,
+        {name: spec for name, spec in methods.items() if spec is not None} | {core.method: core},
+        *default_range(core),
+    )
+    unit, near = typed_unit(core), np.geomspace(plans.low, plans.high, _POINTS + 1)[:-1]
+    starts = np.unique(np.searchsorted(plans.line.speed, near))
+
+    def shown(name: str, spec: TachometerSpec, plan: Plan) -> Answer:
+        error = plan.resolution + plan.disc + spec.scale.rounding_lsb * spec.scale.rad_per_s_per_lsb
+        late = float(spec.times.seconds(spec.latency.tick_to_velocity))
+        delay = late + plan.measurement_time / 2 * (not spec.words.on_ramps)
+        worst = f"{unit.of(np.nanmax(error)):.4g}" if not np.isnan(error).all() else "-"
+        rest, cells = spec.times.standstill_ticks * spec.timing.tick_seconds, cells_of(spec)
+        return {
+            "name": name,
+            "own": name == core.method,
+            "error": _numbers(unit.of(np.fmax.reduceat(error, starts))),
+            "delay": _numbers(np.fmax.reduceat(delay, starts)),
+            "cells": [worst, shown_time(np.nanmax(delay)), short_time(rest), "-" if cells is None else str(cells)],
+        }
+
+    each = [shown(name, plans.methods[name], plan) for name, plan in plans.lines.items()]
+    return {
+        "unit": unit.name,
+        "x": _numbers(unit.of(plans.line.speed[starts])),
+        "heads": ["method", f"worst error ({unit.name})", "longest delay", "standstill within", "cells (ECP5)"],
+        "curves": sorted(each, key=lambda one: not one["own"]),
+        "left_out": left_out,
+    }
+
+
+def respond(options: Texts, motion: Texts) -> Answer:
+    """Return what the golden model of the core, other methods and other projects show of a motion."""
+
+    def of(found: Any) -> Answer:
+        methods, record, tables = found
+        spec = methods.specs[core.method]
+        if record is None or tables:
+            raise ParameterError(
+                "motion", "must be given here, and must not be a file: drop a capture, or take compare"
+            )
+        moved = parse_motion(motion["motion"])
+        edges = moved.max_travel * spec.encoder.counts_per_rev / math.tau
+        ticks = moved.duration / float(spec.timing.tick_seconds)
+        if max(edges, ticks) > _MOST:
+            raise ParameterError(
+                "motion",
+                f"must be of at most {_MOST} counts and ticks, not {max(edges, ticks):.3g}: take tachometry compare",
+            )
+        truth: Encoding = record(spec)
+        return _response(core, methods, Source("--motion", truth.recording, truth.true_speed))
+
+    core = _run(_generate, options, lambda asked: asked.spec.tachometer)
+    return _run(_compare, {**_common(options), **motion}, of)
+
+
+def replay(options: Texts, capture: Texts, name: str, data: str) -> Answer:
+    """Return what they show of a capture: the bytes of a file of this name, in base64."""
+    core = _run(_generate, options, lambda asked: asked.spec.tachometer)
+    suffixes = re.search(r"(\.[a-z0-9]{1,10}){0,2}$", name.lower())
+    with scratch() as folder:
+        file = folder / f"capture{suffixes[0] if suffixes else ''}"
+        try:
+            file.write_bytes(base64.b64decode(data, validate=True))
+            return _run(
+                _replay,
+                {**_common(options), **capture},
+                lambda found: _response(core, found[0], Source("the capture", found[1], None)),
+                str(file),
+            )
+        except ValueError as error:
+            raise Refused(f"the capture must come as base64: {error}") from error
+        except Refused as error:
+            raise Refused(str(error).replace(str(file), name)) from error
+
+
+def size(options: Texts) -> Answer:
+    """Return cells and Fmax of a core on an ECP5, as `compare --size` measures them in half a minute."""
+
+    def of(asked: Asked) -> Answer:
+        try:
+            tools = versions()
+            verilog = replace(asked, name=CORE).texts()[f"{CORE}.v"]
+            ports = ports_on(asked.spec, bus_of(asked.bus, asked.baud))
+            found = measure_core(asked.spec, TARGETS["ECP5"], verilog, tools, ports, SEEDS[:3])
+        except RuntimeError as error:
+            raise click.ClickException(f"the size cannot be measured: {error}") from error
+        figures = {name: f"{value:.0f}" for name, value in found.figures.items() if value and name != "latency"}
+        figures["Fmax"] += " MHz"
+        return {"size": ", ".join(f"{name} {text}" for name, text in figures.items()), "limit": found.limit}
+
+    return _run(_generate, options, of)
+
+
+def _response(core: TachometerSpec, methods: Methods, source: Source) -> Answer:
+    specs = {core.method: core} | methods.specs | {core.method: core} | dict.fromkeys(BASELINES)
+    found = comparison(
+        core, specs, _never, source, earliest=None, latest=math.inf, tune=False, tradeoff=False, bar=no_bar
+    )
+    unit = typed_unit(core)
+    heads, rows = shown_scores(found, unit)
+    at = found.instants[:: -(-len(found.instants) // _POINTS_OF_TIME)]
+    each = zip(found.curves, rows, strict=True)
+    return {
+        "unit": unit.name,
+        "x": _numbers(at),
+        "true": None if source.true_speed is None else _numbers(unit.of(source.true_speed(at))),
+        "heads": heads,
+        "curves": [
+            {
+                "name": curve.name,
+                "own": curve.name == core.method,
+                "rival": curve.name in BASELINES,
+                "what": BASELINES[curve.name].title if curve.name in BASELINES else "",
+                "velocity": _numbers(unit.of(curve.estimate.at(at))),
+                "cells": row[1:],
+            }
+            for curve, row in each
+        ],
+        "left_out": methods.left_out,
+    }
+
+
+def _beside(spec: TachometerSpec, make: Make) -> Methods:
+    """Return all methods that can be as this core is."""
+    return named_methods("all", make)
+
+
+def _never(method: str, texts: Texts) -> TachometerSpec:
+    raise AssertionError("nothing is tuned")
+
+
+def _common(options: Texts) -> dict[str, str]:
+    """Return those options that other methods have, too."""
+    known = _options_of(_compare)
+    return {name: text for name, text in options.items() if name in known}
+
+
+def _motions(spec: TachometerSpec) -> dict[str, str]:
+    """Return motions that suit a core, by what they are."""
+    top, tick = default_range(spec)[1], float(spec.timing.tick_seconds)
+    time, fast, slow = max(0.1, 100 * tick), f"{0.9 * top:.3g}rad/s", f"{top / 200:.3g}rad/s"
+    t, half = f"{time:.3g}s", f"{time / 2:.3g}s"
+    return {
+        "start, run and stop": f"s-curve:0:{fast}:{t}+constant:{fast}:{t}+s-curve:{fast}:0:{t}+stop:{t}",
+        "reversal": f"constant:{fast}:{half}+ramp:{fast}:-{fast}:{t}+constant:-{fast}:{half}",
+        "ramp": f"ramp:0:{fast}:{t}",
+        "sine": f"sine:{fast}:{2 / time:.3g}Hz:{2 * time:.3g}s",
+        "crawl": f"constant:{slow}:{2 * time:.3g}s",
+        "steps": f"constant:{slow}:{half}+constant:{fast}:{half}+constant:{slow}:{half}+stop:{half}",
+    }
+
+
+def _numbers(values: NDArray[np.float64]) -> list[float | None]:
+    """Return numbers as JSON has them, to six digits."""
+    return [None if math.isnan(value) else float(f"{value:.6g}") for value in values.tolist()]
 
 
 def _run(command: click.Command, texts: Texts, of: Callable[[Any], Made], *words: str) -> Made:
@@ -156,4 +367,6 @@ def _typed(texts: Texts) -> str:
     )
 
 
-FUNCTIONS: dict[str, Callable[..., Answer]] = {function.__name__: function for function in (options, check, files)}
+FUNCTIONS: dict[str, Callable[..., Answer]] = {
+    function.__name__: function for function in (options, check, curves, files, respond, replay, size)
+}

@@ -2,10 +2,12 @@
 
 import json
 import secrets
+import signal
 import socket
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from importlib.resources import files
+from types import FrameType
 from typing import Any
 
 import anyio
@@ -15,6 +17,9 @@ from starlette.datastructures import Headers
 from starlette.requests import Request
 from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
+from uvicorn.server import HANDLED_SIGNALS
+
+from tachometry.sim.signals.scratch import STOPS, end_tools
 
 HOST = "127.0.0.1"
 MOST_BYTES = 16 << 20  # that are asked with: a capture, in base64
@@ -131,6 +136,18 @@ def serve(port: int, answer: Answer, told: Callable[[str], None]) -> None:
             limit_concurrency=_MOST_CLIENTS,
             timeout_graceful_shutdown=2,
         )
+        server = _Server(config)
+        for number in STOPS:
+            if number not in HANDLED_SIGNALS:
+                signal.signal(number, server.handle_exit)
         told(f"http://{HOST}:{port}/{token}/")
         with suppress(KeyboardInterrupt):  # which is how it ends
-            uvicorn.Server(config).run(sockets=[listening])
+            server.run(sockets=[listening])
+
+
+class _Server(uvicorn.Server):
+    """Ends with all that it has started."""
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        end_tools()
+        super().handle_exit(sig, frame)

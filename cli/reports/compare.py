@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
+from types import MappingProxyType
 
 from rich.text import Text
 
@@ -11,7 +12,7 @@ from tachometry.cli.reports.terminal import print_rows, print_table, stdout_cons
 from tachometry.sim.studies.comparing.compare import Score
 from tachometry.sim.studies.comparing.comparison import Comparison
 from tachometry.sim.studies.size import Measurement
-from tachometry.spec.language.units import format_time
+from tachometry.spec.language.units import SpeedUnit, format_time
 
 _SPEEDS = ("rms", "max")  # of a score, in rad/s
 _SIZE = {"COMB": "{:.0f}", "FF": "{:.0f}", "Fmax": "{:.0f}MHz"}
@@ -36,26 +37,7 @@ def print_comparison(comparison: Comparison, sizes: Mapping[str, Measurement], l
     scores, unit = comparison.scores, comparison.spec.scale.shown_unit
     if source := comparison.recording.source:
         print_rows(source_rows(source))
-
-    def time(seconds: float | None) -> str:
-        return "-" if seconds is None else ("-" if seconds < 0 else "") + shown_time(abs(seconds))
-
-    rows = [
-        (
-            row.name,
-            f"{row.updates_per_second:.4g}",
-            time(row.mean_time),
-            time(row.worst_time),
-            "-" if row.rms is None else f"{unit.of(row.rms):.4g}",
-            "-" if row.max is None else f"{unit.of(row.max):.4g}",
-            time(row.delay),
-            *(_size_cells(sizes.get(row.name)) if sizes else ()),
-        )
-        for row in scores
-    ]
-    errors = (f"RMS ({unit.name})", f"max ({unit.name})")
-    heads = ("method", "updates/s", "T_m mean", "T_m worst", *errors, "delay")
-    print_table((*heads, *(_SIZE if sizes else ())), rows)
+    print_table(*shown_scores(comparison, unit, sizes))
     console = stdout_console()
     if len(ranked := sorted((row.rms, row.name) for row in scores if row.rms is not None)) > 1:
         (least, best), (second, other) = ranked[:2]
@@ -77,6 +59,32 @@ def print_comparison(comparison: Comparison, sizes: Mapping[str, Measurement], l
     if comparison.true_speed is None:
         warnings += capture_warnings(comparison.recording)
     print_warnings(warnings)
+
+
+def shown_scores(
+    comparison: Comparison, unit: SpeedUnit, sizes: Mapping[str, Measurement] = MappingProxyType({})
+) -> tuple[list[str], list[tuple[str, ...]]]:
+    """Return heads and rows of the table as it is shown."""
+
+    def time(seconds: float | None) -> str:
+        return "-" if seconds is None else ("-" if seconds < 0 else "") + shown_time(abs(seconds))
+
+    rows = [
+        (
+            row.name,
+            f"{row.updates_per_second:.4g}",
+            time(row.mean_time),
+            time(row.worst_time),
+            "-" if row.rms is None else f"{unit.of(row.rms):.4g}",
+            "-" if row.max is None else f"{unit.of(row.max):.4g}",
+            time(row.delay),
+            *(_size_cells(sizes.get(row.name)) if sizes else ()),
+        )
+        for row in comparison.scores
+    ]
+    errors = (f"RMS ({unit.name})", f"max ({unit.name})")
+    heads = ("method", "updates/s", "T_m mean", "T_m worst", *errors, "delay")
+    return [*heads, *(_SIZE if sizes else ())], rows
 
 
 def _size_cells(size: Measurement | None) -> list[str]:

@@ -15,6 +15,7 @@ from pathlib import Path
 if sys.platform != "win32":
     import fcntl
 
+_running: set["subprocess.Popen[str]"] = set()
 # What ends a command in order. A terminal that is closed says so by SIGHUP, where there is this signal.
 STOPS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _PREFIX, _SUFFIX = ".tachometry-", ".tmp"
@@ -147,13 +148,23 @@ def run_tool(
                     process_group=0,
                 )
             )
+        _running.update(started)
         out, err = started[0].communicate(text, seconds)
     except BaseException:
         with held_back():
             for process in started:
                 _end(process)
         raise
+    finally:
+        _running.difference_update(started)
     return subprocess.CompletedProcess(command, started[0].returncode, out, err)
+
+
+def end_tools() -> None:
+    """Kill all tools that run in other threads of this process, which see them fail."""
+    for process in [*_running]:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL) if sys.platform != "win32" else process.kill()
 
 
 def _end(process: "subprocess.Popen[str]") -> None:

@@ -180,12 +180,12 @@ class Plans:
 
         It has all that methods have alike as this core, and measures all of its range.
         """
-        here, own = CELLS.get(_measured_as(self.spec)), _error(self.spec, self.worst)
+        here, own = cells_of(self.spec), _error(self.spec, self.worst)
         if here is None or own is None:
             return None
         better, smaller = [], []
         for spec in _others(self.spec):
-            error, cells = _error(spec, self._worst(spec)), CELLS.get(_measured_as(spec))
+            error, cells = _error(spec, self._worst(spec)), cells_of(spec)
             if error is None or cells is None:
                 continue
             one = Advice(spec.method, own / error, cells - here)
@@ -254,9 +254,10 @@ def _rounding(spec: TachometerSpec) -> float:
     return spec.scale.rounding_lsb * spec.scale.rad_per_s_per_lsb
 
 
-def _measured_as(spec: TachometerSpec) -> str:
+def cells_of(spec: TachometerSpec) -> int | None:
+    """Return cells of an ECP5 that its method takes with the options of the reference core; None: not measured."""
     block = isinstance(spec, TrackTachometer) and spec.program.times is QUICK
-    return f"{spec.method}{'-block' * block}"
+    return CELLS.get(f"{spec.method}{'-block' * block}")
 
 
 def _columns(plan: Plan, unit: SpeedUnit) -> dict[str, NDArray[Any]]:

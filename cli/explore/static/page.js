@@ -31,6 +31,9 @@ const latest = work => {
 };
 
 let known, checked = null;
+// Options of a part of the page, of those that are given.
+const part = name => Object.fromEntries(known.groups.filter(group => group.part === name).flatMap(group => group.options)
+  .filter(one => one.name in values && one.name !== "motion").map(one => [one.name, values[one.name]]));
 
 function field(about) {
   const id = `o-${about.name}`, told = `${id}-help ${id}-error`;
@@ -86,15 +89,15 @@ function dressed() {
   for (const [name] of Object.entries(values)) if ($(`o-${name}`)?.closest(".field").hidden) delete values[name];
 }
 
-function wrong(error) {
-  for (const one of document.querySelectorAll(".error")) one.textContent = "";
-  for (const one of document.querySelectorAll("[aria-invalid]")) one.removeAttribute("aria-invalid");
+function wrong(error, within = "form") {
+  for (const one of $(within).querySelectorAll(".error")) one.textContent = "";
+  for (const one of $(within).querySelectorAll("[aria-invalid]")) one.removeAttribute("aria-invalid");
   if (!error) return;
   const input = error.field && $(`o-${error.field}`);
-  (input ? $(`o-${error.field}-error`) : $("error")).textContent = error.message;
+  (input ? $(`o-${error.field}-error`) : within === "moving" ? $("o-motion-error") : $("error")).textContent = error.message;
   if (!input) return;
   input.setAttribute("aria-invalid", "true");
-  input.closest("details").open = true;
+  if (input.closest("details")) input.closest("details").open = true;
 }
 
 function symbol({ module, ports }) {
@@ -137,12 +140,128 @@ function show(found) {
     ...found.ports.map(p => cells("td", [p.name, p.direction, `${p.width}${p.signed ? " signed" : ""}`, p.unit, p.help], [2])));
 }
 
-const refresh = latest(async () => {
-  const asked = { ...values };
+// Plots: each is drawn again by its function when the colours of the page change.
+const HUES = { s: 225, m: 0, t: 32, mt: 130, rairan: 285, track: 190, hostmot2: 325, odrive: 55 }, drawn = new Map();
+const dark = matchMedia("(prefers-color-scheme: dark)");
+dark.addEventListener("change", () => { for (const draw of drawn.values()) draw(); });
+const hue = name => HUES[name] ?? [...name].reduce((sum, letter) => sum * 31 + letter.charCodeAt(0), 7) % 360;
+const colour = name => name === "true" ? "var(--ink)" : `hsl(${hue(name)} ${name in HUES ? 75 : 45}% ${dark.matches ? 66 : 42}%)`;
+const number = value => value == null ? "–" : Math.abs(value) >= 1e5 || (value !== 0 && Math.abs(value) < 1e-3) ? value.toExponential(1).replace("e+", "e") : String(+value.toPrecision(4));
+const seconds = value => value == null ? "–" : value >= 1 || value === 0 ? `${+value.toPrecision(3)} s`
+  : value >= 1e-3 ? `${+(value * 1e3).toPrecision(3)} ms` : value >= 1e-6 ? `${+(value * 1e6).toPrecision(3)} µs` : `${+(value * 1e9).toPrecision(3)} ns`;
+
+function plot(id, { title, x, y, logs = false, xs, curves, texts = {}, height = 240, moved, hidden = new Set() }) {
+  const draw = () => {
+    const place = $(id), probe = document.body.appendChild(made("i"));  // a canvas does not know the names of colours
+    const resolved = colour => { probe.style.color = colour; return getComputedStyle(probe).color; };
+    const [quiet, grid] = [resolved("var(--quiet)"), resolved("var(--grid)")];
+    const whole = (_, all) => all.map(one => !logs || Math.abs(Math.log10(one) % 1) < 1e-9 ? one : null);
+    const axis = (label, values) => ({ label, stroke: quiet, grid: { stroke: grid, width: 1, filter: whole }, ticks: { stroke: grid, filter: whole },
+      font: "11px system-ui", labelFont: "12px system-ui", size: 34, labelSize: 20, labelGap: 0,
+      ...(values ? { values: (_, all) => all.map(one => one == null ? "" : values(one)) } : {}) });
+    const inFront = [...curves].sort((a, b) => (a.own ?? 0) - (b.own ?? 0));
+    const options = {
+      width: place.clientWidth || 600, height, legend: { show: false }, cursor: { y: false, points: { size: 5 } },
+      scales: { x: { time: false, distr: logs ? 3 : 1 }, y: { distr: logs ? 3 : 1 } },
+      axes: [axis(x, texts.x ?? number), { ...axis(y, texts.y ?? number), size: 60 }],
+      series: [{}, ...inFront.map(one => ({ label: one.name, stroke: resolved(colour(one.name)), width: one.own ? 2.5 : 1.25,
+        dash: one.rival ? [5, 4] : undefined, show: !hidden.has(one.name), points: { show: false }, spanGaps: false }))],
+      hooks: moved ? { setCursor: [u => moved(u.cursor.idx)] } : {},
+    };
+    probe.remove();
+    place.plot?.destroy();
+    place.replaceChildren(made("h3", {}, title));
+    place.setAttribute("role", "group");
+    place.setAttribute("aria-label", `${title}. The table below has the numbers.`);
+    place.plot = new uPlot(options, [xs, ...inFront.map(one => one.ys)], place);
+    place.plot.names = inFront.map(one => one.name);
+  };
+  drawn.set(id, draw);
+  draw();
+}
+new ResizeObserver(() => { for (const id of drawn.keys()) $(id).plot.setSize({ width: $(id).clientWidth, height: $(id).plot.height }); }).observe(document.querySelector("main"));
+
+// The table below plots: a row for each curve, with a box that shows and hides it, and what it is at the cursor.
+function keyed(id, plots, heads, curves, at, hidden) {
+  const rows = curves.map(one => {
+    const box = made("input", { type: "checkbox", id: `${id}-${one.name}` }), swatch = made("span", { class: "swatch" });
+    swatch.style.borderColor = colour(one.name);
+    box.checked = !hidden.has(one.name);
+    box.addEventListener("change", () => {
+      box.checked ? hidden.delete(one.name) : hidden.add(one.name);
+      for (const place of plots) $(place).plot.setSeries($(place).plot.names.indexOf(one.name) + 1, { show: box.checked });
+    });
+    return made("tr", { class: one.own ? "own" : one.rival ? "rival" : "" }, made("td", {}, made("label", { title: one.what ?? "" }, box, swatch, one.name)),
+      ...one.cells.map(cell => made("td", { class: "n" }, cell)), made("td", { class: "n" }));
+  });
+  $(id).replaceChildren(cells("th", [...heads, at], heads.map((_, n) => n + 1)), ...rows);
+  return texts => rows.forEach((row, n) => { row.lastChild.textContent = texts[n]; });
+}
+
+const hiddenOver = new Set(), hiddenOn = new Set();
+const over = latest(async () => {
+  if (!checked) return;
+  const { unit, x, heads, curves, left_out } = await ask("curves", { options: part("core") });
+  const named = curves.map(one => ({ ...one, what: known.methods[one.name] })), told = keyed("methods", ["errors", "delays"], heads, named, "error at the cursor", hiddenOver);
+  const moved = n => told(named.map(one => n == null ? "" : number(one.error[n]))), speed = `speed (${unit})`;
+  plot("errors", { title: "Worst error at constant speed, with a real disc", x: speed, y: `error (${unit})`, logs: true, hidden: hiddenOver, xs: x, curves: named.map(one => ({ ...one, ys: one.error })), moved });
+  plot("delays", { title: "Delay of the velocity", x: speed, y: "delay", logs: true, hidden: hiddenOver, xs: x, curves: named.map(one => ({ ...one, ys: one.delay })), texts: { y: seconds }, moved });
+  $("left-out").textContent = Object.entries(left_out).map(([name, why]) => `${name} is left out: ${why}.`).join(" ");
+});
+
+const shownFirst = new Set(["true", "s", "mt", "track", "hostmot2", "odrive"]);
+let settled = false;
+function responded({ unit, x, true: truth, heads, curves, left_out }) {
+  const shown = curves.map(one => ({ ...one, ys: one.velocity }));
+  if (truth) shown.unshift({ name: "true", ys: truth, cells: heads.slice(1).map(() => "") });
+  if (!settled) for (const one of shown) if (!one.own && !shownFirst.has(one.name)) hiddenOn.add(one.name);
+  settled = true;
+  const told = keyed("scores", truth ? ["velocity", "deviation"] : ["velocity"], heads, shown, `velocity at the cursor (${unit})`, hiddenOn);
+  const moved = n => told(shown.map(one => n == null ? "" : number(one.ys[n])));
+  plot("velocity", { title: "Velocity", x: "time", y: `velocity (${unit})`, xs: x, curves: shown, texts: { x: seconds }, moved, hidden: hiddenOn, height: 260 });
+  $("deviation").hidden = !truth;
+  if (truth) plot("deviation", { title: "Error of the velocity", x: "time", y: `error (${unit})`, xs: x, curves: shown.map(one => ({ ...one, ys: one.ys.map((v, n) => v - truth[n]) })), texts: { x: seconds }, moved, hidden: hiddenOn, height: 200 });
+}
+
+const respond = latest(async () => {
+  if (!checked) return;
   try {
-    checked = await ask("check", { options: asked });
+    responded(await ask("respond", { options: part("core"), motion: { motion: $("o-motion").value.trim(), ...part("motion") } }));
+    wrong(null, "moving");
+  } catch (error) { wrong(error, "moving"); }
+});
+
+function presets({ motions }) {
+  const before = $("preset").value, given = $("o-motion").value;
+  $("preset").replaceChildren(...Object.entries(motions).map(([name, motion]) => made("option", { value: motion }, name)), made("option", { value: "" }, "as written"));
+  const name = before && Object.keys(motions).find(one => one === $("preset").dataset.name);
+  if (!before && given) $("preset").value = "";
+  else { $("preset").value = motions[name] ?? Object.values(motions)[0]; $("o-motion").value = $("preset").value; }
+}
+$("preset").addEventListener("change", () => {
+  $("preset").dataset.name = $("preset").selectedOptions[0].textContent;
+  if ($("preset").value) $("o-motion").value = $("preset").value;
+  delete values.motion;
+  respond();
+});
+$("o-motion").addEventListener("input", () => { $("preset").value = ""; values.motion = $("o-motion").value.trim(); changed(); });
+
+$("measure").addEventListener("click", async () => {
+  $("measure").disabled = true;
+  $("size").textContent = "Measuring…";
+  try {
+    const { size, limit } = await ask("size", { options: part("core") });
+    $("size").textContent = `${size}; ${limit}`;
+  } catch (error) { $("size").textContent = error.message; }
+  $("measure").disabled = false;
+});
+
+const refresh = latest(async () => {
+  try {
+    checked = await ask("check", { options: part("core") });
     wrong(null);
     show(checked);
+    presets(checked);
     $("status").textContent = "";
   } catch (error) {
     checked = null;
@@ -150,7 +269,9 @@ const refresh = latest(async () => {
     $("status").textContent = "An option is not what it must be; what is shown is of the options before.";
   }
   for (const one of document.querySelectorAll("main > section")) one.classList.toggle("stale", !checked);
-  $("download").disabled = $("copy").disabled = !checked;
+  $("download").disabled = $("copy").disabled = $("measure").disabled = !checked;
+  await over();
+  await respond();
 });
 
 let timer;
@@ -170,7 +291,7 @@ $("download").addEventListener("click", async () => {
   $("status").textContent = "Writing the files…";
   $("download").disabled = true;
   try {
-    const { name, files, zip } = await ask("files", { options: { ...values } });
+    const { name, files, zip } = await ask("files", { options: part("core") });
     const bytes = Uint8Array.from(atob(zip), letter => letter.charCodeAt(0));
     const link = made("a", { href: URL.createObjectURL(new Blob([bytes], { type: "application/zip" })), download: name });
     link.click();
@@ -188,5 +309,8 @@ $("download").addEventListener("click", async () => {
   const given = [...new URLSearchParams(location.hash.slice(1))];
   Object.assign(values, given.length ? Object.fromEntries(given) : known.start);
   form();
+  const ofMotion = known.groups.filter(group => group.part === "motion").flatMap(group => group.options).filter(one => one.name !== "motion");
+  $("encoder").lastChild.append(...ofMotion.map(field));
+  $("o-motion").value = values.motion ?? "";
   changed();
 })().catch(error => wrong(error));

@@ -11,16 +11,28 @@ from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
 
+import numpy as np
 import pytest
 from starlette.testclient import TestClient
 from support.command import run
+from support.nightly import only
 
 from tachometry.cli.commands import load
 from tachometry.cli.explore.answers import answer
 from tachometry.cli.explore.server import MOST_BYTES, page
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.studies import size
+from tachometry.sim.studies.comparing.compare import core_curve
+from tachometry.sim.studies.comparing.rivals import BASELINES
+from tachometry.sim.studies.plan import plan_at
+from tachometry.spec import METHODS, of_texts
+from tachometry.spec.language.units import short_time
 
 TOKEN, HOST = "token-of-the-test", "127.0.0.1:4711"
 CORE = {"method": "s", "ppr": "24", "clock": "1MHz", "tick": "100us", "max-time": "1ms"}
+WITH_BUS = {**CORE, "name": "spindle", "bus": "axi-lite", "cancel": "no", "ci": "github", "testbench": ""}
 ORIGIN = {"origin": f"http://{HOST}"}
 
 
@@ -62,11 +74,10 @@ def test_the_form_has_every_option_of_the_command(client: TestClient) -> None:
 
 @pytest.mark.parametrize(
     "options",
-    [
-        CORE,
-        {**CORE, "name": "spindle", "bus": "axi-lite", "cancel": "no", "ci": "github", "testbench": ""},
-        {**CORE, "tick": "200us", "loop": "yes", "gains": "inputs"},
-    ],
+    only(
+        [WITH_BUS],
+        [CORE, WITH_BUS, {**CORE, "tick": "200us", "loop": "yes", "gains": "inputs", "testbench": "cocotb"}],
+    ),
 )
 def test_the_archive_has_what_the_command_writes(client: TestClient, options: dict[str, str], tmp_path: Path) -> None:
     """In every byte, by the command that the page shows."""
@@ -80,7 +91,6 @@ def test_the_archive_has_what_the_command_writes(client: TestClient, options: di
     with ZipFile(io.BytesIO(base64.b64decode(found["zip"]))) as archive:
         assert {name: archive.read(name) for name in archive.namelist()} == written
     assert found["name"] == f"{options.get('name', 'tachometer')}.zip"
-    assert asked(client, "files", options=options) == found
 
 
 @pytest.mark.parametrize(
@@ -175,3 +185,59 @@ def test_what_is_no_question(client: TestClient, body: bytes, kind: str, status:
     reply = client.post(f"/{TOKEN}/ask/check", content=body, headers=ORIGIN | {"content-type": kind})
     assert reply.status_code == status
     assert len(reply.content) < 400
+
+
+def test_curves_are_those_of_plan(client: TestClient) -> None:
+    """The core is in front; a bus, a name and a loop do not change them."""
+    found = asked(client, "curves", options={**CORE, "max-speed": "500rad/s", "bus": "uart", "baud": "100000"})
+    spec = of_texts("s", {**{name: text for name, text in CORE.items() if name != "method"}, "max-speed": "500rad/s"})
+    assert found["curves"][0]["own"]
+    assert {one["name"] for one in found["curves"]} | found["left_out"].keys() == METHODS.keys()
+    plan = plan_at(spec, np.array(found["x"]) * (1 + 1e-5))
+    floor = plan.resolution + plan.disc
+    error = np.array(found["curves"][0]["error"], dtype=float)
+    assert found["unit"] == "rad/s"
+    assert (error >= 0.99 * floor).all()
+    assert error.max() <= 1.01 * floor.max() + spec.scale.rad_per_s_per_lsb
+    rest = spec.times.standstill_ticks * spec.timing.tick_seconds
+    assert found["curves"][0]["cells"] == [f"{error.max():.4g}", "503us", short_time(rest), "252"]
+
+
+def test_a_motion_is_answered_by_golden_models(client: TestClient) -> None:
+    found = asked(client, "respond", options=CORE, motion={"motion": "constant:100rad/s:100ms", "jitter": "5%"})
+    own = found["curves"][0]
+    assert (own["name"], own["own"], found["true"][-1]) == ("s", True, 100)
+    assert {one["name"] for one in found["curves"] if one["rival"]} == BASELINES.keys()
+    spec = of_texts("s", {name: text for name, text in CORE.items() if name != "method"})
+    recording = VirtualEncoder(24, jitter=0.05).record(parse_motion("constant:100rad/s:100ms")).recording
+    curve = core_curve("s", spec, PinTrace.of(recording, spec))
+    assert own["velocity"] == pytest.approx(curve.estimate.at(np.array(found["x"]) + 1e-7), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("motion", "field"),
+    [
+        ({"motion": ""}, "motion"),
+        ({"motion": "csv:/etc/passwd"}, "motion"),
+        ({"motion": "counts:/etc/passwd:a:b"}, "motion"),
+        ({"motion": "constant:1e9rad/s:1s"}, "motion"),
+        ({"motion": "stop:1e6s"}, "motion"),
+        ({"motion": "stop:10ms", "jitter": "2"}, "jitter"),
+        ({"motion": "stop:10ms", "output": "x"}, "output"),
+    ],
+)
+def test_motions_that_are_wrong(client: TestClient, motion: dict[str, str], field: str) -> None:
+    found = asked(client, "respond", options=CORE, motion=motion)
+    assert found["field"] == field
+    assert "root" not in found["error"]
+
+
+def test_motions_that_suit_a_core_are_answered(client: TestClient) -> None:
+    for motion in asked(client, "check", options=CORE)["motions"].values():
+        assert "error" not in asked(client, "respond", options=CORE, motion={"motion": motion})
+
+
+def test_size_says_what_it_needs(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(size, "PACKAGES", ("no-such-package",))
+    found = asked(client, "size", options=CORE)
+    assert found["error"].startswith("the size cannot be measured: no-such-package is not installed: pip install")
