@@ -104,9 +104,9 @@ class AxesTrackDatapath(wiring.Component):
     def _of(self, valid: list[Signal], name: str) -> Value:
         """Return what that machine shows whose turn it is; two never do at once."""
         values = [Value.cast(getattr(turns, name)) for turns in self.machines]
-        if len(values) == 1:
-            return values[0]
-        return reduce(or_, (value & is_it.replicate(len(value)) for value, is_it in zip(values, valid, strict=True)))
+        if len(values) > 1 and self.velocity_output is not None:  # else the others show 0
+            values = [value & is_it.replicate(len(value)) for value, is_it in zip(values, valid, strict=True)]
+        return reduce(or_, values)
 
     def _length(self, m: Module) -> Signal:
         """Return the rounds of the tick whose counts have been handed over."""

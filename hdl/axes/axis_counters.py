@@ -1,5 +1,7 @@
 """m_e of every axis."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 from amaranth import Cat, Const, Module, Mux, ShapeLike, Signal, Value, signed
@@ -49,8 +51,11 @@ class AxisCounters(wiring.Component):
     def __init__(self, *, slots: int, rounds: int, decoding: int) -> None:
         self._take(slots, decoding, signed(rounds.bit_length() + 1))
 
-    def _take(self, slots: int, decoding: int, count: ShapeLike) -> None:
-        """Have the ports of a core that adds up this."""
+    def _take(
+        self, slots: int, decoding: int, count: ShapeLike, memory: Mapping[str, str | int] = MappingProxyType({})
+    ) -> None:
+        """Have the ports of a core that adds up this, in a memory with these attributes."""
+        self._memory = memory
         self._slots = slots
         self._decoding = decoding
         super().__init__(
@@ -68,7 +73,7 @@ class AxisCounters(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         kept = data.StructLayout({"a": 1, "b": 1, "count": self.count.shape()})
-        m.submodules.memory = memory = Memory(shape=kept, depth=self._slots, init=[])
+        m.submodules.memory = memory = Memory(shape=kept, depth=self._slots, init=[], attrs=self._memory)
         read = memory.read_port()
         write = memory.write_port()
         seen = self.level_a, self.level_b, self.slot, self.first, self.last, self.ready

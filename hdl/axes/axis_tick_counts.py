@@ -1,5 +1,6 @@
 """The counts of a tick of every axis, for the tracking method."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from amaranth import Cat, Const, Module, Mux, Signal, signed
@@ -7,6 +8,9 @@ from amaranth.lib import data
 
 from tachometry.hdl.axes.axis_counters import AxisCounters
 from tachometry.spec.formats.tracking import Tracking
+
+# Of a memory of wide words, none of which is read in the clock in which it is written.
+BLOCK: Mapping[str, str | int] = {"ram_style": "block", "no_rw_check": 1}
 
 
 def counts_layout(form: Tracking) -> data.StructLayout:
@@ -42,7 +46,7 @@ class AxisTickCounts(AxisCounters):
 
     def __init__(self, *, slots: int, form: Tracking, decoding: int) -> None:
         self._form = form
-        self._take(slots, decoding, counts_layout(form))
+        self._take(slots, decoding, counts_layout(form), BLOCK)
 
     def _add(self, m: Module, before: Any, first: Signal, ready: Signal, step: Signal) -> None:
         counts, backward, new = step.any(), step[-1], self.count

@@ -6,11 +6,12 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.saturate import saturate
-from tachometry.hdl.axes.axis_tick_counts import counts_layout
+from tachometry.hdl.axes.axis_tick_counts import BLOCK, counts_layout
 from tachometry.hdl.methods.track_machine import TrackMachine
 from tachometry.hdl.output.update import update_layout
 from tachometry.spec.formats.tracking import PLACE_BITS
 from tachometry.spec.methods.axes import AxesSpec
+from tachometry.spec.methods.axis import output_cycles
 from tachometry.spec.methods.track import FETCH_CLOCKS
 from tachometry.spec.methods.track_axis import TrackAxis
 
@@ -39,7 +40,8 @@ class TrackTurns(wiring.Component):
     length : In
         Rounds of the tick.
     valid : Out(1)
-        The others are new, and hold until the next turn.
+        The others are new. They hold until the next turn; but where nothing is converted, and there are other
+        machines, they are 0 until then.
     axis : Out(range(axes))
     ticks : Out(tick_layout(axis))
     update : Out(update_layout(axis))
@@ -104,16 +106,18 @@ class TrackTurns(wiring.Component):
         m.d.comb += [machine.begin.eq(at["begin"]), machine.length.eq(self.length)]
         if n > 1:
             m.d.comb += machine.axis.eq(turn)
-        self._show(m, counts, after, shows)
+        if plan.machines > 1 and not output_cycles(axis):
+            m.d.sync += [self.axis.eq(0), self.ticks.eq(0), self.update.eq(0)]
         with m.If(shows):
             m.d.sync += [self.axis.eq(whose), self.ticks.pulse_count.eq(pulses), self.ticks.overflow.eq(saturated)]
+        self._show(m, counts, after, shows)
         return m
 
     def _handed(self, m: Module, whose: Signal, reads: Signal) -> tuple[data.View, Signal | None]:
         """Return counts of the axis that has its turn, and its position if an index may reset it."""
         names = ("count", "handed_position") if self._axis.index_reset else ("count",)
         shape = data.StructLayout({name: getattr(self, name).shape() for name in names})
-        m.submodules.handed_over = handed = Memory(shape=shape, depth=self._spec.slots, init=[])
+        m.submodules.handed_over = handed = Memory(shape=shape, depth=self._spec.slots, init=[], attrs=BLOCK)
         read = handed.read_port()
         write = handed.write_port()
         taken = Signal(shape)
@@ -146,7 +150,7 @@ class TrackTurns(wiring.Component):
                 "silent": range(most + 2),
             }
         )
-        m.submodules.state = state = Memory(shape=kept, depth=max(len(self._own), 2), init=[])
+        m.submodules.state = state = Memory(shape=kept, depth=max(len(self._own), 2), init=[], attrs=BLOCK)
         read = state.read_port()
         write = state.write_port()
         before = Signal(kept)

@@ -137,7 +137,7 @@ class TrackMachine(wiring.Component):
         )
         m.submodules.words = words = Memory(
             shape=signed(WIDTH),
-            depth=len(self._axes) << ADDRESS_BITS,
+            depth=1 << ((len(self._axes) - 1).bit_length() + ADDRESS_BITS),
             init=self._contents(),
             attrs={"no_rw_check": 1},  # the program reads no word in the clock in which it is written
         )

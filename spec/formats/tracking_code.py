@@ -244,10 +244,13 @@ def _same(stored: str, read: str) -> bool:
 
 @cache
 def _longest(times: Times, output: str = "") -> int:
-    """Return the clocks of the longest way to an output or, without one, to the last instruction.
+    """Return the clocks of the longest way to an output or, without one, to the last instruction."""
+    return max(_longest_of(counts, times, output) for counts in range(3))
 
-    Nothing of how ways exclude each other is known.
-    """
+
+def _longest_of(counts: int, times: Times, output: str) -> int:
+    """Return them for no count, one, or several; nothing else of how ways exclude each other is known."""
+    known = {Jump.ALWAYS: True, Jump.END: True, Jump.EMPTY: counts == 0, Jump.SEVERAL: counts > 1}
     code, labels = assembled().instructions, assembled().labels
     entry: dict[int, tuple[int, int]] = {labels["tick"]: (0, 0)}  # clock, and when the unit has finished
     longest, open_ = 0, {labels["tick"]}
@@ -264,8 +267,8 @@ def _longest(times: Times, output: str = "") -> int:
         if one.output == output if output else one.jump == Jump.END:
             longest = max(longest, clock)
             continue
-        following = [(place + 1, clock)] if one.jump not in (Jump.ALWAYS, Jump.END) else []
-        if one.target:
+        following = [] if known.get(one.jump) else [(place + 1, clock)]
+        if one.target and known.get(one.jump, True):
             following.append((labels[one.target], clock + TAKEN))
         for after, at in following:
             before = entry.get(after, (-1, -1))
