@@ -47,6 +47,21 @@ SPEED = {
 }
 _HEADER = ["port", "when", "kind", "meaning"]
 _LOOP = LoopSpec(tachometer=of_texts("s", {"ppr": "500", "max-speed": "1000rad/s"}))
+_INTERRUPT = """
+## An interrupt
+
+With `--irq` a core on a bus has the output `irq`, active high, and these registers behind all others. The table is of
+`--index --irq`; an event has the same bit in each of the three.
+
+- An event waits in INTERRUPTS until 1 is written to its bit of INTERRUPT_CLEAR. One that comes in the clock of the
+  write waits on, so none is lost.
+- `irq` is high while an event waits whose bit of INTERRUPT_ENABLE is set; after a reset none is. Events wait also while
+  they are not enabled: clear them first.
+- `overflow` is a speed beyond `--max-speed`. Of many axes, an event is that of any of them, and STATUS says which.
+
+In C `NAME_enable_interrupts` and `NAME_take_interrupts` of the driver do this.
+
+"""
 _OF_LOOPS = """
 ## Of a control loop
 
@@ -232,6 +247,7 @@ def ports() -> str:
             "options: the manifest NAME.json has those of your core. Those of many axes are in "
             "[axes](../concepts/axes.md#ports).\n",
             markdown(_HEADER, rows, left=range(4)),
+            "\nWith `--bus` and `--irq` there is also the output `irq`, see [registers](registers.md#an-interrupt).\n",
             "\nThe manifest states the latencies: a level sampled at clock c is counted in the window of c + "
             "`pin_to_count`, `tick` is high `tick_latency` clocks after the window's last clock, and `velocity_valid` "
             "`tick_to_velocity` clocks after `tick`.\n",
@@ -307,12 +323,16 @@ def registers() -> str:
     added = [one for one in commanded if one.name not in known]
     known |= {one.name for one in added if not one.name.startswith(("COMMAND", "LOOP"))}
     instead = [one for one in generating if one.name not in known]
-    of_all, of_loop, of_generator = (
+    with_irq = RegisterMap(of_texts("s", SPEED | {"index": "yes"}), irq=True)
+    interrupting = [one for one in with_irq if one.name.startswith("INTERRUPT")]
+    of_all, of_irq, of_loop, of_generator = (
         re.sub("^## ", "### ", tables(each), flags=re.MULTILINE)
-        for each in (RegisterMap(of_texts("s", SPEED)), added, instead)
+        for each in (RegisterMap(of_texts("s", SPEED)), interrupting, added, instead)
     )
     end = "\nWith `--command generator` there are these instead of the commands, and the others behind them.\n\n"
-    return _REGISTERS.replace("@BUSES@", buses) + of_all + _OF_LOOPS + of_loop + end + of_generator
+    return (
+        _REGISTERS.replace("@BUSES@", buses) + of_all + _INTERRUPT + of_irq + _OF_LOOPS + of_loop + end + of_generator
+    )
 
 
 def _cores(method: str) -> list[TachometerSpec]:

@@ -226,6 +226,7 @@ def generate(
     bus: str | None = None,
     baud: int | None = None,
     target: str = "none",
+    irq: bool = False,
 ) -> list[Path]:
     """Write a core as Verilog, with its manifest and all that it takes to build it in, as `tachometry generate` does.
 
@@ -236,7 +237,7 @@ def generate(
         It is made if it does not exist, and files in it are overwritten.
     name : str
         Of the module and of the files.
-    bus, baud, target
+    bus, baud, target, irq
         See `tachometry.hdl.export.export`.
 
     Returns
@@ -250,7 +251,7 @@ def generate(
     OSError
         If the files cannot be written.
     """
-    texts = export(spec, name, bus, baud, target)
+    texts = export(spec, name, bus, baud, target, irq)
     places = {file: Path(folder) / file for file in texts}
     with Outputs(places) as outputs:  # all of them, or none
         for file, text in texts.items():

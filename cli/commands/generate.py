@@ -29,7 +29,7 @@ from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.testbench.vectors import cocotb_bench
 from tachometry.spec import AxesSpec
 from tachometry.spec.control import AnySpec, LoopSpec
-from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD
+from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD, Bus, bus_of
 from tachometry.spec.registers.manifest import check_module_name
 
 
@@ -62,7 +62,7 @@ class Asked:
     Parameters
     ----------
     spec : AnySpec
-    name, bus, baud, target
+    name, bus, baud, target, irq
         See `hdl.export.export`.
     testbench, ci : str or None
         What is written beside the core.
@@ -83,6 +83,7 @@ class Asked:
     bus: str
     baud: int | None
     target: str
+    irq: bool
     ci: str | None
     record: Callable[..., Encoding] | None
     tables: list[Path]
@@ -95,21 +96,26 @@ class Asked:
             raise ValueError("--testbench must not be given together with --loop and --bus: it drives no bus")
 
     @property
+    def on(self) -> Bus | None:
+        """The bus, with its bits a second and its interrupt."""
+        return bus_of(self.bus, self.baud, irq=self.irq)
+
+    @property
     def manifest(self) -> dict[str, Any]:
         """The content of NAME.json; ValueError if there cannot be such a core."""
-        return manifest_of(self.spec, self.name, self.bus, self.baud, self.target)
+        return manifest_of(self.spec, self.name, self.bus, self.baud, self.target, self.irq)
 
     def texts(self) -> dict[str, str]:
         """Return all files by their names."""
         bench = {} if self.testbench is None else _bench(self.spec, self.name, self.record)
-        texts = export(self.spec, self.name, self.bus, self.baud, self.target)
+        texts = export(self.spec, self.name, self.bus, self.baud, self.target, self.irq)
         jobs = {file: text for file, text in ci_files(self.name).items() if file == f"{self.name}_{self.ci}.yml"}
         return texts | bench | jobs
 
     @property
     def rows(self) -> list[tuple[str, str]]:
         """The names and values that are printed of the core."""
-        return _rows(self.spec, self.bus)
+        return _rows(self.spec, self.on)
 
 
 def _read(*, bus: str | None, target: str, **given: Any) -> dict[str, Any]:
@@ -146,6 +152,13 @@ ASKED = Group(
             metavar="BITS",
             help="Bits a second of --bus uart, which the clock must make within 2 %, with at least 8 clocks a bit; "
             f"{DEFAULT_BAUD}, if it is not given.",
+        ),
+        option(
+            "Files",
+            "--irq",
+            is_flag=True,
+            help="With a --bus: an interrupt, the output irq, with registers that enable and clear its events: index, "
+            "overflow (faster than --max-speed), stall, error.",
         ),
         option(
             "Files",
@@ -223,12 +236,12 @@ def _bench(spec: AnySpec, name: str, record: Callable[..., Encoding] | None) -> 
 
 
 @singledispatch
-def _rows(spec: AnySpec, bus: str) -> list[tuple[str, str]]:
+def _rows(spec: AnySpec, bus: Bus | None) -> list[tuple[str, str]]:
     return core_rows(spec.tachometer, bus)
 
 
 @_rows.register
-def _(spec: AxesSpec, bus: str) -> list[tuple[str, str]]:
+def _(spec: AxesSpec, bus: Bus | None) -> list[tuple[str, str]]:
     return axes_rows(spec)
 
 

@@ -125,7 +125,7 @@ def check(options: Texts) -> Answer:
     """Return what a core is: the command that writes it, its ports, and rows of names and values."""
 
     def of(asked: Asked) -> Answer:
-        ports = ports_on(asked.spec, bus_of(asked.bus, asked.baud))
+        ports = ports_on(asked.spec, asked.on)
         return {
             "module": asked.manifest["module"],  # which also says what cannot be
             "method": asked.spec.tachometer.method,

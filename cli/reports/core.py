@@ -8,14 +8,14 @@ from tachometry.spec import TachometerSpec
 from tachometry.spec.control import AnySpec
 from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.language.units import SpeedUnit, plural, short_time
-from tachometry.spec.registers.loop import registers_of
+from tachometry.spec.registers.buses import Bus, registers_on
 from tachometry.spec.registers.manifest import manifest
 from tachometry.spec.registers.map import WORD
 
 
-def core_rows(spec: TachometerSpec, bus: str = "none") -> list[tuple[str, str]]:
+def core_rows(spec: TachometerSpec, bus: Bus | None = None) -> list[tuple[str, str]]:
     """Return the configuration of a core, what it measures, and its registers on a bus."""
-    registers = [] if bus == "none" else [registers_row(spec, bus)]
+    registers = [] if bus is None else [registers_row(spec, bus)]
     plans = Plans.of(spec)
     return [*configuration(spec), *measured(spec, plans), *advice(plans), *registers]
 
@@ -129,11 +129,11 @@ def typed_unit(spec: TachometerSpec) -> SpeedUnit:
     return spec.scale.shown_unit
 
 
-def registers_row(spec: AnySpec, bus: str) -> tuple[str, str]:
+def registers_row(spec: AnySpec, bus: Bus) -> tuple[str, str]:
     """Tell how many registers a core has on a bus."""
-    registers = registers_of(spec)
+    registers = registers_on(spec, bus)
     number = len(registers.registers)
-    return "registers", f"{number} of {WORD} bits on {bus}, configuration 0x{registers.configuration:08x}"
+    return "registers", f"{number} of {WORD} bits on {bus.name}, configuration 0x{registers.configuration:08x}"
 
 
 def memory_text(kind: str, entries: int, width: int) -> str:

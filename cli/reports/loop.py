@@ -4,9 +4,10 @@ from tachometry.cli.reports.core import configuration, measured, registers_row
 from tachometry.sim.studies.plan import Plans
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.language.units import plural, short_time
+from tachometry.spec.registers.buses import Bus
 
 
-def loop_rows(spec: LoopSpec, bus: str = "none") -> list[tuple[str, str]]:
+def loop_rows(spec: LoopSpec, bus: Bus | None = None) -> list[tuple[str, str]]:
     """Return the configuration of tachometer and loop, and the registers on a bus."""
     form, period, late = spec.form, spec.units.seconds, spec.tick_to_result
     filtered = "none" if spec.filter is None else f"{float(spec.filter):.6g} rad/s"
@@ -34,6 +35,6 @@ def loop_rows(spec: LoopSpec, bus: str = "none") -> list[tuple[str, str]]:
         ),
         ("widths of the loop", widths),
     ]
-    registers = [] if bus == "none" else [registers_row(spec, bus)]
+    registers = [] if bus is None else [registers_row(spec, bus)]
     alone = spec.tachometer
     return [*configuration(alone), *measured(alone, Plans.of(alone)), *rows, *registers]

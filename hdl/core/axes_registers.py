@@ -5,6 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 
 from tachometry.hdl.bus.bank import RegisterBank
+from tachometry.hdl.bus.interrupts import Interrupts, connect
 from tachometry.hdl.bus.native import native_port
 from tachometry.hdl.core.axes_tachometer import AxesTachometer
 from tachometry.hdl.wires.ports import follow, members
@@ -58,4 +59,12 @@ class AxesRegisterCore(wiring.Component):
                 for event, (strobe, number) in whose.items()
             ]
         m.d.comb += [bank.capture.eq(self.capture), bank.overflow.eq(Cat(overflows).any())]
+        if self._map.irq:
+            box = Interrupts(self._map, spec.axes)
+            connect(m, box, bank, core)
+            m.d.comb += [
+                box.ticks.eq(Cat(core.tick & (core.axis == axis) for axis in range(spec.axes))),
+                box.stalled.eq(Cat(getattr(core, f"stalled_{axis}") for axis in range(spec.axes))),
+                self.irq.eq(box.irq),
+            ]
         return m

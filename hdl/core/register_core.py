@@ -5,6 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 
 from tachometry.hdl.bus.bank import RegisterBank
+from tachometry.hdl.bus.interrupts import Interrupts, connect
 from tachometry.hdl.bus.native import native_port
 from tachometry.hdl.bus.tick_position import TickPosition
 from tachometry.hdl.core.loop_core import LoopCore
@@ -74,6 +75,10 @@ class RegisterCore(wiring.Component):
         ]
         if self.loop is not None:
             self._keep(m, self.loop)
+        if self._map.irq:
+            box = Interrupts(self._map)
+            connect(m, box, bank, whole)
+            m.d.comb += [box.ticks.eq(whole.tick), box.stalled.eq(whole.stalled), self.irq.eq(box.irq)]
         if open_sum is not None:
             m.d.comb += [position.next.eq(core.position_counter.next), position.open_sum.eq(open_sum)]
         return m

@@ -13,8 +13,7 @@ from tachometry.hdl.export.targets.target import bus_for, check_core, target_fil
 from tachometry.hdl.export.verilog import verilog_of
 from tachometry.spec.control import AnySpec
 from tachometry.spec.language.provenance import entries
-from tachometry.spec.registers.buses import bus_of, manifest_on
-from tachometry.spec.registers.loop import registers_of
+from tachometry.spec.registers.buses import bus_of, manifest_on, registers_on
 from tachometry.spec.registers.manifest import manifest
 
 # The files of every core, and what --help says of them.
@@ -31,6 +30,7 @@ def export(
     bus: str | None = None,
     baud: int | None = None,
     target: str = "none",
+    irq: bool = False,
 ) -> dict[str, str]:
     """Return all files of a core as texts by file name: those of `CORE_FILES`, of `REGISTER_FILES`, and of the target.
 
@@ -50,21 +50,24 @@ def export(
         Bits a second of a bus that has them; None: its default.
     target : str
         The framework into which it goes, one of `hdl.export.targets.target.TARGETS`, or `none`.
+    irq : bool
+        The registers have an interrupt, and the core an output for it.
 
     Raises
     ------
     ValueError
         If `name` cannot be the name of a Verilog module; if there is no such bus, or the clock cannot make its bits; if
-        the target needs another bus or another core; if the bus cannot reach all registers.
+        the target needs another bus or another core; if the bus cannot reach all registers; if there is none
+        for an interrupt.
     """
-    on = bus_of(bus_for(target, bus), baud)
-    described = manifest_of(spec, name, bus, baud, target)
+    on = bus_of(bus_for(target, bus), baud, irq=irq)
+    described = manifest_of(spec, name, bus, baud, target, irq)
     files: dict[str, str] = {}
     top: wiring.Component
     if on is None:
         top = core_of(spec)
     else:
-        registers = registers_of(spec)
+        registers = registers_on(spec, on)
         top = BusTachometer(registers, on)
         files = register_files(registers, name)
     core = {f"{name}.v": verilog_of(top, described), f"{name}.json": json.dumps(described, indent=2) + "\n"}
@@ -72,8 +75,10 @@ def export(
     return core | target_files(target, spec, name, on, core)
 
 
-def manifest_of(spec: AnySpec, name: str, bus: str | None, baud: int | None, target: str) -> dict[str, Any]:
+def manifest_of(
+    spec: AnySpec, name: str, bus: str | None, baud: int | None, target: str, irq: bool = False
+) -> dict[str, Any]:
     """Return what the manifest of a core says; arguments and errors are those of `export`."""
-    on = bus_of(bus_for(target, bus), baud)
+    on = bus_of(bus_for(target, bus), baud, irq=irq)
     check_core(target, spec)
-    return entries() | (manifest(spec, name) if on is None else manifest_on(registers_of(spec), on, name))
+    return entries() | (manifest(spec, name) if on is None else manifest_on(registers_on(spec, on), on, name))

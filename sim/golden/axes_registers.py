@@ -3,7 +3,7 @@
 import numpy as np
 
 from tachometry.sim import golden
-from tachometry.sim.golden.registers import GoldenBank
+from tachometry.sim.golden.registers import GoldenBank, rises
 from tachometry.sim.signals.axes import AxesTrace
 from tachometry.spec.language.port import INDEX, TICK, UPDATE
 from tachometry.spec.registers.axes import AxesMap
@@ -39,6 +39,11 @@ class GoldenAxesBank(GoldenBank):
         for axis in range(registers.axes.axes):
             overflow |= (ticks["axis"] == axis) & (ticks[f"overflow_{axis}"] != 0)
         self._follow(overflow)
+        stalls = []
+        for axis in range(registers.axes.axes):
+            own = ticks["axis"] == axis
+            stalls.append(rises(ticks.clock[own], ticks[f"stalled_{axis}"][own]))
+        self._stalls = np.unique(np.concatenate(stalls))
 
     def _of_clock(self, clock: int) -> dict[str, int]:
         return {}

@@ -53,6 +53,12 @@ def written(field: Field, data: int, before: int) -> int:
     return value << field.shift | before & below | above
 
 
+def rises(clock: np.ndarray, level: np.ndarray) -> np.ndarray:
+    """Return the clocks in which a level rises, which is low before the first."""
+    high = level != 0
+    return clock[high & ~np.append(False, high[:-1])]
+
+
 class GoldenBank:
     """Answers for the bank of a core whose pins are driven so; of a demo, from a restart on, with all settings 0.
 
@@ -73,6 +79,7 @@ class GoldenBank:
         self._swallowed = decoded(registers.spec, trace).swallowed
         self._happened = {"updated": self._tables[UPDATE].clock, "indexed": self._tables[INDEX].clock}
         self._follow(self._tables[TICK].overflow)
+        self._stalls = rises(self._tables[TICK].clock, self._tables[TICK].stalled)
 
     def _follow(self, overflow: np.ndarray) -> None:
         """Find the clocks of what is counted; `overflow` is a column of the ticks."""
@@ -97,6 +104,7 @@ class GoldenBank:
         self._cleared, hold = -1, 0
         self._settings = initial(self._map)
         self._changed = 0
+        self._irq = {event: [0] for event in self._map.interrupts}  # since which clocks events count
         left = sorted(captures)
         found: list[tuple[int | None, bool]] = []
         for access in accesses:
@@ -116,10 +124,40 @@ class GoldenBank:
             found.append((0 if register is None else self._read(access, hold), register is None))
         return found
 
+    def interrupts(self) -> dict[str, np.ndarray]:
+        """Return clocks of the events that raise the interrupt."""
+        errors = [self._tables[strobe].clock for strobe in ("decode_error", "tick_error") if strobe in self._tables]
+        found = {
+            "index": self._tables[INDEX].clock if INDEX in self._tables else np.array([], dtype=np.int64),
+            "overflow": self._events["overflows"],
+            "stall": self._stalls,
+            "error": np.unique(np.concatenate(errors)),
+        }
+        return {event: found[event] for event in self._map.interrupts}
+
+    def irq(self, accesses: Iterable[Access], n_clocks: int) -> list[bool]:
+        """Return the level of the interrupt in each clock."""
+        written = {access.clock: (access.address, access.data) for access in accesses if access.data is not None}
+        enabling, clearing = (self._map.registers.index(self._map[f"INTERRUPT_{name}"]) for name in ("ENABLE", "CLEAR"))
+        comes = dict.fromkeys(range(n_clocks), 0)
+        for place, clocks in enumerate(self.interrupts().values()):
+            for clock in clocks.tolist():
+                comes[clock] = comes.get(clock, 0) | 1 << place
+        levels, waits, enabled, level = [], 0, 0, False
+        for clock in range(n_clocks):
+            levels.append(level)
+            level = waits & enabled != 0
+            address, data = written.get(clock, (None, 0))
+            waits = comes[clock] | (waits & ~data if address == clearing else waits)
+            enabled = data if address == enabling else enabled
+        return levels
+
     def _set(self, register: Register, data: int, clock: int) -> None:
         """Write settings; those that act once stay 0."""
         self._changed = clock
         for field in register.fields:
+            if register.name == "INTERRUPT_CLEAR" and data >> field.low & 1:
+                self._irq[field.name].append(clock)
             if not field.single:
                 self._settings[field.port] = written(field, data, self._settings[field.port])
 
@@ -177,6 +215,12 @@ class GoldenBank:
             shown |= {name: self._count(clocks, self._cleared, access.clock) for name, clocks in self._events.items()}
             shown["lost_updates"] = self._lost(access.clock)
             shown = {name: min(value, (1 << COUNTER_WIDTH) - 1) for name, value in shown.items()}
+        if register.name == "INTERRUPTS":
+            happened = self.interrupts()
+            shown |= {
+                f"irq_pending_{event}": int(self._count(happened[event], clears[-1] - 1, access.clock) > 0)
+                for event, clears in self._irq.items()
+            }
         word = 0
         for field in register.fields:
             value = field.reset if register.constant else shown.get(field.port or field.name, 0)

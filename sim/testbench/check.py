@@ -62,14 +62,15 @@ class Make:
     Parameters
     ----------
     export : callable
-        Those of a core, its name, its bus and the bus's bits a second, and a framework, or "none".
+        Those of a core, its name, its bus and the bus's bits a second, a framework or "none", and whether there is an
+        interrupt.
     targets : callable
         Frameworks that a core on a bus of this name can go into.
     jobs : callable
         Those of continuous integration, for the name of a core.
     """
 
-    export: Callable[[AnySpec, str, str, int | None, str], Mapping[str, str]]
+    export: Callable[[AnySpec, str, str, int | None, str, bool], Mapping[str, str]]
     targets: Callable[[AnySpec, str], Sequence[str]]
     jobs: Callable[[str], Mapping[str, str]]
 
@@ -173,10 +174,10 @@ def check(
 
 def _expected(spec: AnySpec, name: str, written: Mapping[str, Any], folder: Path, make: Make) -> dict[str, str]:
     """Return all files; those of a framework, a bench or a job only if they are there."""
-    bus, baud = written.get("bus", "none"), written.get("baud")
-    files = dict(make.export(spec, name, bus, baud, "none"))
+    bus, baud, irq = written.get("bus", "none"), written.get("baud"), bool(written.get("irq"))
+    files = dict(make.export(spec, name, bus, baud, "none", irq))
     for target in make.targets(spec, bus):
-        more = make.export(spec, name, bus, baud, target)
+        more = make.export(spec, name, bus, baud, target, irq)
         if any((folder / file).exists() for file in more.keys() - files.keys()):
             files |= more
     files |= {file: text for file, text in make.jobs(name).items() if (folder / file).exists()}

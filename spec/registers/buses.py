@@ -34,6 +34,8 @@ class Bus:
         Bits a second on a line without a clock; 0 if the bus has none.
     address_bits : int
         Bits of the address of a word in its frames; 0 if it has no frames.
+    irq : bool
+        The registers have an interrupt.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Bus:
     asynchronous: tuple[str, ...] = ()
     baud: int = 0
     address_bits: int = 0
+    irq: bool = False
 
     def bit_cycles(self, clock_hz: int) -> int:
         """Return clocks of a bit on a line without a clock.
@@ -200,17 +203,22 @@ BUSES = {
 }
 
 
-def bus_of(name: str, baud: int | None = None) -> Bus | None:
-    """Return the bus of a name, with these bits a second if they are given; None for `none`.
+def bus_of(name: str, baud: int | None = None, *, irq: bool = False) -> Bus | None:
+    """Return the bus of a name, with these bits a second if they are given, and an interrupt; None for `none`.
 
     Raises
     ------
     ParameterError
-        If there is none of this name, or it has no bits a second of its own; if they are none.
+        If there is none of this name, or it has no bits a second of its own; if they are none; if there is an
+        interrupt without a bus.
     """
     if name != "none" and name not in BUSES:
         raise ParameterError("bus", f"must be one of none, {', '.join(BUSES)}, not {name!r}")
     bus = BUSES.get(name)
+    if irq:
+        if bus is None:
+            raise ParameterError("irq", "must be given together with a bus, which clears its events")
+        bus = replace(bus, irq=True)
     if baud is None:
         return bus
     if bus is None or not bus.baud:
@@ -225,8 +233,19 @@ def ports_on(spec: AnySpec, bus: Bus | None) -> tuple[Port, ...]:
     """Return all ports of a core, with those of the bus on which its registers are."""
     if bus is None:
         return spec.ports
-    registers = registers_of(spec)
+    registers = registers_on(spec, bus)
     return (*registers.core_ports, *bus.ports(registers))
+
+
+def registers_on(spec: AnySpec, bus: Bus) -> RegisterMap:
+    """Return all registers of a core on a bus.
+
+    Raises
+    ------
+    ParameterError
+        If it can have none.
+    """
+    return replace(registers_of(spec), irq=bus.irq)
 
 
 def manifest_on(registers: RegisterMap, bus: Bus, name: str = "tachometer") -> dict[str, Any]:
@@ -242,7 +261,7 @@ def manifest_on(registers: RegisterMap, bus: Bus, name: str = "tachometer") -> d
         raise ParameterError("name", f"must not be that of a port, which {name!r} is")
     described = manifest(registers.core, name)
     described["ports"] = [described_port(port) for port in (*registers.core_ports, *ports)]
-    described |= {"bus": bus.name, "registers": registers.described()}
+    described |= {"bus": bus.name, **({"irq": True} if registers.irq else {}), "registers": registers.described()}
     if bus.baud:
         described |= {"baud": bus.baud, "bit_cycles": bus.bit_cycles(registers.spec.timing.clock_hz)}
     return described

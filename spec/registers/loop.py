@@ -50,7 +50,7 @@ class LoopMap(RegisterMap):
     def core_ports(self) -> tuple[Port, ...]:
         """Ports of the core: `enable` stays, as no program is to be needed to switch a drive off."""
         written = {field.port for field in self.settings}
-        return tuple(port for port in self.loop.ports if port.name not in written)
+        return (*(port for port in self.loop.ports if port.name not in written), *self.irq_ports)
 
     @cached_property
     def ports(self) -> tuple[Port, ...]:

@@ -15,7 +15,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -27,6 +27,9 @@ from tachometry.spec.registers.manifest import manifest
 WORD = 32  # bits
 IDENTIFICATION = int.from_bytes(b"TACH", "big")
 COUNTER_WIDTH = 8  # bits of each counter of COUNTERS
+
+# What a core has with an interrupt, besides the registers.
+IRQ = Port("irq", "output", help="Interrupt, high while an event waits that INTERRUPT_ENABLE lets through.")
 
 _LIVE = (TICK, UPDATE, INDEX)  # what is captured is new with these strobes
 _DESCRIBED = ("name", "low", "width", "access", "reset", "signed", "unit", "port", "shift")  # in the manifest
@@ -144,14 +147,17 @@ class RegisterMap:
     Parameters
     ----------
     spec : TachometerSpec
+    irq : bool
+        There is an output `irq`, with registers of its own, which follow all others.
     """
 
     spec: TachometerSpec
+    irq: bool = field(default=False, kw_only=True)
 
     @cached_property
     def registers(self) -> tuple[Register, ...]:
         """In the order of their offsets, which follow each other without a gap."""
-        drafts = (*self._head(), *self._captured(), *self._added())
+        drafts = (*self._head(), *self._captured(), *self._added(), *self._interrupting())
         return tuple(
             Register(name, number * WORD // 8, help, fields, **more)
             for number, (name, help, fields, more) in enumerate(drafts)
@@ -179,7 +185,23 @@ class RegisterMap:
     @property
     def core_ports(self) -> tuple[Port, ...]:
         """Ports that the core has beside those of the bus."""
-        return self.core.ports
+        return (*self.core.ports, *self.irq_ports)
+
+    @property
+    def irq_ports(self) -> tuple[Port, ...]:
+        """The port of the interrupt, if there is one."""
+        return (IRQ,) if self.irq else ()
+
+    @cached_property
+    def interrupts(self) -> dict[str, str]:
+        """Events that raise the interrupt, each with its meaning; none without an interrupt."""
+        if not self.irq:
+            return {}
+        found = {"index": "A rising edge of the index line."} if self.spec.index else {}
+        found["overflow"] = "A tick at more than the maximum speed: its pulse_count was saturated."
+        found["stall"] = "The shaft has come to rest: stalled rises."
+        late = ", or an external tick was missing or came too early" if self.spec.external_tick else ""
+        return found | {"error": f"Both lines changed at once{late}."}
 
     @property
     def quantities(self) -> tuple[tuple[str, float, str], ...]:
@@ -235,7 +257,8 @@ class RegisterMap:
     def configuration(self) -> int:
         """A hash of all that a driver relies on: a driver that was made for one core refuses another."""
         core = {name: entry for name, entry in manifest(self.core).items() if name != "options"}
-        described = [core, [(name, help) for name, help, *_ in self._captured()]]
+        described: list[Any] = [core, [(name, help) for name, help, *_ in self._captured()]]
+        described += [[*self.interrupts]] if self.irq else []
         return int.from_bytes(hashlib.sha256(json.dumps(described, sort_keys=True).encode()).digest()[:4], "big")
 
     def described(self) -> dict[str, Any]:
@@ -325,6 +348,24 @@ class RegisterMap:
     def _added(self) -> Iterable[Draft]:
         """Return what a design around the core adds."""
         return ()
+
+    def _interrupting(self) -> Iterable[Draft]:
+        """Return registers of the interrupt: an event has the same bit in each of them."""
+        kinds: tuple[tuple[str, str, str, dict[str, Any]], ...] = (
+            ("INTERRUPTS", "Events that wait. One that comes while it is cleared waits on.", "pending", {}),
+            ("INTERRUPT_ENABLE", "Events that raise irq.", "enable", {"writable": True}),
+            ("INTERRUPT_CLEAR", "Writing 1 clears an event.", "clear", {"writable": True, "single": True}),
+        )
+        for register, help, kind, more in kinds if self.irq else ():
+            yield (
+                register,
+                help,
+                tuple(
+                    Field(event, 1, place, meaning, port=f"irq_{kind}_{event}", **more)
+                    for place, (event, meaning) in enumerate(self.interrupts.items())
+                ),
+                {},
+            )
 
     def _flags(self, ports: Iterable[Port], suffix: str) -> Iterable[Field]:
         events = {f"updated{suffix}": "There was an update of the velocity since the capture before."}

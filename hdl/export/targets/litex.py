@@ -4,11 +4,10 @@ from collections.abc import Mapping
 
 from tachometry.hdl.export.render import render_files
 from tachometry.spec.control import AnySpec
-from tachometry.spec.registers.buses import Bus
-from tachometry.spec.registers.loop import registers_of
+from tachometry.spec.registers.buses import Bus, registers_on
 
 
-def litex(spec: AnySpec, name: str, bus: Bus | None, made: Mapping[str, str]) -> dict[str, str]:
+def litex(spec: AnySpec, name: str, bus: Bus, made: Mapping[str, str]) -> dict[str, str]:
     """Return the text of `NAME_litex.py` by its name.
 
     Parameters
@@ -21,4 +20,4 @@ def litex(spec: AnySpec, name: str, bus: Bus | None, made: Mapping[str, str]) ->
     made : mapping of str to str
         The core, which the module reads from the file beside it.
     """
-    return render_files(["NAME_litex.py"], name, spec=spec.tachometer, registers=registers_of(spec))
+    return render_files(["NAME_litex.py"], name, spec=spec.tachometer, registers=registers_on(spec, bus))

@@ -30,7 +30,7 @@ class Target:
 
     help: str
     buses: tuple[str, ...]
-    files: Callable[[Any, str, Bus | None, Mapping[str, str]], dict[str, str]]
+    files: Callable[[Any, str, Any, Mapping[str, str]], dict[str, str]]
     axes: bool = True
     loops: bool = False
 

@@ -7,8 +7,7 @@ from typing import Any
 from tachometry.hdl.export.registers.values import is_whole, sentences
 from tachometry.hdl.export.render import render_files
 from tachometry.spec.control import AnySpec
-from tachometry.spec.registers.buses import Bus, ports_on
-from tachometry.spec.registers.loop import registers_of
+from tachometry.spec.registers.buses import Bus, ports_on, registers_on
 
 _FILES = ("NAME_ip/component.xml", "NAME_ip/NAME_ip.v")
 _VIEWS = {"xilinx_anylanguagesynthesis": "synthesis", "xilinx_anylanguagebehavioralsimulation": "simulation"}
@@ -66,10 +65,10 @@ def vivado(spec: AnySpec, name: str, bus: Bus | None, made: Mapping[str, str]) -
     outer = {port.name: port.name for port in ports}
     holes: dict[str, Any] = {"clock": "clk", "reset": "rst", "polarity": "ACTIVE_HIGH", "bus": "", "associated": ""}
     associated: dict[str, str] = {}
-    if there is not None:
+    if bus is not None and there is not None:
         logical = {port.name: port.name for port in ports if port.name.startswith(f"{there.name}_")}
         logical = {port: port.removeprefix(f"{there.name}_").upper() for port in logical}
-        registers = registers_of(spec)
+        registers = registers_on(spec, bus)
         outer |= {"clk": there.clock, "rst": there.reset}
         associated = {"ASSOCIATED_BUSIF": there.name}
         holes = {
@@ -81,13 +80,14 @@ def vivado(spec: AnySpec, name: str, bus: Bus | None, made: Mapping[str, str]) -
             "logical": logical,
             "associated": f"ASSOCIATED_BUSIF {there.name}, ",
             "registers": registers,
+            "irq": registers.irq,
             "range": max(_LEAST_RANGE, 1 << registers.address_width),
         }
     clock_hz = spec.timing.clock_hz
     files = render_files(
         _FILES,
         name,
-        **{"logical": {}, **holes},
+        **{"logical": {}, "irq": False, **holes},
         method=spec.tachometer.method,
         ports=ports,
         outer=outer,

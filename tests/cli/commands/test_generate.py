@@ -39,7 +39,7 @@ def test_options_reach_the_core(tmp_path: Path, capsys: pytest.CaptureFixture[st
     [
         ("--bus uart --baud 115200", {"bus": "uart", "baud": 115_200}),
         ("--for rio", {"target": "rio"}),
-        ("--for litex", {"target": "litex"}),
+        ("--for litex --irq", {"target": "litex", "irq": True}),
     ],
 )
 def test_it_writes_and_lists_the_files_of_export(

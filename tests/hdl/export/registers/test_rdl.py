@@ -36,7 +36,8 @@ def case(method: str, seed: int) -> tuple[RegisterMap, PinTrace, list[dict[str, 
     for clock, *levels in zip(trace.clock.tolist(), *(trace.lines[pin.name] for pin in spec.ports.pins), strict=True):
         if clock < n_clocks:
             rows[clock] |= {pin.name: int(level) for pin, level in zip(spec.ports.pins, levels, strict=True)}
-    return RegisterMap(spec), PinTrace(trace.clock, trace.a, trace.b, n_clocks, trace.z, trace.tick_in), rows
+    registers = RegisterMap(spec, irq=True)
+    return registers, PinTrace(trace.clock, trace.a, trace.b, n_clocks, trace.z, trace.tick_in), rows
 
 
 def plan(registers: list[RegNode], n_clocks: int) -> list[tuple[int, RegNode, int | None]]:

@@ -38,7 +38,7 @@ SPIRIT = "{http://www.spiritconsortium.org/XMLSchema/SPIRIT/1685-2009}"
 @cache
 def made(core: str) -> dict[str, str]:
     texts, bus = CORES[core]
-    return export(of_options(texts), "spindle", bus, target="vivado")
+    return export(of_options(texts), "spindle", bus, target="vivado", irq=core == "axi")
 
 
 def registers(top: AddrmapNode) -> dict[tuple[str, int, int], dict[str, tuple[object, ...]]]:

@@ -1,0 +1,76 @@
+"""Events wait until they are cleared, and raise an interrupt if they are enabled."""
+
+from functools import reduce
+from operator import or_
+
+from amaranth import Module, Signal, Value
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from tachometry.spec.registers.map import RegisterMap
+
+
+class Interrupts(wiring.Component):
+    """Keeps events for a program; one that comes in the clock in which it is cleared waits on.
+
+    Parameters
+    ----------
+    registers : RegisterMap
+        Those of a core with an interrupt.
+    axes : int
+
+    Members
+    -------
+    ticks, stalled : In(axes)
+        The axis ticks; its shaft rests.
+    index, overflow, error : In(1)
+        The event is in this clock; `index` only where the core has one.
+    irq_enable_… : In(1)
+        An event raises `irq`.
+    irq_clear_… : In(1)
+        An event is being cleared.
+    irq_pending_… : Out(1)
+        An event waits, from the clock after it on.
+    irq : Out(1)
+        An event that is enabled waits, a clock later.
+    """
+
+    def __init__(self, registers: RegisterMap, axes: int = 1) -> None:
+        self._events = [*registers.interrupts]
+        kinds = {"enable": In(1), "clear": In(1), "pending": Out(1)}
+        super().__init__(
+            {
+                **{event: In(1) for event in self._events if event != "stall"},
+                **{f"irq_{kind}_{event}": flow for kind, flow in kinds.items() for event in self._events},
+                "ticks": In(axes),
+                "stalled": In(axes),
+                "irq": Out(1),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        rested = Signal.like(self.stalled)  # at the latest tick of each axis
+        m.d.sync += rested.eq((self.stalled & self.ticks) | (rested & ~self.ticks))
+        stall = (self.stalled & self.ticks & ~rested).any()
+        raised: list[Value] = []
+        for event in self._events:
+            enable, clear, pending = (getattr(self, f"irq_{kind}_{event}") for kind in ("enable", "clear", "pending"))
+            comes = stall if event == "stall" else getattr(self, event)
+            m.d.sync += pending.eq(comes | (pending & ~clear))
+            raised.append(pending & enable)
+        m.d.sync += self.irq.eq(reduce(or_, raised))
+        return m
+
+
+def connect(m: Module, box: Interrupts, bank: wiring.Component, core: wiring.Component) -> None:
+    """Connect what a bank and a core of one axis or many have by the names of the box, and its output."""
+    m.submodules.interrupts = box
+    for name, member in box.signature.members.items():
+        if name.startswith("irq_"):
+            source, target = (box, bank) if member.flow == Out else (bank, box)
+            m.d.comb += getattr(target, name).eq(getattr(source, name))
+    late = [core.tick_error] if hasattr(core, "tick_error") else []
+    m.d.comb += [box.overflow.eq(core.tick & bank.overflow), box.error.eq(reduce(or_, late, core.decode_error))]
+    if hasattr(box, "index"):
+        m.d.comb += box.index.eq(core.index_valid)

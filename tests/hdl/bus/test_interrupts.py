@@ -1,0 +1,189 @@
+"""Interrupts and their registers against their golden model, on motions with every event."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.axes import motions, small
+from support.control import SMALL
+from support.nightly import nightly, only
+from support.simulate import clock_by_clock
+from support.verilog import play
+
+from tachometry.hdl.bus import interrupts
+from tachometry.hdl.core.axes_registers import AxesRegisterCore
+from tachometry.hdl.core.register_core import RegisterCore
+from tachometry.hdl.export import export
+from tachometry.sim.golden.axes_registers import GoldenAxesBank
+from tachometry.sim.golden.loop_registers import GoldenLoopBank
+from tachometry.sim.golden.registers import Access, GoldenBank
+from tachometry.sim.signals.axes import AxesTrace
+from tachometry.sim.signals.recording import PinTrace, quadrature
+from tachometry.spec import AxesSpec, ParameterError, Timing, of_texts
+from tachometry.spec.control import AnySpec, LoopSpec
+from tachometry.spec.registers.axes import AxesMap
+from tachometry.spec.registers.buses import BUSES, bus_of, ports_on, registers_on
+from tachometry.spec.registers.map import RegisterMap
+
+BASE = {"ppr": "25", "clock": "1MHz", "tick": "40clk", "max-time": "160clk", "max-speed": "500rev/s"}
+CORES: dict[str, AnySpec] = {
+    "s": of_texts("s", BASE | {"index": "yes"}),
+    "external ticks": of_texts("m", BASE | {"external-tick": "yes", "max-speed": "200rev/s"}),
+    "rairan": of_texts("rairan", BASE | {"tick": "20clk"}),
+    "axes": small(2, parallel=True, index=True),
+    "loop": replace(SMALL, tachometer=replace(SMALL.tachometer, timing=Timing(1_000_000, 100, 3)), gains="inputs"),
+}
+CLOCKS = 3000
+
+
+def bank_of(registers: RegisterMap, trace: PinTrace | AxesTrace) -> GoldenBank:
+    if isinstance(trace, AxesTrace):
+        assert isinstance(registers, AxesMap)
+        return GoldenAxesBank(registers, trace)
+    loop = isinstance(registers.core, LoopSpec)
+    return GoldenLoopBank(registers, trace) if loop else GoldenBank(registers, trace)  # type: ignore[arg-type]
+
+
+def _trace(spec: AnySpec) -> PinTrace | AxesTrace:
+    """Return a motion with both lines at once, counts that are too many, an index and a standstill."""
+    if isinstance(spec, AxesSpec):
+        return motions(spec, CLOCKS)
+    rng = np.random.default_rng(1)
+    # Too fast, as it may be, and at rest for longer than a measurement; sometimes both lines change at once.
+    gaps = np.concatenate([[*rng.choice([11, 30, 50], 1).repeat(6), 450] for _ in range(CLOCKS // 450)])
+    turns = np.where(rng.random(len(gaps)) < 0.1, 2, rng.choice([1, -1]))
+    clock = np.append(0, np.cumsum(gaps))
+    clock = clock[clock < CLOCKS]
+    level = quadrature(np.append(0, np.cumsum(turns)))[: len(clock)]
+    z = (rng.random(len(clock)) < 0.3).astype(np.uint8) if spec.tachometer.index else None
+    made = PinTrace(clock, level & np.uint8(1), level >> np.uint8(1), CLOCKS, z)
+    if not spec.tachometer.external_tick:
+        return made
+    return made.with_tick_in(np.cumsum(rng.choice([2, 40, 39, 43, 250], CLOCKS // 40)))
+
+
+Rows = list[dict[str, int]]
+
+
+@cache
+def case(core: str) -> tuple[RegisterMap, PinTrace | AxesTrace, list[Access], Rows]:
+    """Return a core with its motion, random writes to the registers of the interrupt, and reads of them."""
+    spec = CORES[core]
+    trace = _trace(spec)
+    bus = bus_of("native", irq=True)
+    assert bus is not None
+    registers = registers_on(spec, bus)
+    rng = np.random.default_rng(5)
+    # Some events are cleared as they come.
+    coming = {clock for clocks in bank_of(registers, trace).interrupts().values() for clock in clocks[::2].tolist()}
+    clears = registers["INTERRUPT_CLEAR"].offset // 4
+    ours = [number for number, one in enumerate(registers) if one.name.startswith("INTERRUPT")]
+    accesses = []
+    for clock in range(CLOCKS - 1):
+        if clock in coming:
+            accesses.append(Access(clock, clears, 15))
+        elif rng.random() < 0.1:
+            data = int(rng.integers(16)) | int(rng.integers(1 << 20)) << 12 if rng.random() < 0.5 else None
+            accesses.append(Access(clock, int(rng.choice(ours)), data))
+    rows: Rows = [{"capture": 0, "read": 0, "write": 0} for _ in range(CLOCKS)]
+    pins = [pin.name for pin in spec.ports.pins if pin.name in trace.lines]
+    for clock, *levels in zip(trace.clock.tolist(), *(trace.lines[pin].tolist() for pin in pins), strict=True):
+        if clock < CLOCKS:
+            rows[clock] |= dict(zip(pins, levels, strict=True))
+    for access in accesses:
+        kind = {"read": 1} if access.data is None else {"write": 1, "write_data": access.data}
+        rows[access.clock] |= {"address": access.address, **kind}
+    return registers, trace, accesses, rows
+
+
+def compare(core: str, seen: Sequence[tuple[int, int, int]]) -> None:
+    """Hold data, errors and interrupt of each clock against the golden model, and see that all has happened."""
+    registers, trace, accesses, _ = case(core)
+    bank = bank_of(registers, trace)
+    answers = bank.answers(accesses)
+    for access, (data, error) in zip(accesses, answers, strict=True):
+        assert seen[access.clock + 1][:2] == (data, int(error)), (core, access)
+    happened = {event: len(clocks) for event, clocks in bank.interrupts().items()}
+    assert all(happened.values()), happened
+    levels = bank.irq(accesses, CLOCKS)
+    wrong = [clock for clock, level in enumerate(levels) if seen[clock][2] != level]
+    assert wrong == [], (core, wrong[0])
+    assert 100 < sum(levels) < CLOCKS - 100
+    enabled = [index for index, one in enumerate(registers) if one.name == "INTERRUPT_ENABLE"]
+    assert {data for access, (data, _) in zip(accesses, answers, strict=True) if access.address == enabled[0]} > {0, 1}
+
+
+def simulated(core: str) -> list[tuple[int, int, int]]:
+    registers, _, _, rows = case(core)
+    box = AxesRegisterCore(registers) if isinstance(registers, AxesMap) else RegisterCore(registers)
+    bus = ("read", "write", "address", "write_data")
+    named = [{f"bus.{name}" if name in bus else name: value for name, value in row.items()} for row in rows]
+    seen = clock_by_clock(box, named, ["bus.read_data", "bus.error", "irq"])
+    return [(row["bus.read_data"], row["bus.error"], row["irq"]) for row in seen]
+
+
+@pytest.mark.parametrize("core", only(["s", "axes"], CORES))
+def test_interrupts_are_those_of_the_golden_model(core: str) -> None:
+    compare(core, simulated(core))
+
+
+@pytest.mark.parametrize("core", only(["external ticks"], CORES))
+def test_exported_verilog_in_icarus(core: str, tmp_path: Path) -> None:
+    spec, (_, _, _, rows) = CORES[core], case(core)
+    bus = bus_of("native", irq=True)
+    pins = [port for port in ports_on(spec, bus) if port.direction == "input" and port.name not in ("clk", "rst")]
+    outputs = [port for port in ports_on(spec, bus) if port.direction == "output"]
+    now = dict.fromkeys((port.name.removeprefix("reg_") for port in pins), 0)
+    changes = []
+    for clock, row in enumerate(rows):
+        now |= row
+        changes.append([clock, *now.values()])
+    text = export(spec, bus="native", irq=True)["tachometer.v"]
+    found = play(text, pins, outputs, ["1"], tmp_path, np.array(changes), len(rows))
+    names = [port.name for port in outputs]
+    columns = [1 + names.index(name) for name in ("reg_read_data", "reg_error", "irq")]
+    compare(core, [(int(data), int(error), int(irq)) for data, error, irq in found[:, columns].tolist()])
+
+
+# What breaks it on purpose.
+WRONG = {
+    "clear wins": ("comes | (pending & ~clear)", "(comes | pending) & ~clear"),
+    "not masked": ("pending & enable", "pending"),
+    "while at rest": ("& ~rested", ""),
+}
+
+
+@nightly
+@pytest.mark.parametrize("name", WRONG)
+def test_mutants_are_found(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = Path(interrupts.__file__).read_text(encoding="utf-8")
+    right, wrong = WRONG[name]
+    assert source.count(right) == 1
+    changed: dict[str, object] = {"__name__": "mutant"}
+    exec(source.replace(right, wrong), changed)
+    monkeypatch.setattr("tachometry.hdl.core.register_core.Interrupts", changed["Interrupts"])
+    with pytest.raises(AssertionError):
+        compare("s", simulated("s"))
+
+
+@pytest.mark.parametrize("bus", BUSES)
+def test_every_bus_has_it_and_only_when_it_is_asked_for(bus: str) -> None:
+    spec = CORES["s"]
+    with_it, without = (bus_of(bus, 50_000 if bus == "uart" else None, irq=irq) for irq in (True, False))
+    assert with_it is not None
+    assert without is not None
+    added = {port.name for port in ports_on(spec, with_it)} - {port.name for port in ports_on(spec, without)}
+    assert added == {"irq"}
+    registers = registers_on(spec, with_it)
+    before = registers_on(spec, without)
+    assert [one.name for one in registers][-3:] == ["INTERRUPTS", "INTERRUPT_ENABLE", "INTERRUPT_CLEAR"]
+    assert [(one.name, one.offset) for one in registers][:-3] == [(one.name, one.offset) for one in before]
+    assert registers.configuration != before.configuration
+
+
+def test_without_a_bus_there_is_none() -> None:
+    with pytest.raises(ParameterError, match="irq must be given together with a bus, which clears its events"):
+        export(CORES["s"], irq=True)
