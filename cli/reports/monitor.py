@@ -14,6 +14,7 @@ from rich.text import Text
 from tachometry.boards.monitor.selftest import Result
 from tachometry.boards.monitor.watch import HISTORY, Display, State
 from tachometry.cli.reports.streams import printable
+from tachometry.spec.core.health import FAULT_TEXTS, Fault
 from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.language.units import plural
 
@@ -196,6 +197,9 @@ def _wrong(state: State) -> list[tuple[str, str]]:
         if name in state.counters or name != "tick_errors":
             number = state.counters.get(name)
             rows.append((text, "-" if number is None else f"{number}{' or more' * (number == _SATURATED)}"))
+    if "health" in state.columns:
+        code = state.value("health")
+        rows.append(("health", "-" if code is None else f"{code}: {FAULT_TEXTS[Fault(int(code))]}" if code else "0"))
     if "swallowed_edges" in state.columns:
         edges = state.value("swallowed_edges")
         rows.append(("swallowed edges", "-" if edges is None else str(edges)))

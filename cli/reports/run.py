@@ -14,6 +14,7 @@ from tachometry.cli.reports.terminal import print_rows, stdout_console
 from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.simulation import Axis, Simulation
 from tachometry.spec import AxesSpec, CoreSpec
+from tachometry.spec.core.health import FAULT_TEXTS
 from tachometry.spec.language.units import format_time, plural
 
 _Row = tuple[str, str]  # a name and its value
@@ -112,6 +113,9 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
     if spec.index:
         last = f", the last at position {run.index.index_position[-1]}" if len(run.index.clock) else ""
         rows.append(("index", f"{len(run.index.clock)} times{last}{index_distance(axis)}"))
+    if spec.health:
+        code, faults = run.ticks.health[-1], plural(int(run.ticks.faults[-1]), "fault")
+        rows.append(("health", f"{faults}, first: {FAULT_TEXTS[code]}" if code else "no fault"))
     if spec.external_tick:
         rows.append(("tick errors", f"{len(run.tick_errors)} (external tick too early or missing)"))
     if n_overflows := int(np.count_nonzero(run.ticks.overflow)):

@@ -6,6 +6,7 @@ from amaranth.lib import stream, wiring
 from tachometry.hdl.arithmetic.idle import Idle, idle_of
 from tachometry.hdl.front_end.conditioner import InputConditioner
 from tachometry.hdl.front_end.decoder import QuadratureDecoder
+from tachometry.hdl.front_end.encoder_watch import EncoderWatch
 from tachometry.hdl.front_end.external_tick import ExternalTick
 from tachometry.hdl.front_end.index_capture import IndexCapture
 from tachometry.hdl.front_end.position_counter import PositionCounter
@@ -19,7 +20,7 @@ from tachometry.hdl.output.update import update_layout
 from tachometry.hdl.output.update_age import UpdateAge
 from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput, SerialVelocityOutput
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import members
+from tachometry.hdl.wires.ports import follow, members
 from tachometry.spec import TachometerSpec
 from tachometry.spec.language.port import UPDATE
 
@@ -54,6 +55,16 @@ class Tachometer(wiring.Component):
         )
         self.position_counter = PositionCounter(spec.position_width, spec.latency.tick)
         self.index_capture = IndexCapture(spec.position_width, spec.latency.tick) if spec.index else None
+        self.watch: EncoderWatch | None = None
+        if spec.health:
+            self.watch = EncoderWatch(
+                second=spec.timing.clock_hz,
+                edges=spec.health_edges,
+                errors=spec.health_errors,
+                counts_per_rev=spec.encoder.counts_per_rev if spec.index else 0,
+                position_width=spec.position_width if spec.index else 0,
+                index_reset=spec.index_reset,
+            )
         self.datapath = DATAPATHS[spec.method](spec)
         self.sampling_clock: TickSource
         if isinstance(self.datapath, OwnTicks):
@@ -83,7 +94,7 @@ class Tachometer(wiring.Component):
     @property
     def idle(self) -> tuple[Idle, ...]:
         """Registers that a simulation may move on."""
-        boxes: dict[str, object] = {"conditioner": self.conditioner, "datapath": self.datapath}
+        boxes: dict[str, object] = {"conditioner": self.conditioner, "watch": self.watch, "datapath": self.datapath}
         if not self._spec.facts.own_ticks:
             boxes["sampling_clock"] = self.sampling_clock
         return idle_of(boxes)
@@ -105,6 +116,7 @@ class Tachometer(wiring.Component):
         updates = self._output(m)
         self._age(m, ticks, updates)
         self._index(m)
+        self._watch(m)
         if isinstance(self.sampling_clock, ExternalTick):
             m.d.comb += [
                 self.sampling_clock.tick_in.eq(self.tick_in),
@@ -207,3 +219,15 @@ class Tachometer(wiring.Component):
             self.index_position.eq(index.index_position),
             self.index_valid.eq(index.index_valid),
         ]
+
+    def _watch(self, m: Module) -> None:
+        """Tell what is wrong with the encoder, if that is watched."""
+        if self.watch is None:
+            return
+        m.submodules.watch = watch = self.watch
+        follow(m, watch, self.decoder, ("level_a", "level_b", "ready", "step", "decode_error"))
+        follow(m, self, watch, ("health", "faults"))
+        m.d.comb += self.fault.eq(watch.health.any())
+        if self.index_capture is not None:
+            follow(m, watch, self.index_capture, ("index_valid", "index_position"))
+            follow(m, self, watch, ("index_error",))

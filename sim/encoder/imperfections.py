@@ -26,6 +26,7 @@ NONUNIFORMITY, JITTER, ILLEGAL, LOST, BOUNCE = range(5)
 
 MAX_BOUNCES = 1000
 
+_BIT = {"a": np.uint8(1), "b": np.uint8(2), "z": np.uint8(4)}
 _CHUNK = 1 << 16
 _LN2 = 0.6931471805599453
 _CLIP = 0.49  # of the gap to a neighbour: two edges that move towards each other still keep their order
@@ -57,6 +58,48 @@ class Bounce:
         if match is None:
             raise ParameterError("bounce", f"must be COUNT:TIME, such as 3:500us, not {text!r}")
         return Bounce(int(match[1]), read_nearest("bounce time", match[2], TIME, "s"))
+
+
+@dataclass(frozen=True)
+class LineFault:
+    """A line is at fault from some time on.
+
+    Parameters
+    ----------
+    line : str
+        `a`, `b` or `z`.
+    time_s : float, seconds
+    """
+
+    line: str
+    time_s: float
+
+    def __post_init__(self) -> None:
+        if self.line not in _BIT:
+            raise ParameterError("line", f"must be a, b or z, not {self.line!r}")
+        if not 0 <= self.time_s < math.inf:
+            raise ParameterError("time", f"must be 0 s or more, not {self.time_s} s")
+
+    @staticmethod
+    def parse(what: str, text: str) -> "LineFault":
+        """Read LINE:TIME, such as b:200ms (s, ms, us or ns)."""
+        line, _, time = text.strip().partition(":")
+        if line.lower() not in _BIT or not time:
+            raise ParameterError(what, f"must be LINE:TIME, such as b:200ms, with line a, b or z, not {text!r}")
+        if (begins := read_nearest(what, time, TIME, "s")) < 0:
+            raise ParameterError(what, f"must begin at 0 s or later, not at {time}")
+        return LineFault(line.lower(), begins)
+
+    def applied(self, time: FloatArray, level: Levels, *, high: bool) -> tuple[FloatArray, Levels]:
+        """Return times and levels with the line high from then on, as an open input is, or as it is then."""
+        bit = _BIT[self.line]
+        begins = int(np.searchsorted(time, self.time_s, side="right"))
+        time = np.insert(time, begins, self.time_s)
+        level = np.insert(level, begins, level[begins - 1])
+        kept = bit if high else level[begins] & bit
+        level[begins:] = level[begins:] & ~bit | kept
+        changed = np.append(True, level[1:] != level[:-1])
+        return time[changed], level[changed]
 
 
 def stream(seed: int, which: int) -> np.random.PCG64:

@@ -10,7 +10,7 @@ from tachometry.spec.language.option import ParameterError, option
 from tachometry.spec.language.units import DEGREES, FRACTION, number_reader
 
 if TYPE_CHECKING:  # numpy is slow to import
-    from tachometry.sim.encoder.imperfections import Bounce
+    from tachometry.sim.encoder.imperfections import Bounce, LineFault
     from tachometry.sim.encoder.motion import Vibration
 
 _MOTION, _FAULTS = "Motion", "Encoder faults"
@@ -26,6 +26,12 @@ def _bounce(what: str, text: str) -> Bounce:
     from tachometry.sim.encoder.imperfections import Bounce
 
     return Bounce.parse(text)
+
+
+def _line_fault(what: str, text: str) -> LineFault:
+    from tachometry.sim.encoder.imperfections import LineFault
+
+    return LineFault.parse(what, text)
 
 
 def _seed(what: str, text: str) -> int:
@@ -70,6 +76,8 @@ class EncoderOptions:
     illegal : float, from 0 to 1
         Probability that an edge is late and comes at the instant of the next one, so that both lines change at once.
         An edge is not late if the one before it is, or if the next one is of the same line, as after a reversal.
+    broken, stuck : LineFault or None
+        A line that is high from some time on, as an open input is, and one that stays as it is then.
     seed : int, at least 0
         Of all random numbers. Each imperfection has a stream of its own.
 
@@ -132,6 +140,20 @@ class EncoderOptions:
         "Probability that an edge comes together with the next one: both lines change at once.",
         "PROBABILITY",
         number_reader(FRACTION),
+    )
+    broken: LineFault | None = option(  # noqa: RUF009
+        None,
+        "A broken wire, such as b:200ms: from then on line a, b or z is high, as an open input is.",
+        metavar="LINE:TIME",
+        group=_FAULTS,
+        parse=_line_fault,
+    )
+    stuck: LineFault | None = option(  # noqa: RUF009
+        None,
+        "A shorted wire, such as a:200ms: from then on line a, b or z stays as it is.",
+        metavar="LINE:TIME",
+        group=_FAULTS,
+        parse=_line_fault,
     )
     seed: int = option(
         0, "Seed of all random numbers; equal seeds give equal files.", metavar="N", group=_FAULTS, parse=_seed

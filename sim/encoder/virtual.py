@@ -152,6 +152,9 @@ class VirtualEncoder(EncoderOptions):
         if self.index:
             slot = quarter % (4 * self.pulses_per_rev) == 0
             times, level = imperfections.gated_index(times, level, time, slot)
+        for fault, high in ((self.broken, True), (self.stuck, False)):
+            if fault is not None and fault.time_s < duration:
+                times, level = fault.applied(times, level, high=high)
         return Recording.of_level(times, level, duration, ("a", "b", "z")[: 2 + self.index]), n_illegal, n_lost
 
     def _stream(self, which: int) -> np.random.PCG64:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from tachometry.sim.golden import health
 from tachometry.sim.golden.axes import run_axes
 from tachometry.sim.golden.front_end import count, decoded
 from tachometry.sim.golden.low_pass import filtered
@@ -46,7 +47,8 @@ def tables(spec: TachometerSpec, trace: PinTrace) -> dict[str, Table]:
         last, tick_errors = windows(spec, trace)
         beyond, nominal = None, np.ones_like(last)
     ticks, index = count(spec, steps, last, beyond)
-    ticks = with_stalled(spec, ticks, nominal)
+    wrong = health.faults(spec, steps, index)
+    ticks = health.with_health(spec, with_stalled(spec, ticks, nominal), wrong)
     measured = golden.updates(ticks, steps, trace.n_clocks)
     measured = measured.having(cause=measured.clock - spec.latency.datapath)
     updates = in_unit(spec, filtered(spec, ticks, measured))
@@ -56,5 +58,6 @@ def tables(spec: TachometerSpec, trace: PinTrace) -> dict[str, Table]:
         "index_valid": index,
         "decode_error": Table(steps.errors, {}),
         "tick_error": Table(tick_errors, {}),
+        "fault": wrong,
     }
     return {name: table.rows(slice(np.searchsorted(table.clock, trace.n_clocks))) for name, table in found.items()}

@@ -1,6 +1,6 @@
 """The golden front end turns sampled levels into steps, pulse numbers and positions."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,6 +91,8 @@ class Steps:
         Clocks in which Z rises; none without an index.
     swallowed : int64 array
         Clocks in which the glitch filter has counted a glitch.
+    changed : uint8 array, shape (n,)
+        The lines that change in `clock`: 1 of A, 2 of B, 3 both.
     """
 
     clock: NDArray[np.int64]
@@ -98,6 +100,7 @@ class Steps:
     errors: NDArray[np.int64]
     index: NDArray[np.int64]
     swallowed: NDArray[np.int64]
+    changed: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, dtype=np.uint8))
 
 
 def together(
@@ -126,13 +129,14 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
         changed = np.append(True, (trace.a[1:] != trace.a[:-1]) | (trace.b[1:] != trace.b[:-1]))
         clock, a, b = trace.clock[changed], trace.a[changed], trace.b[changed]
     step, illegal = decode(a, b, spec.encoder.decoding)
+    changed = (a[1:] ^ a[:-1]) | (b[1:] ^ b[:-1]) << np.uint8(1)
     at = clock[1:] + spec.latency.pin_to_count
     rises = at[:0]
     if spec.index:
         at_z, z = conditioned("z")
         rises = at_z[1:][z[1:] == 1] + spec.latency.pin_to_count
     # Two clocks for the synchroniser, one for the counter of glitches.
-    return Steps(at, step, at[illegal], rises, np.sort(np.concatenate(returned)) + 3)
+    return Steps(at, step, at[illegal], rises, np.sort(np.concatenate(returned)) + 3, changed)
 
 
 def first_beyond(steps: Steps, last: NDArray[np.int64], limit: int) -> NDArray[np.int64]:

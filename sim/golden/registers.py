@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tachometry.sim import golden
+from tachometry.sim.golden import health
 from tachometry.sim.golden.front_end import decoded
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec.language.port import INDEX, TICK, UPDATE
@@ -190,7 +191,13 @@ class GoldenBank:
             "time": clock % (1 << WORD),
             "age": min(age, self._map.spec.timing.max_ticks),
             "swallowed_edges": 2 * min(glitches, (1 << 15) - 1),
+            **(self._faults(clock) if self._map.spec.health else {}),
         }
+
+    def _faults(self, clock: int) -> dict[str, int]:
+        found = self._tables["fault"]
+        first, end = np.searchsorted(found.clock, [self._cleared + 1, clock], side="right")[:, None]
+        return {name: int(column[0]) for name, column in health.shown(found, first, end).items()}
 
     @staticmethod
     def _count(clocks: np.ndarray, after: int, until: int) -> int:

@@ -40,10 +40,18 @@ def check(spec: TachometerSpec) -> None:
         raise ParameterError("filter_clocks", f"must be from 0 to {most} clocks, {longest}, not {spec.filter_clocks}")
     if spec.index_reset and not spec.index:
         raise ParameterError("index_reset", "must be given together with an index")
+    _check_health(spec)
     if spec.facts.bounds:
         _check_edge_error(spec)
     if spec.lowpass is not None:
         _check_lowpass(spec, spec.lowpass)
+
+
+def _check_health(spec: TachometerSpec) -> None:
+    for name, least, most in (("health_edges", 2, 1 << 16), ("health_errors", 0, (1 << 16) - 1)):
+        value = getattr(spec, name)
+        if not least <= value <= most:
+            raise ParameterError(name, f"must be from {least} to {most}, not {value}")
 
 
 def _check_edge_error(spec: TachometerSpec) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from tachometry.spec.core.health import FAULT_TEXTS, FAULT_WIDTH, FAULTS_WIDTH
 from tachometry.spec.language.port import INDEX, TICK, UPDATE, Port, held, pin, strobe
 
 if TYPE_CHECKING:
@@ -100,6 +101,7 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
                 "external tick came too early and was left out.",
             ),
         ),
+        *_health_ports(spec),
         *_if(
             spec.filter_clocks,
             held(
@@ -110,6 +112,19 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
             ),
         ),
     )
+
+
+def _health_ports(spec: TachometerSpec) -> Iterable[Port]:
+    if not spec.health:
+        return
+    codes = "; ".join(f"{code}: {text}" for code, text in FAULT_TEXTS.items())
+    now = "It changes between the ticks as well, and a capture takes what it is then."
+    yield held(TICK, "health", FAULT_WIDTH, help=f"The first fault of the encoder since it was cleared; {codes}. {now}")
+    yield held(TICK, "faults", FAULTS_WIDTH, help="Faults of the encoder since they were cleared; it stays at 255.")
+    yield held(TICK, "fault", help="There has been a fault of the encoder: health is not 0.")
+    if spec.index:
+        text = "Counts by which the latest wrong turn from index to index went too far forward: lost, or extra."
+        yield held(TICK, "index_error", spec.position_width, signed=True, unit="counts", help=text)
 
 
 def _if(present: object, port: Port) -> Iterable[Port]:

@@ -71,6 +71,12 @@ class TachometerSpec:
         The distance of any two edges is off by at most so many counts, 0 to 1; it is rounded up to eighths.
     lowpass : Fraction or None
         G of the low-pass filter for fluctuating measurement time, eq. (22) of Tsuji 2009, in rad/s; None: no filter.
+    health : bool
+        Watch the encoder: outputs `health`, `faults`, `fault`, and with an index `index_error`.
+    health_edges : int
+        So many edges of a line within a second, and none of the other, are a fault of the other.
+    health_errors : int
+        More illegal transitions in a second are a fault.
     chosen : str
         Why this method was taken, where none was named; empty: it was named.
 
@@ -180,6 +186,28 @@ class TachometerSpec:
         unit="rad/s",
         parse=parse_bandwidth,
         tests=("", "20kHz"),
+    )
+    health: bool = option(
+        False,
+        "Watch the encoder: outputs health (the first fault), faults (how many) and fault (there is one), and with "
+        "--index index_error. A reset clears them, and CONTROL.clear.",
+    )
+    health_edges: int = option(
+        256,
+        "N edges of a line in a second, 2 to 65536, and none of the other, are a fault of the other. A shaft that "
+        "swings about one edge has such edges as well (with --health).",
+        metavar="N",
+        needs="health",
+        parse=parse_whole,
+        tests=("5",),
+    )
+    health_errors: int = option(
+        10,
+        "More than N illegal transitions in a second, 0 to 65535, are a fault (with --health).",
+        metavar="N",
+        needs="health",
+        parse=parse_whole,
+        tests=("0",),
     )
     chosen: str = field(default="", compare=False, repr=False)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from tachometry.spec.language.option import REQUIRED, Option, ParameterError, option, read_options
+from tachometry.spec.language.option import REQUIRED, Option, ParameterError, option, parse_whole, read_options
 from tachometry.spec.language.units import (
     CLOCKS,
     FREQUENCY,
@@ -34,8 +34,8 @@ def parse_clocks(what: str, text: str, timing: Mapping[str, Any]) -> int:
 
 def parse_filter(what: str, text: str, timing: Mapping[str, Any]) -> int:
     """Return a time, rounded up to clocks, or clocks with or without their unit, for an option."""
-    if re.fullmatch(r"\s*-?\d{1,20}\s*", text, re.ASCII):
-        return int(text)
+    if re.fullmatch(r"\s*-?\d+\s*", text, re.ASCII):
+        return parse_whole(what, text)
     return math.ceil(time_or_clocks(what, text, timing["clock_hz"]) * timing["clock_hz"])
 
 

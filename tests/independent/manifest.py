@@ -30,6 +30,9 @@ _SHARED = {
     "bounds": "bounds",
     "edge_error": "edge-error",
     "lowpass": "lowpass",
+    "health": "health",
+    "health_edges": "health-edges",
+    "health_errors": "health-errors",
 }
 _TIMED = {"timer": "timer", "bound_decay": "bound-decay", "paper_exact": "paper-exact"}
 _RAIRAN = {"estimate": "estimate", "paper_exact": "paper-exact", "bound_decay": "bound-decay", "adaptive": "adaptive"}
@@ -46,7 +49,7 @@ WORDS = {
     "rairan": {**_SHARED, **_RAIRAN},
     "track": {**_SHARED, **_TRACK},
 }
-_FLAGS = ("index", "index-reset", "age", "bounds", "paper-exact", "whole-cycles")
+_FLAGS = ("index", "index-reset", "age", "bounds", "paper-exact", "whole-cycles", "health")
 # Entries of the acceleration, and its unit for that of the velocity.
 ACCELERATION = ("width", "frac_bits", "unit", "rad_per_s2_per_lsb")
 ACCELERATIONS = {"count/tick": "count/tick²", "rad/s": "rad/s²", "rev/s": "rev/s²", "rpm": "rpm/s"}
@@ -77,6 +80,8 @@ def parameter(settings: Settings, name: str, shown: object) -> object:
         "multiplier": settings.words.get("multiplier", "auto"),
         "fine_bits": settings.fine_bits,
         "position_width": settings.position_bits,
+        "health_edges": int(settings.words.get("health-edges", "256")),
+        "health_errors": int(settings.words.get("health-errors", "10")),
         "filter_clocks": settings.filter,
         "max_tick_cycles": settings.longest_tick if settings.external else None,
         "timer": "tick" if settings.lattice else "clock",
@@ -368,18 +373,20 @@ def check_ports(expected: Expected, ports: list[dict[str, Any]]) -> None:
             else {}
         ),
         **({"index_position": settings.position_bits} if settings.flag("index") else {}),
+        **({"health": 3, "faults": 8} if settings.flag("health") else {}),
+        **({"index_error": settings.position_bits} if settings.flag("health") and settings.flag("index") else {}),
         **({"swallowed_edges": 16} if settings.filter else {}),
     }
     single = ["velocity_valid", "forced", "tick", "decode_error", "overflow", "stalled"]
     single += ["velocity_overflow"] * (not own) + ["bounds_valid"] * settings.flag("bounds")
     single += ["out_of_range"] * beyond + ["index_valid"] * settings.flag("index")
-    single += ["tick_error"] * settings.external
+    single += ["fault"] * settings.flag("health") + ["tick_error"] * settings.external
     inputs = ["clk", "rst", "a", "b"] + ["z"] * settings.flag("index") + ["tick_in"] * settings.external
     found = {port["name"]: port for port in ports}
     assert len(found) == len(ports)
     assert [port["name"] for port in ports if port["direction"] == "input"] == inputs
     assert {port["name"] for port in ports if port["direction"] == "output"} == {*widths, *single}
-    unsigned = ("interval", "age", "quality", "n_ep1", "n_dt1", "dt_shift", "swallowed_edges")
+    unsigned = ("interval", "age", "quality", "n_ep1", "n_dt1", "dt_shift", "swallowed_edges", "health", "faults")
     for name, port in found.items():
         assert set(port) == {"name", "direction", "width", "signed"}
         assert port["signed"] == (name in widths and name not in unsigned), name

@@ -125,11 +125,19 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
     if isinstance(spec, RairanTachometer) and max_ticks >= 10 and not (spec.paper_exact or spec.lowpass):
         spec = replace(spec, adaptive=Fraction(1, 4))
         spec = replace(spec, adaptive=Fraction(1, int(rng.integers(4, 2 * spec.widths.max_pulse_count))))
-    spec = random_output(spec, rng)
+    spec = watched(random_output(spec, rng), np.random.default_rng([seed, 1]))
     earliest = spec.times.min_tick_cycles if method == "track" else 0  # elsewhere ticks are as short anyway
     encoding = encoder.record(parse_motion("+".join(parts[k] for k in order)))
     trace = encoding.recording.place(CLOCK_HZ)
     return spec, encoding, random_ticks(trace, tick_cycles, rng, earliest) if spec.external_tick else trace
+
+
+def watched(spec: TachometerSpec, rng: np.random.Generator) -> TachometerSpec:
+    """Return the core, every other time with a watch of its encoder that finds many faults."""
+    if rng.random() < 0.5:
+        return spec
+    edges, errors = (int(rng.integers(least, 4)) for least in (2, 0))
+    return replace(spec, health=True, health_edges=edges, health_errors=errors)
 
 
 def filter_of(method: str, clocks: int, tick_cycles: int) -> int:

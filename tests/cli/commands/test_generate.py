@@ -99,6 +99,9 @@ def test_defaults(tmp_path: Path) -> None:
         "bounds": False,
         "edge_error": 0.0,
         "lowpass": None,
+        "health": False,
+        "health_edges": 256,
+        "health_errors": 10,
         "cancel": True,
         "reciprocal_source": "serial",
     }

@@ -183,6 +183,9 @@ def test_manifest_names_every_option_and_survives_json() -> None:
         "bounds": False,
         "edge_error": 0.0,
         "lowpass": None,
+        "health": False,
+        "health_edges": 256,
+        "health_errors": 10,
         "cancel": False,
         "reciprocal_source": "serial",
     }

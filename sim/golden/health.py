@@ -1,0 +1,85 @@
+"""The golden watch finds what is wrong with the encoder."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.sim.golden.front_end import Steps
+from tachometry.sim.golden.ordered import places
+from tachometry.sim.signals.run import Table
+from tachometry.spec import TachometerSpec
+from tachometry.spec.core.health import FAULTS_WIDTH, Fault
+
+Ints = NDArray[np.int64]
+_OTHER = {1: Fault.B_STANDS, 2: Fault.A_STANDS}  # of what changes alone
+
+
+def _standing(spec: TachometerSpec, steps: Steps) -> tuple[Ints, Ints]:
+    """Return clocks in which a line has had too many edges without one of the other in a second, and the faults."""
+    second = steps.clock // spec.timing.clock_hz
+    anew = np.append(True, (steps.changed[1:] != steps.changed[:-1]) | (second[1:] != second[:-1]))[: len(second)]
+    row = np.arange(len(second))
+    number = row - np.maximum.accumulate(np.where(anew, row, 0)) + 1
+    found = np.flatnonzero((number % spec.health_edges == 0) & (steps.changed != 3))
+    return steps.clock[found], np.where(steps.changed[found] == 1, _OTHER[1], _OTHER[2]).astype(np.int64)
+
+
+def _illegal(spec: TachometerSpec, errors: Ints) -> Ints:
+    """Return clocks of the errors of a second that are one too many."""
+    second = errors // spec.timing.clock_hz
+    return errors[np.arange(len(errors)) - np.searchsorted(second, second) == spec.health_errors]
+
+
+def _index(spec: TachometerSpec, steps: Steps, index: Table) -> tuple[Ints, Ints]:
+    """Return clocks after indices with which a turn was wrong, and by how many counts it went too far forward."""
+    stepped = np.flatnonzero(steps.step)
+    before = places(steps.clock[stepped], index.clock, "left")
+    back = np.append(0, steps.step[stepped])[before] < 0
+    position = index["index_position"]
+    way = position[1:] - (0 if spec.index_reset else position[:-1])
+    size = 1 << spec.position_width
+    turn = np.where(back[1:], -spec.encoder.counts_per_rev, spec.encoder.counts_per_rev)
+    off = (way - turn + size // 2) % size - size // 2
+    wrong = (back[1:] == back[:-1]) & (way % size != 0) & (off != 0)
+    return index.clock[1:][wrong] + 1, off[wrong]
+
+
+def faults(spec: TachometerSpec, steps: Steps, index: Table) -> Table:
+    """Return the clocks from which faults are shown, each with its code, and with the error of a wrong turn."""
+    if not spec.health:
+        return Table(np.empty(0, dtype=np.int64), {})
+    standing, codes = _standing(spec, steps)
+    illegal = _illegal(spec, steps.errors)
+    wrong, off = _index(spec, steps, index) if spec.index else (standing[:0], standing[:0])
+    clock = np.concatenate([standing, illegal, wrong])
+    code = np.concatenate(
+        [codes, np.full(len(illegal), int(Fault.ILLEGAL)), np.full(len(wrong), int(Fault.INDEX_COUNTS))]
+    )
+    error = np.concatenate([np.zeros(len(standing) + len(illegal), dtype=np.int64), off])
+    clock, which = np.unique(clock, return_inverse=True)
+    least, errors = np.full(len(clock), 1 << 62), np.zeros(len(clock), dtype=np.int64)
+    np.minimum.at(least, which, code)
+    np.add.at(errors, which, error)
+    return Table(clock + 1, {"code": least, "error": errors})
+
+
+def shown(found: Table, first: Ints, end: Ints) -> dict[str, NDArray[np.int64]]:
+    """Return what is shown of the faults of rows from `first` on, below `end`, for each pair of these."""
+    some = end > first
+    turns = np.flatnonzero(found["error"])
+    latest = np.append(-1, turns)[np.searchsorted(turns, end)]
+    code, error = np.append(found["code"], 0), np.append(found["error"], 0)
+    health = np.where(some, code[np.where(some, first, -1)], 0)
+    return {
+        "health": health,
+        "faults": np.minimum(end - first, (1 << FAULTS_WIDTH) - 1),
+        "fault": health != 0,
+        "index_error": np.where(latest >= first, error[latest], 0),
+    }
+
+
+def with_health(spec: TachometerSpec, ticks: Table, found: Table) -> Table:
+    """Return ticks with what is shown of faults."""
+    if not spec.health:
+        return ticks
+    end = places(found.clock, ticks.clock, "right")
+    return ticks.having(**shown(found, np.zeros_like(end), end))

@@ -1,0 +1,22 @@
+"""Codes of what can be wrong with an encoder, which a core that watches it shows."""
+
+from enum import IntEnum
+
+
+class Fault(IntEnum):
+    """Names a fault; 0 is none. Of faults in one clock the lowest is shown."""
+
+    A_STANDS = 1
+    B_STANDS = 2
+    INDEX_COUNTS = 3
+    ILLEGAL = 4
+
+
+FAULT_WIDTH = 3  # bits of a code
+FAULTS_WIDTH = 8  # bits of the number of faults, which stays at its end
+FAULT_TEXTS = {
+    Fault.A_STANDS: "line a stands while b has edges: broken or shorted",
+    Fault.B_STANDS: "line b stands while a has edges: broken or shorted",
+    Fault.INDEX_COUNTS: "counts are lost or extra between two indices",
+    Fault.ILLEGAL: "too many illegal transitions in a second",
+}

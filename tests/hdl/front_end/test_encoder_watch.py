@@ -1,0 +1,193 @@
+"""The watch of the encoder against its rules, in seconds of few clocks; and what it says of faults."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from proofs.source import mutant
+from support.nightly import nightly, only
+from support.simulate import clock_by_clock
+
+from tachometry.hdl.front_end import encoder_watch
+from tachometry.sim import golden
+from tachometry.sim.encoder.imperfections import LineFault
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.stress import stress
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.studies.lockstep import lockstep
+from tachometry.spec import of_texts
+from tachometry.spec.core.health import Fault
+
+WIDTH = 6
+SEEN = ["health", "faults", "index_error"]
+Row = dict[str, int]
+
+
+def rows_of(seed: int, n_clocks: int = 600) -> list[Row]:
+    """Return random inputs, in which edges are often alone, and positions near a turn apart."""
+    rng = np.random.default_rng(seed)
+    rows: list[Row] = []
+    levels, position = {"level_a": 0, "level_b": 0}, 0
+    favourite = "level_a"
+    for clock in range(n_clocks):
+        if rng.random() < 0.05:
+            favourite = rng.choice(["level_a", "level_b"])
+        for line in levels:
+            levels[line] ^= int(rng.random() < (0.6 if line == favourite else 0.06))
+        row = {**levels, "ready": int(clock > 4 and rng.random() < 0.98), "clear": int(rng.random() < 0.04)}
+        row |= {"step": int(rng.choice([-1, 0, 0, 1, 1])), "decode_error": int(rng.random() < 0.2)}
+        row["index_valid"] = int(rng.random() < 0.2 and not (rows and rows[-1]["index_valid"]))
+        if row["index_valid"]:
+            position += int(rng.choice([-8, 0, 8, 8]) + rng.choice([0, 0, 0, -1, 1, 3, 4, -4]))
+            position = (position + 32) % 64 - 32
+        rows.append({**row, "index_position": position})
+    return rows
+
+
+def ruled(rows: list[Row], *, second: int, edges: int, errors: int, turn: int, reset: bool) -> list[Row]:
+    """Return what the rules make of the inputs."""
+    shown = []
+    now = dict.fromkeys(SEEN, 0)
+    past = {"level_a": 0, "level_b": 0}
+    line, alone, counted, backward = "", 0, 0, False
+    origin: int | None = None
+    origin_backward, due = False, 0
+    for clock, row in enumerate(rows):
+        shown.append(dict(now))
+        found = set()
+        changed = [name for name in past if row["ready"] and row[name] != past[name]]
+        past = {name: row[name] for name in past}
+        if len(changed) == 2:
+            alone = 0
+        elif changed:
+            alone, line = (alone + 1 if changed == [line] and alone else 1), changed[0]
+            if alone == edges:
+                alone = 0
+                found.add(Fault.B_STANDS if line == "level_a" else Fault.A_STANDS)
+        if row["decode_error"]:
+            counted += 1
+            if counted == errors + 1:
+                found.add(Fault.ILLEGAL)
+        if clock % second == second - 1:
+            alone = counted = 0
+        error = due
+        if error:
+            found.add(Fault.INDEX_COUNTS)
+        due = 0
+        if row["index_valid"]:
+            way = (row["index_position"] - (0 if reset else origin or 0) + 32) % 64 - 32
+            off = (way + (turn if backward else -turn) + 32) % 64 - 32
+            due = off if way and origin is not None and backward == origin_backward else 0
+            origin, origin_backward = row["index_position"], backward
+        if row["step"]:
+            backward = row["step"] < 0
+        if found:
+            now["health"] = now["health"] or min(found)
+            now["faults"] = min(now["faults"] + 1, 255)
+        now["index_error"] = error or now["index_error"]
+        if row["clear"]:
+            now = dict.fromkeys(SEEN, 0)
+    return shown
+
+
+CASES = [(7, 3, 1, False), (50, 5, 0, True), (1, 2, 0, False), (13, 2, 3, True), (600, 4, 15, False)]
+
+
+def check(seed: int, case: tuple[int, int, int, bool]) -> None:
+    second, edges, errors, reset = case
+    box = encoder_watch.EncoderWatch(
+        second=second, edges=edges, errors=errors, counts_per_rev=8, position_width=WIDTH, index_reset=reset
+    )
+    rows = rows_of(seed)
+    seen = clock_by_clock(box, rows, SEEN)
+    for clock, wanted in enumerate(ruled(rows, second=second, edges=edges, errors=errors, turn=8, reset=reset)):
+        assert seen[clock] == wanted, (seed, case, clock)
+
+
+def check_all() -> None:
+    for case in CASES:
+        check(0, case)
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("seed", only([0], range(6)))  # 600 random clocks reach every rule
+def test_every_clock_is_as_the_rules_say(seed: int, case: tuple[int, int, int, bool]) -> None:
+    check(seed, case)
+
+
+MUTANTS = [
+    ("alone == self._edges - 1", "alone == self._edges - 2"),
+    ("of_b == change_b", "of_b != change_b"),
+    ("with m.If(change_a & change_b):", "with m.If(change_a & ~change_a):"),
+    ("errors == self._errors)", "errors >= self._errors)"),
+    ("m.d.sync += errors.eq(0)", "m.d.sync += errors.eq(errors)"),
+    ("m.d.sync += alone.eq(0)\n        return", "pass\n        return"),
+    ("known & (backward == was_backward)", "known"),
+    ("Mux(was_backward, self._turn, -self._turn)", "Mux(was_backward, -self._turn, self._turn)"),
+    ("way.any() & off", "off"),
+    ("with m.If(self.health == 0):", "with m.If(1):"),
+    ("way.any() & off.any()", "way.any()"),
+    ("self.index_error.eq(0)", "self.index_error.eq(self.index_error)"),
+]
+
+
+@nightly  # it asks what the test above notices
+@pytest.mark.parametrize(("right", "wrong"), MUTANTS)
+def test_mutants_are_noticed(right: str, wrong: str) -> None:
+    with mutant(encoder_watch.EncoderWatch, right, wrong), pytest.raises(AssertionError):
+        check_all()
+
+
+@pytest.mark.parametrize("seed", only([1], range(4)))
+@pytest.mark.parametrize("decoding", only(["4"], ["4", "2", "1"]))
+def test_golden_model_and_hardware_agree_over_seconds(seed: int, decoding: str) -> None:
+    """A second of a clock of 1 kHz ends many times in a motion."""
+    core = {"ppr": "4", "decoding": decoding, "clock": "1kHz", "tick": "4ms", "max-time": "40ms", "index": "yes"}
+    spec = of_texts("m", core | {"health": "yes", "health-edges": "6", "health-errors": "1", "filter": "1"})
+    found = lockstep(spec, stress(spec, seed), PySim())
+    assert found.n_mismatches == 0, found.first
+    assert found.actual.ticks.health[-1]
+
+
+CORE = {"ppr": "500", "clock": "12MHz", "index": "yes", "health": "yes"}
+REAL: dict[str, Any] = {"jitter": 0.05, "nonuniformity": 0.1, "phase_error_deg": 10}
+EDGES = 4 * 100 * 500 / (2 * np.pi)  # a second, of both lines, at 100 rad/s
+FAULTS: list[tuple[dict[str, Any], Fault, float]] = [
+    ({"broken": LineFault("b", 0.1)}, Fault.B_STANDS, 512 / (EDGES / 2)),
+    ({"broken": LineFault("a", 0.1)}, Fault.A_STANDS, 512 / (EDGES / 2)),
+    ({"stuck": LineFault("a", 0.1)}, Fault.A_STANDS, 512 / (EDGES / 2)),
+    ({"stuck": LineFault("b", 0.1)}, Fault.B_STANDS, 512 / (EDGES / 2)),
+    ({"lost": 0.0005}, Fault.INDEX_COUNTS, 0.5),
+    ({"illegal": 0.01}, Fault.ILLEGAL, 0.5),
+]
+
+
+@pytest.mark.parametrize(("fault", "code", "within"), FAULTS)
+def test_each_fault_is_told_in_time(fault: dict[str, Any], code: Fault, within: float) -> None:
+    """A line that stands within 2 N edges of the other: a second may end between them."""
+    spec = of_texts("m", CORE)
+    encoder = VirtualEncoder(500, index=True, seed=3, **REAL, **fault)
+    recording = encoder.record(parse_motion("constant:100rad/s:600ms")).recording
+    run = golden.run(spec, PinTrace.of(recording, spec))
+    shown = np.flatnonzero(run.ticks.health)
+    assert len(shown)
+    first = shown[0]
+    assert run.ticks.health[first] == run.ticks.health[-1] == code
+    assert run.ticks.fault[first:].all()
+    begun = 0.1 if "lost" not in fault and "illegal" not in fault else 0.0
+    assert begun <= run.ticks.clock[first] / 12e6 <= begun + within + 40e-6
+    # Two counts are lost with every illegal transition, four with every pulse.
+    assert code != Fault.INDEX_COUNTS or run.ticks.index_error[-1] % 4 == 0
+
+
+@pytest.mark.parametrize("seconds", only([1], [1, 10]))
+def test_clean_motion_on_a_real_disc_has_no_fault(seconds: int) -> None:
+    spec = of_texts("m", CORE)
+    encoder = VirtualEncoder(500, index=True, seed=5, **REAL)
+    motion = "ramp:0:100:200ms+ramp:100:-100:300ms+sine:20:5Hz:400ms+constant:0.5:100ms"
+    recording = encoder.record(parse_motion(f"{seconds}*({motion})")).recording
+    run = golden.run(spec, PinTrace.of(recording, spec))
+    assert len(run.index) > 3
+    assert not run.ticks.faults[-1]
