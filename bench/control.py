@@ -21,8 +21,8 @@ from tachometry.sim.studies.loops.usable_gain import IDEAL, KINDS, REAL, TASK, T
 DISCS = {"ideal disc": IDEAL, "real disc": REAL}
 SLOW = {
     "0": "constant:0:1200ms",
-    "2 rad/s": "ramp:0:2rad/s:300ms+constant:2:900ms",
-    "10 rad/s": "ramp:0:10rad/s:300ms+constant:10:900ms",
+    "2 rad/s": "ramp:0:2rad/s:300ms+constant:2rad/s:900ms",
+    "10 rad/s": "ramp:0:10rad/s:300ms+constant:10rad/s:900ms",
 }
 SHOWN_TICKS = {1e-3: "1 ms", 1e-4: "100 µs", 20e-6: "20 µs", 1e-6: "1 µs", 20e-9: "one clock, 20 ns"}
 

@@ -30,12 +30,13 @@ from tachometry.spec import AUTO
 
 \b
 Examples:
-  tachometry loop --ppr 500 --motion ramp:0:40:1s+constant:40:2s \\
+  tachometry loop --ppr 500 --motion ramp:0:40rad/s:1s+constant:40rad/s:2s \\
       --load 0.2Nm:2s:500ms --plot loop.png
   tachometry loop --ppr 500 --decoding 1 --tick 1ms --methods s,m,mt \\
       --motion constant:39rad/s:3s --from 1s --vary kv=20,30,40
-  tachometry loop --ppr 500 --motion ramp:0:39:300ms+constant:39:1s \\
-      --from 500ms --load 0.2Nm:800ms:200ms --phase-error 10 \\
+  tachometry loop --ppr 500 --from 500ms \\
+      --motion ramp:0:39rad/s:300ms+constant:39rad/s:1s \\
+      --load 0.2Nm:800ms:200ms --phase-error 10 \\
       --vary tick=1ms,100us,20us --vary kv=40,80 --csv loops.csv""",
 )
 @option(

@@ -33,7 +33,7 @@ Examples:
     "Range",
     "--speeds",
     metavar="LO:HI",
-    help="Speeds of the tables, in rad/s (default), rev/s or rpm; a LO without unit has that of HI. They are shown in "
+    help="Speeds of the tables, in rad/s, rev/s or rpm; a LO without unit has that of HI. They are shown in "
     "--unit, or for count/tick in the unit of HI. "
     "[default: one count in the maximum time to --max-speed, or to ten counts per tick]",
 )
@@ -90,11 +90,11 @@ def _range(spec: TachometerSpec, text: str | None) -> tuple[float, float, str]:
         return *default_range(spec), unit if spec.unit == NATIVE else spec.unit
     low, _, high = (part.strip() for part in text.partition(":"))
     try:
-        last = Speed.parse(high, "rad/s")
+        last = Speed.parse(high)
         first = Speed.parse(low, last.unit)
     except ValueError as error:
         raise ValueError(
-            f"--speeds must be LO:HI, both greater than 0, in rad/s, rev/s or rpm, not {text!r}"
+            f"--speeds must be LO:HI, both greater than 0, in rad/s, rev/s or rpm such as 10:3000rpm, not {text!r}"
         ) from error
     counts = last.ceil_counts(spec.encoder.counts_per_rev, spec.timing.tick_seconds)
     if counts > spec.widths.max_count or last.rad_per_s > spec.scale.greatest_speed * (1 + 1e-12):

@@ -178,7 +178,7 @@ def _at(texts: Texts, clock_hz: int, why: str = "") -> Texts:
     text = texts.get(_CLOCK)
     if text is not None and parse_frequency(_CLOCK, text) != clock_hz:
         raise ParameterError(_CLOCK, f"must be that of the board, {clock_hz} Hz, not {text}{why}")
-    return {**texts, _CLOCK: str(clock_hz)}
+    return {**texts, _CLOCK: parse_frequency.written(clock_hz)}
 
 
 def _common_of_board() -> tuple[click.Option, ...]:

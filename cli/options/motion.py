@@ -29,7 +29,7 @@ Motions, joined by + into one:
   csv:FILE    alone: a table with the header time,angle_rad in s and rad
   counts:FILE:TIME:COUNT  alone, in no loop or sweep: the log of a counter,
               by the names of its columns; see replay --count
-Units: rad/s (default), rev/s, rpm; s (default), ms, us, ns;
+Units: rad/s, rev/s, rpm (0 has none); s (default), ms, us, ns;
   Hz (default), kHz, MHz, GHz."""
 
 

@@ -57,7 +57,7 @@ class Bounce:
         match = re.fullmatch(r"\s*(\d{1,30}):([^:]+)", text, re.ASCII)
         if match is None:
             raise ParameterError("bounce", f"must be COUNT:TIME, such as 3:500us, not {text!r}")
-        return Bounce(int(match[1]), read_nearest("bounce time", match[2], TIME, "s"))
+        return Bounce(int(match[1]), read_nearest("bounce time", match[2], TIME))
 
 
 @dataclass(frozen=True)

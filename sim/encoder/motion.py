@@ -218,7 +218,7 @@ class Vibration:
         if not colon or ":" in frequency:
             raise ParameterError("vibration", f"must be AMPLITUDE:FREQUENCY, not {text!r}")
         return Vibration(
-            read_nearest("vibration amplitude", amplitude, ANGLE, "rad"),
+            read_nearest("vibration amplitude", amplitude, ANGLE),
             read_nearest("vibration frequency", frequency, FREQUENCY, "Hz"),
         )
 
@@ -252,7 +252,7 @@ def parse_motion(text: str) -> Motion:
         trapezoid:SPEED:ACCEL_TIME:HOLD_TIME, s-curve:FROM:TO:TIME (the acceleration is a raised cosine), stop:TIME.
         N*(...) repeats segments. Or csv:FILE alone: a table with the header `time,angle_rad` (seconds, rad) between
         whose rows the angle is interpolated linearly; its first time becomes 0.
-        Speeds are in rad/s (default), rev/s or rpm, times in s (default), ms, us or ns, frequencies in Hz (default),
+        Speeds are 0, or in rad/s, rev/s or rpm, times in s (default), ms, us or ns, frequencies in Hz (default),
         kHz, MHz or GHz.
 
     Raises
@@ -280,7 +280,8 @@ def _parse_segment(text: str) -> list[_Segment]:
     values = []
     for (name, units), number in zip(fields.items(), numbers, strict=True):
         default = next(iter(units))
-        value = read_nearest(f"{name} of {kind}", number, units, default)
+        plain = "" if units is SPEED and number.strip() not in ("0", "0.0") else default  # 300 may be rad/s or rpm
+        value = read_nearest(f"{name} of {kind}", number, units, plain)
         if units is not SPEED and value <= 0:
             raise ValueError(f"{name} of {kind} must be more than 0 {default}, not {number!r}")
         values.append(value)

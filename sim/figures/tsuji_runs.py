@@ -105,7 +105,7 @@ def fig09(lab: Lab) -> Result:
     """Compute fig. 9: velocity measurement with alternate pulse alteration."""
     m = MTachometer(**_CORE)  # type: ignore[arg-type]
     plain, cancelled = (STachometer(cancel=cancel, **_CORE) for cancel in (False, True))  # type: ignore[arg-type]
-    encoding = lab.turn(m, "ramp:12.3:12.9rad/s:1s", vibration="0.5mrad:170Hz", nonuniformity=0.2)
+    encoding = lab.turn(m, "ramp:12.3rad/s:12.9rad/s:1s", vibration="0.5mrad:170Hz", nonuniformity=0.2)
     runs = [lab.golden(spec, encoding) for spec in (m, plain, cancelled)]
     instants = np.arange(0.05, 1, TICK)
     truth = encoding.motion_speed(instants)
@@ -165,7 +165,7 @@ def fig09(lab: Lab) -> Result:
 def fig12(lab: Lab) -> Result:
     """Compute fig. 12: velocity measurement on each method; hardware and golden models in lockstep."""
     specs = _methods()
-    encoding = lab.turn(next(iter(specs.values())), "ramp:0:40rad/s:1s+constant:40rad/s:200ms+ramp:40:0rad/s:800ms")
+    encoding = lab.turn(next(iter(specs.values())), "ramp:0:40rad/s:1s+constant:40rad/s:200ms+ramp:40rad/s:0:800ms")
     duration = encoding.recording.duration
     instants = np.arange(0.02, duration - TICK / 2, TICK)
     truth = encoding.true_speed(instants)

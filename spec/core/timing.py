@@ -48,7 +48,7 @@ def _tick(what: str, text: str, timing: Mapping[str, Any]) -> int:
 
 def _of_frequency(what: str, text: str, timing: Mapping[str, Any]) -> int:
     _check_clock(timing["clock_hz"])
-    hertz = read_exactly(what, text, FREQUENCY, "Hz")
+    hertz = read_exactly(what, text, FREQUENCY)
     if hertz <= 0:
         raise ParameterError(what, f"must be greater than 0, not {text}")
     return _check_tick(_whole(what, text, 1 / hertz, Fraction(1, timing["clock_hz"]), "clock"))
@@ -93,7 +93,7 @@ class Timing:
 
     clock_hz: int = option(
         REQUIRED,
-        "Clock of the core, in Hz, kHz, MHz or GHz; a plain number is Hz.",
+        "Clock of the core, in Hz, kHz, MHz or GHz.",
         text="48MHz",
         name="clock",
         metavar="FREQUENCY",

@@ -56,6 +56,7 @@ def _decimal(**exponents: int) -> dict[str, Unit]:
 
 
 CLOCKS = "clk"
+PLAIN_HERTZ = 1_000_000  # from here on a number without a unit is no frequency in kHz or MHz
 TIME = _decimal(s=0, ms=-3, us=-6, ns=-9)
 FREQUENCY = _decimal(Hz=0, kHz=3, MHz=6, GHz=9)
 SPEED = {"rad/s": Unit(), "rev/s": Unit(pi=Fraction(2)), "rpm": Unit(pi=Fraction(1, 30))}
@@ -98,7 +99,9 @@ def read_quantity(what: str, text: str, units: Units, default: str = "", also: s
         allowed = f"in {names} (default {default})" if default else f"with one of the units {names}"
         if "" in units:
             allowed = names and f"or one in {names}"
-        raise ParameterError(what, f"{' '.join(filter(None, ('must be a number', allowed, also)))}, not {text!r}")
+        typed = [f"{match[1]}{name}" for name in units] if match and not match[3] else []
+        hint = f": type {', '.join(typed[:-1])} or {typed[-1]}" if typed and not also else ""
+        raise ParameterError(what, f"{' '.join(filter(None, ('must be a number', allowed, also)))}{hint}, not {text!r}")
     value = Fraction(match[1]) / int(match[2] or 1)
     if value and not _LEAST <= abs(value) <= _GREATEST:
         raise ParameterError(what, f"must be of a size from 1e-30 to 1e30, not {text!r}")
@@ -204,7 +207,7 @@ def parse_time(what: str, text: str) -> Fraction:
 
 
 class _Frequency:
-    """Reads hertz in a text such as `48MHz`, a whole number; a plain number is hertz.
+    """Reads hertz in a text such as `48MHz`, a whole number; a plain number is hertz, if it can be nothing else.
 
     Raises
     ------
@@ -213,7 +216,8 @@ class _Frequency:
     """
 
     def __call__(self, what: str, text: str | int) -> int:
-        hertz = read_exactly(what, str(text), FREQUENCY, "Hz")
+        plain = re.fullmatch(r"\s*\d{1,30}\s*", str(text), re.ASCII) and not 0 < int(text) < PLAIN_HERTZ
+        hertz = read_exactly(what, str(text), FREQUENCY, "Hz" if plain else "")
         if hertz.denominator != 1 or hertz <= 0:
             raise ParameterError(what, f"must be a positive whole number of Hz, not {text!r}")
         return int(hertz)

@@ -17,7 +17,7 @@ FORWARD = [(0, 0), (1, 0), (1, 1), (0, 1)]
 
 
 GOLDEN = {
-    "motion": "ramp:0:400rad/s:50ms+sine:100:35Hz:100ms+stop:20ms+constant:-300rpm:80ms",
+    "motion": "ramp:0:400rad/s:50ms+sine:100rad/s:35Hz:100ms+stop:20ms+constant:-300rpm:80ms",
     "vibration": Vibration(1e-3, 487.0),
     "nonuniformity": 0.2,
     "jitter": 0.07,

@@ -17,7 +17,7 @@ from tachometry.sim.studies import verify as study
 from tachometry.sim.studies.pairs import AXES, core_of
 
 CORE = "--method s --ppr 25 --clock 20kHz --tick 2ms --max-time 8ms --max-speed 100rad/s --engine pysim".split()
-MOTIONS = "ramp:0:60:100ms,constant:-40:100ms"
+MOTIONS = "ramp:0:60rad/s:100ms,constant:-40rad/s:100ms"
 
 
 def rows(capsys: pytest.CaptureFixture[str]) -> list[str]:
@@ -79,7 +79,7 @@ def test_what_the_reader_says_of_an_axis_is_printed(tmp_path: Path, capsys: pyte
 
 def test_edges_that_are_too_close_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     core = "--ppr 25 --clock 2kHz --tick 20ms --max-time 80ms --engine pysim --axes 3".split()
-    assert run("simulate", *core, "--motion", "constant:60:100ms,stop:100ms") == 0
+    assert run("simulate", *core, "--motion", "constant:60rad/s:100ms,stop:100ms") == 0
     assert "WARNING: axis 0: " in (told := capsys.readouterr().out)
     assert "came within 4 clocks of another, in which an axis is looked at once" in told.replace("\n", " ")
     assert "WARNING: axis 1" not in told

@@ -15,7 +15,7 @@ from tachometry.sim.studies.comparing.rivals import BASELINES
 from tachometry.spec import METHODS, TachometerSpec
 
 CORE = "--ppr 100 --clock 1MHz --tick 1ms --max-time 20ms".split()
-MOTION = ["--motion", "ramp:0:40rad/s:200ms+sine:30:10Hz:200ms"]
+MOTION = ["--motion", "ramp:0:40rad/s:200ms+sine:30rad/s:10Hz:200ms"]
 
 
 def test_all_methods_in_one_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -54,7 +54,10 @@ def test_options_of_methods(capsys: pytest.CaptureFixture[str]) -> None:
         (["--tradeoff", "x.gif"], "file must end in .png, .pdf, .svg or .csv"),
         (["--methods", "hostmot2:x=1"], "options of hostmot2 must be of period, not 'x'"),
         (["--motion", "stop:1us", "--methods", "difference,hostmot2:x=1"], "options of hostmot2 must be of period"),
-        (["--methods", "hostmot2:period=1"], "period must be a number with one of the units s, ms, us, ns, not '1'"),
+        (
+            ["--methods", "hostmot2:period=1"],
+            "period must be a number with one of the units s, ms, us, ns: type 1s,",
+        ),
         (["--methods", "hostmot2:period=0s"], "control period must be more than 0 s, not 0.0 s"),
         (["--methods", "kalman:order=4"], "order of the filter must be 2 or 3, not 4"),
         (["--tune", "--from", "2s"], "--motion must last longer than --from, not 400ms"),

@@ -52,7 +52,7 @@ def test_a_mismatch_of_the_hardware_is_told(
 ) -> None:
     """A golden model with a fault, on a short run: the hardware differs, and the exit status is 1."""
     turn = Lab.turn
-    monkeypatch.setattr(Lab, "turn", lambda lab, spec, motion, **more: turn(lab, spec, "ramp:0:40:400ms", **more))
+    monkeypatch.setattr(Lab, "turn", lambda lab, spec, motion, **more: turn(lab, spec, "ramp:0:40rad/s:400ms", **more))
     true_quotient = round_quotient
     monkeypatch.setattr(m_method, "round_quotient", lambda *args: true_quotient(*args) + 1)
     assert run("--only", "tsuji12", "-o", tmp_path) == 1

@@ -158,7 +158,7 @@ def test_baud_reaches_the_bus(words: str, baud: int, cycles: int, tmp_path: Path
         ("", "--ppr must be given, or --lines, or --cpr"),
         ("--ppr 9 --decoding 3", "--decoding must be 1, 2 or 4, or x1, x2 or x4, not '3'"),
         ("--ppr 9 --method x", "--method must be one of auto, s, m, t, mt, rairan, track, not 'x'"),
-        ("--ppr 9 --clock 48", "--tick must be a whole number of clocks, not 20us"),
+        ("--ppr 9 --clock 48Hz", "--tick must be a whole number of clocks, not 20us"),
         ("--ppr 9 --clock 48mxz", "--clock must be a number in Hz, kHz, MHz, GHz (default Hz), not '48mxz'"),
         ("--ppr 9 --clock 0Hz", "--clock must be a positive whole number of Hz, not '0Hz'"),
         ("--ppr 9 --tick 20clk --max-time 1s", "--max-time, in ticks, must be from 2 to 1048576, not 2400000"),

@@ -14,7 +14,7 @@ from tachometry.sim.engines.loop import COLUMNS
 from tachometry.sim.studies.sweeping import cluster
 
 CORE = "--methods s --ppr 500 --clock 48MHz --tick 20us --max-time 10ms".split()
-SHORT = [*CORE, "--motion", "ramp:0:4:30ms+constant:4:50ms", "--from", "40ms"]
+SHORT = [*CORE, "--motion", "ramp:0:4rad/s:30ms+constant:4rad/s:50ms", "--from", "40ms"]
 
 
 def run(*args: object) -> int:
@@ -29,7 +29,7 @@ def test_one_loop_and_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[st
     table = capsys.readouterr().out.splitlines()
     assert table[0].split()[:4] == ["seed", "RMS", "error", "(rad/s)"]
     assert [line.split()[0] for line in table[1:4]] == ["7", "8", "mean"]
-    assert table[5] == "s; ramp:0:4:30ms+constant:4:50ms"
+    assert table[5] == "s; ramp:0:4rad/s:30ms+constant:4rad/s:50ms"
     for path in (tmp_path / "one").iterdir():
         assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes(), path.name
     with (tmp_path / "one" / "log.csv").open() as file:

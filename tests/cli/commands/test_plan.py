@@ -133,7 +133,7 @@ def test_plain_averaging_has_the_wider_bound(capsys: pytest.CaptureFixture[str])
 @pytest.mark.parametrize(
     ("text", "first", "last"),
     [
-        ("10:100", "10 rad/s", "100 rad/s"),
+        ("10:100rad/s", "10 rad/s", "100 rad/s"),
         ("1:2rev/s", "1 rev/s", "2 rev/s"),
         ("600rpm:20rev/s", "10 rev/s", "20 rev/s"),
         (" 1e1rpm : 75rev/s ", "0.166667 rev/s", "75 rev/s"),  # exactly the greatest speed
@@ -206,20 +206,26 @@ finally:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ("--speeds 5", "--speeds must be LO:HI, both greater than 0, in rad/s, rev/s or rpm, not '5'"),
+        (
+            "--speeds 5",
+            "--speeds must be LO:HI, both greater than 0, in rad/s, rev/s or rpm such as 10:3000rpm,",
+        ),
         ("--speeds :", "--speeds must be LO:HI, both greater than 0"),
-        ("--speeds 1:2:3", "--speeds must be LO:HI, both greater than 0, in rad/s, rev/s or rpm, not '1:2:3'"),
+        (
+            "--speeds 1:2:3",
+            "--speeds must be LO:HI, both greater than 0, in rad/s, rev/s or rpm such as",
+        ),
         ("--speeds 0:5rpm", "--speeds must be LO:HI, both greater than 0"),
         ("--speeds -1:5rpm", "--speeds must be LO:HI, both greater than 0"),
         ("--speeds 1m/s:5rpm", "--speeds must be LO:HI, both greater than 0"),
         ("--speeds nan:inf", "--speeds must be LO:HI, both greater than 0"),
-        ("--speeds 5:5", "--speeds must be LO:HI with LO less than HI, not '5:5'"),
+        ("--speeds 5:5rad/s", "--speeds must be LO:HI with LO less than HI, not '5:5rad/s'"),
         ("--speeds 50:5rpm", "--speeds must be LO:HI with LO less than HI, not '50:5rpm'"),
         ("--speeds 1:75.01rev/s", "--speeds must be at most 3 counts per tick (75rev/s), the most that this core"),
-        ("--speeds 1:1e29", "--speeds must be at most 3 counts per tick (471.239rad/s)"),
+        ("--speeds 1:1e29rad/s", "--speeds must be at most 3 counts per tick (471.239rad/s)"),
         ("--speeds 1:1e999", "--speeds must be LO:HI, both greater than 0"),
         ("--speeds 1e999:1", "--speeds must be LO:HI, both greater than 0"),
-        ("--speeds 1e-29:1", "--speeds must be at least 1.5708e-07rad/s, not '1e-29:1'"),
+        ("--speeds 1e-29:1rad/s", "--speeds must be at least 1.5708e-07rad/s, not '1e-29:1rad/s'"),
         ("--speeds 1e-9:1rpm", "--speeds must be at least 1.5e-06rpm, not '1e-9:1rpm'"),
         ("--max-speed 1e999rpm", "--max-speed must be of a size from 1e-30 to 1e30, not '1e999rpm'"),
         ("--max-time 1us", "--max-time must be a whole number of ticks"),
@@ -227,7 +233,7 @@ finally:
         ("--plot {new}/p.png --csv {new}/p.png", "--plot and --csv must be different files, not both {new}/p.png"),
         ("--csv {new}/..", "--csv must be a file, which"),
         ("--plot {new}/p.png --csv {new}/../file/p.csv", "file/p.csv: Not a directory"),
-        ("--csv {new}/p.csv --speeds 2:1", "--speeds must be LO:HI with LO less than HI"),
+        ("--csv {new}/p.csv --speeds 2:1rad/s", "--speeds must be LO:HI with LO less than HI"),
         ("--motion stop:1s", "No such option '--motion'"),
     ],
 )

@@ -24,11 +24,11 @@ CORE = "--ppr 100 --clock 20kHz --tick 1ms --max-time 10ms".split()
 
 
 def recorded() -> Recording:
-    return VirtualEncoder(100).record(parse_motion("ramp:0:20:100ms")).recording
+    return VirtualEncoder(100).record(parse_motion("ramp:0:20rad/s:100ms")).recording
 
 
 def test_a_saved_capture_gives_the_same_trace(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = "--motion ramp:-10:20:200ms --jitter 0.2 --illegal 0.01 --vibration 1mrad:80Hz --seed 5".split()
+    options = "--motion ramp:-10rad/s:20rad/s:200ms --jitter 0.2 --illegal 0.01 --vibration 1mrad:80Hz --seed 5".split()
     names = {"--trace": "t.csv", "--counts": "c.csv", "--save-capture": "s.sr", "--vcd": "v.vcd"}
 
     def outputs(folder: str) -> list[str]:
@@ -160,7 +160,7 @@ def test_the_guide(
 def test_samplerate(tmp_path: Path) -> None:
     write_sr(tmp_path / "c.sr", recorded().place(20_000), 20_000)
     assert run("replay", tmp_path / "c.sr", *CORE, "--samplerate", "20kHz") == 0
-    assert run("replay", tmp_path / "c.sr", *CORE, "--samplerate", "20000") == 0
+    assert run("replay", tmp_path / "c.sr", *CORE, "--samplerate", "20kHz") == 0
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ from tachometry.spec import Encoder, STachometer, Timing
 
 CORE = "--ppr 100 --clock 20kHz --tick 1ms --max-time 10ms".split()
 FEW_CLOCKS = ("--engine", "pysim")  # fewer than a core is worth compiling for
-MOTION = ["--motion", "ramp:0:20:200ms+stop:50ms+constant:-15:100ms"]
+MOTION = ["--motion", "ramp:0:20rad/s:200ms+stop:50ms+constant:-15rad/s:100ms"]
 OUTPUTS = {"--vcd": "v.vcd", "--plot": "p.png", "--trace": "t.csv", "--counts": "c.csv", "--save-capture": "s.sr"}
 COMMAND = [sys.executable, "-c", "from tachometry.cli.main import main; main()"]
 SPEC = STachometer(encoder=Encoder(100), timing=Timing(20_000, 20, 10))
@@ -102,7 +102,7 @@ def test_counts_have_a_row_per_tick(tmp_path: Path, golden_run: Run) -> None:
 
 
 def test_events_have_a_row_each(tmp_path: Path) -> None:
-    options = "--motion constant:40:400ms --illegal 0.05 --seed 3 --index".split()
+    options = "--motion constant:40rad/s:400ms --illegal 0.05 --seed 3 --index".split()
     assert run("simulate", *CORE, *options, "--events", tmp_path / "e.csv") == 0
     with (tmp_path / "e.csv").open(newline="") as file:
         rows = list(csv.reader(file))
@@ -129,7 +129,7 @@ def test_no_update_no_error_statistics(capsys: pytest.CaptureFixture[str]) -> No
 
 
 def test_counts_that_are_lost_are_told(capsys: pytest.CaptureFixture[str]) -> None:
-    options = "--motion constant:20:200ms --illegal 0.05 --seed 3".split()
+    options = "--motion constant:20rad/s:200ms --illegal 0.05 --seed 3".split()
     assert run("simulate", *CORE, *options) == 0
     table = summary(capsys.readouterr().out)
     out, lost = table["counts out"].split()
@@ -141,7 +141,7 @@ def test_counts_that_are_lost_are_told(capsys: pytest.CaptureFixture[str]) -> No
 
 
 def test_pulses_that_are_missed_are_told(capsys: pytest.CaptureFixture[str]) -> None:
-    options = "--motion constant:20:200ms --lost 0.05 --seed 3".split()
+    options = "--motion constant:20rad/s:200ms --lost 0.05 --seed 3".split()
     assert run("simulate", *CORE, *options) == 0
     table = summary(capsys.readouterr().out)
     edges, missed = table["edges lost"].split(" ", 1)
@@ -177,14 +177,14 @@ def test_every_imperfection_reaches_the_pins_and_so_does_the_index(tmp_path: Pat
 
 
 def test_overflow_is_told(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("simulate", *CORE, "--motion", "constant:100:20ms", "--max-speed", "50rad/s", *FEW_CLOCKS) == 0
+    assert run("simulate", *CORE, "--motion", "constant:100rad/s:20ms", "--max-speed", "50rad/s", *FEW_CLOCKS) == 0
     assert "faster than --max-speed" in summary(capsys.readouterr().out)["overflow"]
 
 
 @pytest.mark.parametrize("suffix", [".png", ".pdf"])
 def test_plots(suffix: str, tmp_path: Path) -> None:
     for name in ("one", "two"):
-        assert run("simulate", *CORE, "--motion", "ramp:0:20:50ms", "--plot", tmp_path / f"{name}{suffix}") == 0
+        assert run("simulate", *CORE, "--motion", "ramp:0:20rad/s:50ms", "--plot", tmp_path / f"{name}{suffix}") == 0
     one, two = (tmp_path / f"{name}{suffix}" for name in ("one", "two"))
     assert one.read_bytes() == two.read_bytes()
     assert b"matplotlib v" not in one.read_bytes().lower()
@@ -192,7 +192,7 @@ def test_plots(suffix: str, tmp_path: Path) -> None:
 
 
 def test_equal_options_give_equal_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = ["simulate", *CORE, "--motion", "ramp:0:20:100ms", "--jitter", "0.1", "--vibration", "1mrad:50Hz"]
+    options = ["simulate", *CORE, "--motion", "ramp:0:20rad/s:100ms", "--jitter", "0.1", "--vibration", "1mrad:50Hz"]
     for name in ("one", "two"):
         assert run(*options, *all_outputs(tmp_path / name)) == 0
     out = capsys.readouterr().out
@@ -210,7 +210,7 @@ def test_equal_options_give_equal_files(tmp_path: Path, capsys: pytest.CaptureFi
 
 def test_another_seed_gives_another_trace(tmp_path: Path) -> None:
     for seed in "01":
-        options = ["--motion", "constant:20:100ms", "--jitter", "0.3", "--seed", seed]
+        options = ["--motion", "constant:20rad/s:100ms", "--jitter", "0.3", "--seed", seed]
         assert run("simulate", *CORE, *options, "--save-capture", tmp_path / f"{seed}.sr") == 0
     assert (tmp_path / "0.sr").read_bytes() != (tmp_path / "1.sr").read_bytes()
 
@@ -240,11 +240,11 @@ def test_a_mismatch_fails_but_leaves_the_outputs(
     [
         ("", "Missing option '--motion'. (see tachometry simulate --help)"),
         ("--motion jump:1", "--motion segment must be one of constant:SPEED:TIME, ramp:FROM:TO:TIME"),
-        ("--motion constant:1:-1s", "TIME of constant must be more than 0 s, not '-1s'"),
-        ("--motion constant:1:1ms", "--motion must last at least 22 clocks of --clock (1.1ms)"),
+        ("--motion constant:1rad/s:-1s", "TIME of constant must be more than 0 s, not '-1s'"),
+        ("--motion constant:1rad/s:1ms", "--motion must last at least 22 clocks of --clock (1.1ms)"),
         ("--motion csv:{new}/none.csv", "motion file '{new}/none.csv' cannot be read: No such file or directory"),
         ("--motion stop:1s --vibration 1", "--vibration must be AMPLITUDE:FREQUENCY, not '1'"),
-        ("--motion stop:1s --vibration 0:1Hz", "--vibration amplitude must be more than 0"),
+        ("--motion stop:1s --vibration 0rad:1Hz", "--vibration amplitude must be more than 0"),
         ("--motion stop:1s --jitter 0.5", "--jitter must be from 0 to less than 0.5, not 0.5"),
         ("--motion stop:1s --jitter nan", "--jitter must be from 0 to less than 0.5, not nan"),
         ("--motion stop:1s --nonuniformity -1", "--nonuniformity must be from 0 to less than 0.5, not -1.0"),
@@ -260,7 +260,7 @@ def test_a_mismatch_fails_but_leaves_the_outputs(
         ("--motion stop:1s --lost nan", "--lost must be from 0 to 1, not nan"),
         ("--motion stop:1s --seed -1", "--seed must be at least 0, not -1"),
         ("--motion stop:1s --max-time 1ms", "--max-time, in ticks, must be from 2 to 1048576, not 1"),
-        ("--motion constant:1e9:1e9s", "--motion must be of at most 10000000 encoder edges"),
+        ("--motion constant:1e9rad/s:1e9s", "--motion must be of at most 10000000 encoder edges"),
         ("--motion stop:1s --plot {new}/p.jpg", "Invalid value for '--plot': file must end in .png, .pdf or .svg"),
         ("--motion stop:1s --plot {new}/p", "file must end in .png, .pdf or .svg, not '{new}/p'"),
         ("--motion stop:1s --vcd {new}/v.gtkw", "Invalid value for '--vcd': file must end in .vcd"),
@@ -333,7 +333,7 @@ def test_ctrl_c_in_the_simulation(
     ),
 )
 def test_ctrl_c_from_a_terminal_keeps_what_was_simulated(engine: str, end: signal.Signals, tmp_path: Path) -> None:
-    options = [*CORE, "--motion", "constant:20:1000s", "--engine", engine, *all_outputs(tmp_path / "new")]
+    options = [*CORE, "--motion", "constant:20rad/s:1000s", "--engine", engine, *all_outputs(tmp_path / "new")]
     process = subprocess.Popen(
         [*COMMAND, "simulate", *options],
         stdout=subprocess.PIPE,
@@ -357,9 +357,7 @@ def test_ctrl_c_from_a_terminal_keeps_what_was_simulated(engine: str, end: signa
 
 def test_the_glitch_filter_tells_what_it_swallowed(capsys: pytest.CaptureFixture[str]) -> None:
     # Each line changes every 21 clocks or so; some levels hold for less than 18.
-    assert (
-        run("simulate", *CORE, "--motion", "constant:30:200ms", "--jitter", "0.3", "--filter", "18", *FEW_CLOCKS) == 0
-    )
+    assert run("simulate", *CORE, *"--motion constant:30rad/s:200ms --jitter 0.3 --filter 18".split(), *FEW_CLOCKS) == 0
     rows = summary(capsys.readouterr().out)
     assert int(rows["edges swallowed"].split()[0]) > 0
     assert rows["mismatches"] == "0"

@@ -132,13 +132,17 @@ def test_the_hardware_in_lockstep(
     scheduler: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     line = ["--ppr", "20", "--clock", "20kHz", "--tick", "1ms", "--motion", "constant:{speed}:100ms"]
-    line += ["--vary", "speed=5,50", "--methods", "m", "--engine", "pysim", "--results", str(tmp_path / "r.parquet")]
+    line += [
+        *"--vary speed=5rad/s,50rad/s --methods m --engine pysim".split(),
+        "--results",
+        str(tmp_path / "r.parquet"),
+    ]
     assert run(*line, *scheduler) == 0
     assert capsys.readouterr().out.endswith(
         "PASS: hardware and golden model agree in every bit of 2 points, 4000 clocks\n"
     )
     assert [(row["engine"], row["mismatches"]) for row in rows(tmp_path / "r.parquet")] == [("pysim", 0)] * 2
-    assert run(*("speed=5" if word == "speed=5,50" else word for word in line), *scheduler) == 0
+    assert run(*("speed=5rad/s" if word == "speed=5rad/s,50rad/s" else word for word in line), *scheduler) == 0
     told = capsys.readouterr().out
     assert "\n1 point, none run anew; " in told
     assert "in every bit of 1 point, 2000 clocks" in told
@@ -176,7 +180,7 @@ BAD = [
     (["--vary", "seed=1", "--seed", "2"], "--seed must be given or varied, not both"),
     (["--motion", "constant:{speed}:1us"], "--motion must last at least 102 clocks of --clock (102us)"),
     (["--frobnicate"], "No such option"),
-    (["--vary", "speed=1", "--tick", "1ms", "--plot", "x.png"], "--vary must be given together with --plot"),
+    (["--vary", "speed=1rad/s", "--tick", "1ms", "--plot", "x.png"], "--vary must be given together with --plot"),
     (["--axes", "speed,seed", "--plot", "x.png"], "--axes must be one or two of speed, tick, not 'speed,seed'"),
     (
         ["--from", "1s"],
@@ -251,10 +255,10 @@ def test_what_fails_on_the_way_is_told_and_the_rest_is_kept(
     scheduler: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     line = [*CORE, *MOTION, "--methods", "m", *scheduler, "--results", tmp_path / "r.parquet"]
-    assert run(*line, "--vary", "speed=1e12,5,1e13") == 2
+    assert run(*line, "--vary", "speed=1e12rad/s,5rad/s,1e13rad/s") == 2
     err = capsys.readouterr().err
     assert err.startswith("tachometry: error: --motion must be of at most 10000000 encoder edges")
-    assert re.search(r" \(method m, motion constant:1e1[23]:100ms\); 2 of 3 points could not be run\n$", err)
+    assert re.search(r" \(method m, motion constant:1e1[23]rad/s:100ms\); 2 of 3 points could not be run\n$", err)
     assert [row["speed"] for row in rows(tmp_path / "r.parquet")] == [5]
 
 

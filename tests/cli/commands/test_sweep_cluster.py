@@ -17,7 +17,7 @@ from support.nightly import nightly, only
 COMMAND = [sys.executable, "-c", "from tachometry.cli.main import main; main()", "sweep"]
 SWEEP = [
     *"--ppr 100 --clock 1MHz --tick 1ms --max-time 20ms --jitter 0.1 --motion constant:{speed}:50ms".split(),
-    *"--methods s,m --vary speed=1..100:50".split(),
+    *"--methods s,m --vary speed=1rad/s..100rad/s:50".split(),
 ]
 POINTS = 100
 
@@ -197,9 +197,9 @@ def test_a_point_that_no_worker_outlives(tmp_path: Path) -> None:
         "DASK_DISTRIBUTED__WORKER__PRELOAD": f'["{script}"]',
         "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0",
     }
-    words = [*COMMAND, *SWEEP[:-2], "--methods", "m", "--vary", "speed=5", "--jobs", "1"]
+    words = [*COMMAND, *SWEEP[:-2], "--methods", "m", "--vary", "speed=5rad/s", "--jobs", "1"]
     done = subprocess.run(words, env=os.environ | more, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith("tachometry: error: every worker died at the point of m on constant:5:50ms: ")
+    assert done.stderr.startswith("tachometry: error: every worker died at the point of m on constant:5rad/s:50ms: ")
     assert done.stderr.endswith("; 1 of 1 point could not be run\n")
     assert done.stderr.count("\n") == 1

@@ -20,10 +20,14 @@ REFUSED = {
     ("--kp", "-1"): "--kp must be at least 0, not -1",
     ("--kp", "1e13"): "--kp must be of a size from 1e-12 to 1e12, not 1e+13",
     ("--observer", "0rad/s"): "--observer must be greater than 0, not 0",
-    ("--observer", "160"): "--observer must be a number with one of the units rad/s, Hz, kHz, MHz, GHz, not '160'",
+    (
+        "--observer",
+        "160",
+    ): "--observer must be a number with one of the units rad/s, Hz, kHz, MHz, GHz: type 160rad/s, 160Hz, 160kHz, "
+    "160MHz or 160GHz, not '160'",
     ("--velocity-filter", "-3Hz"): "--velocity-filter must be greater than 0, not -18.8495559",
     ("--inertia", "1e9"): "--inertia must be of a size from 1e-12 to 1e6, not 1e+09",
-    ("--current-limit", "5"): "--current-limit must be a number with one of the units A, mA, not '5'",
+    ("--current-limit", "5"): "--current-limit must be a number with one of the units A, mA: type 5A or 5mA, not '5'",
 }
 
 

@@ -186,7 +186,7 @@ def test_each_fault_is_told_in_time(fault: dict[str, Any], code: Fault, within: 
 def test_clean_motion_on_a_real_disc_has_no_fault(seconds: int) -> None:
     spec = of_texts("m", CORE)
     encoder = VirtualEncoder(500, index=True, seed=5, **REAL)
-    motion = "ramp:0:100:200ms+ramp:100:-100:300ms+sine:20:5Hz:400ms+constant:0.5:100ms"
+    motion = "ramp:0:100rad/s:200ms+ramp:100rad/s:-100rad/s:300ms+sine:20rad/s:5Hz:400ms+constant:0.5rad/s:100ms"
     recording = encoder.record(parse_motion(f"{seconds}*({motion})")).recording
     run = golden.run(spec, PinTrace.of(recording, spec))
     assert len(run.index) > 3

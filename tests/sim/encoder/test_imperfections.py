@@ -51,7 +51,7 @@ def test_jitter_has_the_given_deviation() -> None:
 
 
 def test_jitter_keeps_the_order_of_edges() -> None:
-    motion = "sine:30:7Hz:1s"
+    motion = "sine:30rad/s:7Hz:1s"
     parameters = {"vibration": Vibration(2e-3, 333), "nonuniformity": 0.4}
     ideal, shaken = (record(motion, jitter=jitter, **parameters).recording for jitter in (0, 0.499))
     gap = np.diff(ideal.time, append=ideal.duration)
@@ -71,12 +71,12 @@ def test_jitter_keeps_edges_within_the_recording() -> None:
 
 def test_jitter_is_no_part_of_the_truth() -> None:
     t = np.linspace(0, 1, 999)
-    still, shaken = (record("constant:5:1s", jitter=jitter).true_position(t) for jitter in (0, 0.3))
+    still, shaken = (record("constant:5rad/s:1s", jitter=jitter).true_position(t) for jitter in (0, 0.3))
     assert np.array_equal(still, shaken)
 
 
 def test_a_longer_motion_begins_with_the_same_noise() -> None:
-    short, long = (record(f"constant:5:{t}s", jitter=0.1, illegal=0.1).recording for t in (1, 2))
+    short, long = (record(f"constant:5rad/s:{t}s", jitter=0.1, illegal=0.1).recording for t in (1, 2))
     n = len(short.time) - 3  # the end of the recording is a neighbour of the last edge
     np.testing.assert_allclose(short.time[:n], long.time[:n], rtol=1e-14)
 
@@ -177,7 +177,7 @@ def test_phase_and_duty_as_data_sheets_measure_them(phase: float, duty: float, d
 
 def test_phase_and_duty_are_of_the_disc() -> None:
     parameters = {"phase_error_deg": 40, "duty_error_deg": -25, "nonuniformity": 0.13, "seed": 4}
-    encoding = record("ramp:30:-40:1s+sine:9:3Hz:1s", **parameters)
+    encoding = record("ramp:30rad/s:-40rad/s:1s+sine:9rad/s:3Hz:1s", **parameters)
     t = np.linspace(0, 2, 9999)
     assert np.array_equal(decoded_at(encoding, t, 4), encoding.true_position(t))
     assert np.all(np.diff(encoding.recording.time) > 0)
@@ -197,7 +197,7 @@ def test_the_narrowest_state_never_vanishes() -> None:
 
 
 def test_bounce_is_chatter_after_each_edge() -> None:
-    ideal, bouncing = (record("ramp:0:30:100ms", seed=9, bounce=b) for b in (None, Bounce(3, 50e-6)))
+    ideal, bouncing = (record("ramp:0:30rad/s:100ms", seed=9, bounce=b) for b in (None, Bounce(3, 50e-6)))
     time, level = bouncing.recording.time, bouncing.recording.level
     assert len(time) == 1 + 7 * (len(ideal.recording.time) - 1)
     rows = np.arange(1, len(time)).reshape(-1, 7)
@@ -227,7 +227,7 @@ def golden_run(encoding: Encoding, clock_hz: int, filter_clocks: int = 0) -> tup
 def test_the_core_comes_out_even_after_bounce(filter_clocks: int) -> None:
     # 1 us clocks, an edge every 160 or more, chatter over 20 of them
     parameters = {"bounce": Bounce(4, 20e-6), "jitter": 0.02, "phase_error_deg": 20, "start_angle_rad": 0.5 * PITCH}
-    encoding = record("ramp:1:5:200ms+constant:-5:100ms", **parameters)
+    encoding = record("ramp:1rad/s:5rad/s:200ms+constant:-5rad/s:100ms", **parameters)
     run, true = golden_run(encoding, 1_000_000, filter_clocks)
     assert len(run.errors) == 0
     behind = run.ticks.position - true
@@ -238,7 +238,7 @@ def test_the_core_comes_out_even_after_bounce(filter_clocks: int) -> None:
 
 def test_edges_that_come_together_do_not_bounce() -> None:
     parameters = {"illegal": 0.3, "seed": 2}
-    smooth, bouncing = (record("constant:3:1s", bounce=b, **parameters) for b in (None, Bounce(2, 1e-4)))
+    smooth, bouncing = (record("constant:3rad/s:1s", bounce=b, **parameters) for b in (None, Bounce(2, 1e-4)))
     assert bouncing.n_illegal == smooth.n_illegal == decode(bouncing.recording, 4)[1] > 100
     assert decode(bouncing.recording, 4)[0][-1] == decode(smooth.recording, 4)[0][-1]
     assert len(bouncing.recording.time) == 5 * len(smooth.recording.time) - 4 * (1 + smooth.n_illegal)
@@ -317,7 +317,7 @@ def test_all_together_keep_the_order_of_edges(seed: int) -> None:
     rng = np.random.default_rng(seed)
     room = 90 * rng.dirichlet([1, 1, 1, 0.2])
     encoding = record(
-        "ramp:0:50:50ms+sine:20:35Hz:100ms+constant:-300rpm:80ms",
+        "ramp:0:50rad/s:50ms+sine:20rad/s:35Hz:100ms+constant:-300rpm:80ms",
         vibration=Vibration(2e-3, 487.0),
         nonuniformity=room[0] / 180,
         phase_error_deg=room[1] * rng.choice([-1, 1]),
@@ -378,7 +378,7 @@ def test_bounce_is_of_the_edges_that_a_motion_may_have() -> None:
 
 def test_bounce_is_read_from_text() -> None:
     assert Bounce.parse("3:500us") == Bounce(3, 500e-6)
-    assert Bounce.parse("1:0.002") == Bounce(1, 2e-3)
+    assert Bounce.parse("1:0.002s") == Bounce(1, 2e-3)
 
 
 @pytest.mark.parametrize(
@@ -391,9 +391,9 @@ def test_bounce_is_read_from_text() -> None:
         ("1:1ms:1", "bounce must be COUNT:TIME, such as 3:500us, not '1:1ms:1'"),
         ("0:1ms", "bounce count must be from 1 to 1000, not 0"),
         ("1001:1ms", "bounce count must be from 1 to 1000, not 1001"),
-        ("3:0", "bounce time must be more than 0 s, not 0.0 s"),
+        ("3:0s", "bounce time must be more than 0 s, not 0.0 s"),
         ("3:-1us", "bounce time must be more than 0 s, not -1e-06 s"),
-        ("3:1Hz", "bounce time must be a number in s, ms, us, ns (default s), not '1Hz'"),
+        ("3:1Hz", "bounce time must be a number with one of the units s, ms, us, ns, not '1Hz'"),
     ],
 )
 def test_texts_that_are_no_bounce(text: str, message: str) -> None:

@@ -42,7 +42,7 @@ def test_levels_at_rest_follow_from_the_start_angle(quarter: int) -> None:
 def test_an_angle_on_an_edge_has_passed_it() -> None:
     disc = VirtualEncoder(PPR).disc
     assert disc.quarter(np.array([0.0, PITCH, -PITCH, np.nextafter(0, -1)])).tolist() == [0, 1, -1, -1]
-    assert record("constant:-1:1us").true_position([0, 1e-9]).tolist() == [0, -1]
+    assert record("constant:-1rad/s:1us").true_position([0, 1e-9]).tolist() == [0, -1]
 
 
 def test_ramp_from_standstill() -> None:
@@ -54,7 +54,7 @@ def test_ramp_from_standstill() -> None:
 
 def test_ramp_through_zero_turns_where_the_speed_does() -> None:
     # The apex, 25 rad at 1 s, lies between two points of any grid of ends only.
-    encoding = record("ramp:50:-50:2s", start_angle_rad=PITCH / 2)
+    encoding = record("ramp:50rad/s:-50rad/s:2s", start_angle_rad=PITCH / 2)
     time, position = encoding.recording.time, decode(encoding.recording, 4)[0]
     assert max(position) == math.floor(25 / PITCH + 0.5)
     assert position[-1] == 0
@@ -62,7 +62,7 @@ def test_ramp_through_zero_turns_where_the_speed_does() -> None:
 
 
 def test_turning_point_hidden_by_a_jump_of_the_speed() -> None:
-    encoding = record("ramp:10:-5:1s+constant:10:1s", start_angle_rad=PITCH / 2)
+    encoding = record("ramp:10rad/s:-5rad/s:1s+constant:10rad/s:1s", start_angle_rad=PITCH / 2)
     t = np.linspace(0, 2, 10_001)
     assert np.array_equal(decoded_at(encoding, t, 4), encoding.true_position(t))
     assert encoding.true_position(2 / 3) == math.floor(10 / 3 / PITCH + 0.5)
@@ -72,7 +72,9 @@ def test_turning_back_for_less_than_a_cell_of_the_grid() -> None:
     # 65 cells in a period of vibration: the shaft turns back within one of them, and passes an edge three times.
     amplitude, center = 1000 * PITCH, 0.5
     speed = 2 * math.pi * amplitude * (1 - 2e-4)
-    encoding = record(f"constant:{speed!r}:1.0001s", vibration=Vibration(amplitude, 1), start_angle_rad=-speed * center)
+    encoding = record(
+        f"constant:{speed!r}rad/s:1.0001s", vibration=Vibration(amplitude, 1), start_angle_rad=-speed * center
+    )
     position = np.array(decode(encoding.recording, 4)[0])
     (back,) = np.flatnonzero(np.diff(position) < 0)
     assert encoding.recording.time[back + 1] == pytest.approx(center, abs=1e-6)
@@ -97,7 +99,7 @@ def test_sine_returns() -> None:
 @pytest.mark.parametrize(("past", "edges"), [(-1e-6, 0), (1e-6, 2)])
 def test_touching_an_edge_gives_none_or_two(past: float, edges: int) -> None:
     # The peak of the angle is AMPLITUDE / (pi f).
-    encoding = record(f"sine:{(0.5 + past) * PITCH * math.pi * 10!r}:10Hz:100ms", start_angle_rad=PITCH / 2)
+    encoding = record(f"sine:{(0.5 + past) * PITCH * math.pi * 10!r}rad/s:10Hz:100ms", start_angle_rad=PITCH / 2)
     assert len(encoding.recording.time) == 1 + edges
     assert encoding.true_position(0.05) == edges // 2
 
@@ -114,7 +116,7 @@ def test_vibration_dithers_on_one_edge_at_standstill() -> None:
 
 
 def test_vibration_is_in_the_true_speed_only() -> None:
-    encoding = record("constant:3:1s", vibration=Vibration(1e-3, 50))
+    encoding = record("constant:3rad/s:1s", vibration=Vibration(1e-3, 50))
     t = np.linspace(0, 1, 7)
     assert encoding.motion_speed(t).tolist() == [3] * 7
     np.testing.assert_allclose(encoding.true_speed(t), 3 + 0.1 * math.pi * np.cos(100 * math.pi * t), rtol=1e-12)
@@ -126,11 +128,11 @@ def test_vibration_is_in_the_true_speed_only() -> None:
     [
         ("constant:1rev/s:1s", {}),
         ("constant:-7rad/s:1s", {"nonuniformity": 0.45}),
-        ("ramp:30:-40:1s+stop:10ms+sine:9:3Hz:1s", {"nonuniformity": 0.2, "start_angle_rad": -12.3}),
+        ("ramp:30rad/s:-40rad/s:1s+stop:10ms+sine:9rad/s:3Hz:1s", {"nonuniformity": 0.2, "start_angle_rad": -12.3}),
         ("stop:1s", {"vibration": Vibration(5e-3, 47.3), "start_angle_rad": 0.1}),
         # Here the vibration only just makes the shaft turn back, at first three times a period and then not at all.
-        ("ramp:0.2:0.6:3s", {"vibration": Vibration(1e-3, 60.1), "pulses_per_rev": 50_000}),
-        ("sine:1:2Hz:1s", {"vibration": Vibration(2e-3, 301), "nonuniformity": 0.49, "pulses_per_rev": 5000}),
+        ("ramp:0.2rad/s:0.6rad/s:3s", {"vibration": Vibration(1e-3, 60.1), "pulses_per_rev": 50_000}),
+        ("sine:1rad/s:2Hz:1s", {"vibration": Vibration(2e-3, 301), "nonuniformity": 0.49, "pulses_per_rev": 5000}),
     ],
 )
 def test_truth_is_what_an_ideal_decoder_of_the_lines_sees(

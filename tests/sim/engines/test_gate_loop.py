@@ -23,7 +23,7 @@ from tachometry.spec.language.option import ParameterError
 DOUBLE = replace(
     setting(KINDS[0], 80.0, 20e-6, REAL),
     task=Task(
-        motion=parse_motion("ramp:0:15:100ms+ramp:15:-5:150ms+constant:-5:150ms"),
+        motion=parse_motion("ramp:0:15rad/s:100ms+ramp:15rad/s:-5rad/s:150ms+constant:-5rad/s:150ms"),
         load=Load(torque=0.1, begin=0.3, seconds=0.05),
         noise=0.005,
     ),
@@ -101,7 +101,7 @@ def test_the_core_of_a_setting_has_its_gains() -> None:
 
 
 def test_a_check_counts_what_differs(monkeypatch: pytest.MonkeyPatch) -> None:
-    short = replace(DOUBLE, task=Task(motion=parse_motion("ramp:0:15:60ms+constant:15:20ms"), noise=0.005))
+    short = replace(DOUBLE, task=Task(motion=parse_motion("ramp:0:15rad/s:60ms+constant:15rad/s:20ms"), noise=0.005))
     found = check(short, 1)
     assert (found.ticks, found.mismatches) == (3_999, 0)
     assert found.gates.rms == pytest.approx(found.double.rms, rel=0.05)

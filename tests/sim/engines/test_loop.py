@@ -84,7 +84,9 @@ def test_counts_are_those_of_the_virtual_encoder(encoder: VirtualEncoder) -> Non
     """To and fro at constant acceleration, which is a motion; but for the clocks that a count takes."""
     log = driven(np.repeat([2.0, -2.0, 2.0], [100, 300, 200]), PLAIN, encoder)
     fast = 2 * PLAIN.torque_constant / PLAIN.inertia * 0.1
-    motion = parse_motion(f"ramp:0:{fast!r}:100ms+ramp:{fast!r}:{-2 * fast!r}:300ms+ramp:{-2 * fast!r}:0:200ms")
+    motion = parse_motion(
+        f"ramp:0:{fast!r}rad/s:100ms+ramp:{fast!r}rad/s:{-2 * fast!r}rad/s:300ms+ramp:{-2 * fast!r}rad/s:0:200ms"
+    )
     encoding = replace(encoder, start_angle_rad=encoder.disc.pitch_rad / 2).record(motion)
     time = log["time"][1:] - (S_CORE.latency.pin_to_count + 1) / S_CORE.timing.clock_hz
     expected = encoding.true_position(time) - encoding.true_position(0.0)

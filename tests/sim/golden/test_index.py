@@ -135,7 +135,9 @@ def test_the_index_is_gated_and_leaves_the_lines_alone(seed: int) -> None:
         "pulses_per_rev": 2,
         "seed": seed,
     }
-    bare, indexed = (record("ramp:-200:300:300ms", index=index, **faults).recording for index in (False, True))
+    bare, indexed = (
+        record("ramp:-200rad/s:300rad/s:300ms", index=index, **faults).recording for index in (False, True)
+    )
     lines = indexed.level & 3
     kept = np.append(True, lines[1:] != lines[:-1])
     assert np.array_equal(indexed.time[kept], bare.time)

@@ -36,7 +36,7 @@ def test_times_frequencies_speeds_and_angles_are_read_alike() -> None:
     assert (timing.clock_hz, timing.tick_cycles, timing.max_ticks) == (10**8, 5, 20)
     assert Timing.parse("1GHz", "50ns", "1us").tick_cycles == 50
     assert parse_motion("constant:10rad/s:50ns").duration == 50e-9
-    assert parse_motion("sine:1:1MHz:1us").sine_frequency == 1e6
+    assert parse_motion("sine:1rad/s:1MHz:1us").sine_frequency == 1e6
     assert Bounce.parse("3:50ns").time_s == 50e-9
     assert Vibration.parse("1deg:1GHz").frequency_hz == 1e9
     assert parse_bandwidth("lowpass", "1MHz") == 2 * PI * 10**6

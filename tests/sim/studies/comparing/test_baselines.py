@@ -53,9 +53,11 @@ def steps_at(*times: float, signs: str = "", duration: float = 1.0) -> Steps:
 def random_steps(seed: int) -> Steps:
     random = np.random.default_rng(seed)
     speed = random.normal(0, 1, 8) * 10 ** random.uniform(-0.5, 2.5, 8)
-    motion = "+".join(f"ramp:{a:.3f}:{b:.3f}:60ms" for a, b in zip(speed[:4], speed[4:], strict=True))
+    motion = "+".join(f"ramp:{a:.3f}rad/s:{b:.3f}rad/s:60ms" for a, b in zip(speed[:4], speed[4:], strict=True))
     faults = {"jitter": 0.1, "nonuniformity": 0.2, "illegal": 0.02, "seed": seed, "start_angle_rad": seed / 3}
-    return steps_of(f"{motion}+stop:90ms+sine:{speed[0]:.3f}:40Hz:150ms+constant:{-speed[1]:.3f}:80ms", **faults)
+    return steps_of(
+        f"{motion}+stop:90ms+sine:{speed[0]:.3f}rad/s:40Hz:150ms+constant:{-speed[1]:.3f}rad/s:80ms", **faults
+    )
 
 
 def true_and_measured(motion: str, method: Method, period: float, from_s: float) -> tuple[FloatArray, FloatArray]:
@@ -178,7 +180,7 @@ def test_every_method_is_its_description(seed: int) -> None:
 
 
 def test_steps_are_those_of_the_decoder() -> None:
-    recording = record("sine:30:20Hz:200ms", pulses_per_rev=CPR // 4, illegal=0.05, index=True).recording
+    recording = record("sine:30rad/s:20Hz:200ms", pulses_per_rev=CPR // 4, illegal=0.05, index=True).recording
     for decoding in (1, 2, 4):
         steps = Steps.of_recording(recording, CPR, decoding)
         position, _ = decode(recording, decoding)
@@ -193,7 +195,7 @@ def test_steps_are_those_of_the_decoder() -> None:
 @pytest.mark.parametrize("speed", [0.5, 5, 40, 300, -2000])
 @pytest.mark.parametrize("method", RAW)
 def test_constant_speed(method: Method, speed: float) -> None:
-    _, error = true_and_measured(f"constant:{speed}:1s", method, PERIOD, 0.3)
+    _, error = true_and_measured(f"constant:{speed}rad/s:1s", method, PERIOD, 0.3)
     assert abs(np.mean(error)) < COUNT / 0.7  # the count of 0.7 s is right within one
     if method in (timestamp_method, mixed_method):  # the clock's two roundings, over a period or a count
         clock = {timestamp_method: 0.5e-6, mixed_method: 1e-6}[method]
@@ -204,7 +206,7 @@ def test_constant_speed(method: Method, speed: float) -> None:
 def test_standstill_is_zero_from_the_start_and_after_each_timeout(method: Method) -> None:
     period = 125e-6
     assert not np.any(method(steps_of("stop:200ms"), period).velocity)
-    moved = method(steps_of("constant:30:200ms+stop:600ms"), period)
+    moved = method(steps_of("constant:30rad/s:200ms+stop:600ms"), period)
     at_rest = {finite_difference: 0.2 + 0.15, timestamp_method: 0.2 + 0.5, mixed_method: 0.2 + 0.101}
     assert moved.at(0.2) > 20
     assert np.max(np.abs(moved.velocity[moved.time > at_rest.get(method, 0.2 + 0.02)])) < 1e-9
@@ -212,7 +214,7 @@ def test_standstill_is_zero_from_the_start_and_after_each_timeout(method: Method
 
 @pytest.mark.parametrize(("method", "settled_s"), [*zip(RAW, [1e-3, 3e-3, 2e-3, 20e-3], strict=True)])
 def test_sign_after_reversal(method: Method, settled_s: float) -> None:
-    estimate = method(steps_of("constant:100:300ms+constant:-100:300ms"), PERIOD)
+    estimate = method(steps_of("constant:100rad/s:300ms+constant:-100rad/s:300ms"), PERIOD)
     assert np.all(estimate.velocity[(estimate.time > 0.02) & (estimate.time <= 0.3)] > 0)
     assert np.all(estimate.velocity[estimate.time > 0.3 + settled_s + 1e-9] < 0)
 
@@ -267,10 +269,10 @@ def test_number_of_readings() -> None:
 def test_finite_difference_knows_only_whole_counts_per_period() -> None:
     """Noise of up to a count per period whatever the speed; the filter that tames it delays by its time constant."""
     for speed in (5, 300):
-        estimate = raw_difference(steps_of(f"constant:{speed}:1s"), PERIOD)
+        estimate = raw_difference(steps_of(f"constant:{speed}rad/s:1s"), PERIOD)
         levels = np.unique(np.round(estimate.velocity * PERIOD / COUNT, 6))
         assert levels.tolist() == [speed * PERIOD // COUNT, speed * PERIOD // COUNT + 1]
-    _, error = true_and_measured("ramp:0:1000:500ms", finite_difference, PERIOD, 0.1)
+    _, error = true_and_measured("ramp:0:1000rad/s:500ms", finite_difference, PERIOD, 0.1)
     assert -np.mean(error) / 2000 == pytest.approx(PERIOD / 2 + 5e-3, rel=0.01)
 
 
@@ -283,44 +285,44 @@ def test_finite_difference_knows_only_whole_counts_per_period() -> None:
     ],
 )
 def test_tracking_loop_lags_on_ramps_by_two_over_its_bandwidth(method: Method, period: float, lag_s: float) -> None:
-    _, error = true_and_measured("ramp:-500:500:500ms", method, period, 0.1)
+    _, error = true_and_measured("ramp:-500rad/s:500rad/s:500ms", method, period, 0.1)
     assert -np.mean(error) / 2000 == pytest.approx(lag_s, rel=0.02)
 
 
 def test_tracking_loop_of_whole_counts_dithers() -> None:
     """One count of error for one period adds T ki, 2 rad/s here: slower than half of it, the speed comes in bursts."""
     quantum = 125e-6 * 1000**2 * COUNT
-    truth, error = true_and_measured("constant:0.1:2s", tracking_loop, 125e-6, 0.5)
+    truth, error = true_and_measured("constant:0.1rad/s:2s", tracking_loop, 125e-6, 0.5)
     measured = truth + error
     assert np.mean(measured == 0) > 0.8
     assert np.max(measured) == pytest.approx(quantum)
     assert np.std(error) > 4 * 0.1
-    _, error = true_and_measured("constant:40:1s", tracking_loop, 125e-6, 0.3)
+    _, error = true_and_measured("constant:40rad/s:1s", tracking_loop, 125e-6, 0.3)
     assert 0.4 * quantum < np.std(error) < 0.6 * quantum
 
 
 @pytest.mark.parametrize("method", [timestamp_method, mixed_method])
 def test_timing_single_counts_shows_uneven_slots_in_full(method: Method) -> None:
     """B 20 degrees late: slots of 110 and 70 degrees in place of 90, at a count every 3.1 periods."""
-    steps = steps_of("constant:5:1s", phase_error_deg=20)
+    steps = steps_of("constant:5rad/s:1s", phase_error_deg=20)
     ratio = method(steps, PERIOD).velocity[100:] / 5
     assert np.max(ratio) == pytest.approx(90 / 70, rel=1e-3)
     assert np.min(ratio) == pytest.approx(90 / 110, rel=1e-3)
     assert np.mean((ratio > 1.28) | (ratio < 0.82)) > 0.7
     assert np.std(ratio) == pytest.approx(0.22, abs=0.02)
-    assert np.std(method(steps_of("constant:300:1s", phase_error_deg=20), PERIOD).velocity[100:] / 300) < 0.02
+    assert np.std(method(steps_of("constant:300rad/s:1s", phase_error_deg=20), PERIOD).velocity[100:] / 300) < 0.02
 
 
 def test_timing_counts_shows_no_speed_slower_than_a_count_per_timeout() -> None:
-    assert not np.any(timestamp_method(steps_of(f"constant:{1.9 * COUNT}:5s"), PERIOD).velocity)
-    slow = mixed_method(steps_of(f"constant:{5 * COUNT}:5s"), PERIOD).velocity[1000:]
+    assert not np.any(timestamp_method(steps_of(f"constant:{1.9 * COUNT}rad/s:5s"), PERIOD).velocity)
+    slow = mixed_method(steps_of(f"constant:{5 * COUNT}rad/s:5s"), PERIOD).velocity[1000:]
     assert np.mean(slow == 0) == pytest.approx(0.5, abs=0.02)
     assert np.max(slow) == pytest.approx(5 * COUNT, rel=1e-4)
 
 
 def test_mixed_method_runs_on_after_a_stop() -> None:
     """The last speed is held for the timeout: 0.1 s of travel that was none, where the timestamp bound decays."""
-    steps = steps_of("constant:40:300ms+stop:700ms")
+    steps = steps_of("constant:40rad/s:300ms+stop:700ms")
     for method, at_least, at_most in ((mixed_method, 240, 260), (timestamp_method, 5, 8), (raw_difference, 0, 0)):
         estimate = method(steps, PERIOD)
         travel = np.sum(estimate.velocity[estimate.time > 0.3]) * PERIOD / COUNT
@@ -361,7 +363,8 @@ def test_delay_of_a_shifted_signal(delay_s: float) -> None:
 )
 def test_delay_of_each_method(method: Method, period: float, delay_ms: float) -> None:
     """Of a fine encoder, whose counts are much shorter than a period."""
-    motion = "ramp:0:200:100ms+ramp:200:50:60ms+ramp:50:300:150ms+ramp:300:-100:120ms+ramp:-100:120:90ms"
+    motion = "ramp:0:200rad/s:100ms+ramp:200rad/s:50rad/s:60ms+ramp:50rad/s:300rad/s:150ms"
+    motion += "+ramp:300rad/s:-100rad/s:120ms+ramp:-100rad/s:120rad/s:90ms"
     encoding = record(motion, pulses_per_rev=2000)
     estimate = method(Steps.of_recording(encoding.recording, 8000), period)
     delay = delay_seconds(estimate.time, estimate.velocity, encoding.true_speed(estimate.time))

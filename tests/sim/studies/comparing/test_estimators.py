@@ -24,9 +24,9 @@ COUNT = 2 * math.pi / CPR
 def random_steps(seed: int) -> Steps:
     random = np.random.default_rng(seed)
     speed = random.normal(0, 1, 4) * 10 ** random.uniform(0, 2, 4)
-    motion = "+".join(f"ramp:{a:.3f}:{b:.3f}:60ms" for a, b in zip(speed[:2], speed[2:], strict=True))
+    motion = "+".join(f"ramp:{a:.3f}rad/s:{b:.3f}rad/s:60ms" for a, b in zip(speed[:2], speed[2:], strict=True))
     recording = record(
-        f"{motion}+stop:150ms+sine:{speed[0]:.3f}:20Hz:90ms", pulses_per_rev=CPR // 4, jitter=0.05, seed=seed
+        f"{motion}+stop:150ms+sine:{speed[0]:.3f}rad/s:20Hz:90ms", pulses_per_rev=CPR // 4, jitter=0.05, seed=seed
     ).recording
     return Steps.of_recording(recording, CPR)
 
@@ -190,7 +190,7 @@ def test_kalman_filter_in_matrices(order: int, noise: float) -> None:
 
 
 def test_kalman_filter_with_acceleration_does_not_lag_on_a_ramp() -> None:
-    encoding = record("ramp:0:400:500ms", pulses_per_rev=CPR // 4)
+    encoding = record("ramp:0:400rad/s:500ms", pulses_per_rev=CPR // 4)
     steps = Steps.of_recording(encoding.recording, CPR)
     lags = []
     for order, noise in ((2, 200.0), (3, 4e4)):

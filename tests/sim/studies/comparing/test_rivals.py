@@ -8,7 +8,7 @@ from tachometry.sim.studies.comparing.baselines import Steps, low_pass, mixed_me
 from tachometry.sim.studies.comparing.estimators import kalman
 from tachometry.sim.studies.comparing.rivals import BASELINES, baseline_curve, baseline_model, settings
 
-RECORDING = record("ramp:0:100:60ms", pulses_per_rev=100).recording
+RECORDING = record("ramp:0:100rad/s:60ms", pulses_per_rev=100).recording
 STEPS = Steps.of_recording(RECORDING, 400)
 
 

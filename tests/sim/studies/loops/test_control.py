@@ -80,7 +80,7 @@ def test_the_speed_as_it_is_shown_is_filtered_by_30_rad_per_s() -> None:
 
 def test_a_load_may_be_a_torque_or_a_current() -> None:
     load = Load(torque=0.0603, begin=0.01, seconds=0.02)
-    task = Task(motion=parse_motion("ramp:0:10:50ms"), load=load)
+    task = Task(motion=parse_motion("ramp:0:10rad/s:50ms"), load=load)
     torque, current = task.course(MOTOR, 1), replace(task, virtual=True).course(MOTOR, 1)
     assert np.flatnonzero(torque.load).tolist() == np.flatnonzero(current.current).tolist() == list(range(10, 30))
     assert not torque.current.any()
@@ -184,7 +184,7 @@ def test_the_memory_of_tracking_is_as_short_as_the_loop_is_fast() -> None:
 def test_the_observer_waits_for_counts_of_tracking() -> None:
     """Between two counts y stays, whatever the core shows."""
     one = setting(KINDS[-1], 40.0, 100e-6, IDEAL)
-    one = replace(one, task=Task(motion=parse_motion("ramp:0:2:50ms+constant:2:100ms")))
+    one = replace(one, task=Task(motion=parse_motion("ramp:0:2rad/s:50ms+constant:2rad/s:100ms")))
     log = one.run(one.simulation, 0)
     counted = np.diff(log["position"], prepend=0) != 0
     late = counted | np.roll(counted, 1) | np.roll(counted, 2)  # an update is as late as the program is long

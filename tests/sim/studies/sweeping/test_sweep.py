@@ -80,7 +80,7 @@ def test_what_cannot_be_told_is_empty() -> None:
 
 
 def test_the_hardware_runs_beside_it() -> None:
-    row = run_point(replace(POINT, motion=parse_motion("constant:30:10ms"), engine="pysim"))
+    row = run_point(replace(POINT, motion=parse_motion("constant:30rad/s:10ms"), engine="pysim"))
     assert (row["engine"], row["mismatches"], row["clocks"]) == ("pysim", 0, 10_000)
 
 
@@ -100,7 +100,7 @@ DIFFERENT: list[dict[str, Any]] = [
 def test_what_a_point_is_known_by(monkeypatch: pytest.MonkeyPatch) -> None:
     """All that decides its row, and not how it is written."""
     assert pickle.loads(pickle.dumps(POINT)).digest == POINT.digest
-    assert replace(POINT, motion=parse_motion("sine:30:0.005kHz:0.4s")).digest == POINT.digest
+    assert replace(POINT, motion=parse_motion("sine:30rad/s:0.005kHz:0.4s")).digest == POINT.digest
     every = {replace(POINT, **change).digest for change in DIFFERENT} | {POINT.digest}
     assert len(every) == len(DIFFERENT) + 1
     monkeypatch.setattr(sweep, "code_digest", lambda **_: "another")
