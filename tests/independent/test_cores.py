@@ -13,7 +13,7 @@ from independent.manifest import check_manifest
 from independent.show import check_age, check_updates
 from independent.stimulus import Lines, external, motion
 from independent.track import check_tracking, track_updates
-from reference.front import Front, Tick, conditioned, external_ends, index_positions, ticks_of
+from reference.front import Front, Tick, conditioned, external_ends, faults, index_positions, ticks_of
 from reference.rairan import rairan_updates
 from reference.settings import arguments
 from reference.timed import timed_updates
@@ -102,12 +102,26 @@ def check_front(
     if settings.external:
         assert [row["clock"] - late for row in rows if row["tick_error"]] == [at for at in wrong if at + late < n]
         assert wrong
+    if settings.flag("health"):
+        check_health(faults(settings, front, late), seen)
     if settings.filter:
         glitches = sorted(front.glitches)
         for row in seen:
             gone = [bisect_right(glitches, row["clock"] - spare) for spare in (2, 4)]
             assert 2 * gone[1] <= row["swallowed_edges"] <= 2 * gone[0]
         assert seen[-1]["swallowed_edges"] == 2 * len(front.glitches) > 0
+
+
+def check_health(found: list[tuple[int, int, int]], seen: list[Row]) -> None:
+    """The first fault, how many clocks had one, and the latest wrong turn, from the clock after each."""
+    for row in seen:
+        before = [fault for fault in found if fault[0] < row["clock"]]
+        wrong = [off for _, _, off in before if off]
+        assert row["health"] == (before[0][1] if before else 0)
+        assert row["fault"] == bool(before)
+        assert row["faults"] == min(len({at for at, *_ in before}), 255)
+        assert row["index_error"] == (wrong[-1] if wrong else 0)
+    assert len(found) > 2
 
 
 def check_core(case: Case, folder: Path, manifest: Manifest) -> None:

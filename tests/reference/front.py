@@ -23,6 +23,8 @@ class Front:
         Clocks of illegal transitions, of rises of Z and of the external tick.
     glitches : list of int
         Clocks in which a line went back before it was believed.
+    changes : list of (int, str)
+        Clocks in which lines change, and which: `a`, `b` or `ab`.
     """
 
     n_clocks: int
@@ -31,6 +33,7 @@ class Front:
     index: list[int] = field(default_factory=list)
     rises: list[int] = field(default_factory=list)
     glitches: list[int] = field(default_factory=list)
+    changes: list[tuple[int, str]] = field(default_factory=list)
 
 
 def believed(changes: list[tuple[int, int]], n_clocks: int, clocks: int) -> tuple[dict[int, int], list[int]]:
@@ -81,6 +84,7 @@ def conditioned(settings: Settings, play: Play, latency: int) -> Front:
     a, b = (line[max(at for at in line if at <= both)] for line in lines[:2])
     for at in sorted(at for at in {*lines[0], *lines[1]} if at > both):
         new = (lines[0].get(at, a), lines[1].get(at, b))
+        front.changes.append((at + latency, "a" * (new[0] != a) + "b" * (new[1] != b)))
         if new[0] != a and new[1] != b:
             front.errors.append(at + latency)
         elif step := count_of(settings.decoding, (a, b), new):
@@ -157,4 +161,41 @@ def index_positions(settings: Settings, front: Front) -> list[tuple[int, int]]:
         if clock in rises:
             found.append((clock, wrapped(position, settings.position_bits)))
             position = 0 if settings.flag("index-reset") else position
+    return found
+
+
+def faults(settings: Settings, front: Front, late: int) -> list[tuple[int, int, int]]:
+    """Return clocks in which a fault is seen, its code, and the counts by which a turn was wrong; `late` is the latency
+    of the index.
+    """
+    edges, errors = int(settings.words["health-edges"]), int(settings.words["health-errors"])
+    found, alone, before, counted, second = [], 0, "", 0, 0
+    for at, lines in front.changes:
+        if at // settings.clock_hz != second:
+            second, alone, counted = at // settings.clock_hz, 0, 0
+        if lines == "ab":
+            alone, counted = 0, counted + 1
+            if counted == errors + 1:
+                found.append((at, 4, 0))
+            continue
+        alone, before = (alone + 1 if lines == before and alone else 1), lines
+        if alone == edges:
+            found.append((at, 2 if lines == "a" else 1, 0))
+            alone = 0
+    if settings.flag("index"):
+        found += _turns(settings, front, late)
+    return sorted(found)
+
+
+def _turns(settings: Settings, front: Front, late: int) -> list[tuple[int, int, int]]:
+    """Return indices in the direction of the one before that are neither a turn from it nor where it was."""
+    found, last = [], None
+    for at, position in index_positions(settings, front):
+        direction = next((front.steps[clock] for clock in sorted(front.steps, reverse=True) if clock < at + late), 1)
+        if last is not None and last[1] == direction:
+            way = wrapped(position - (0 if settings.flag("index-reset") else last[0]), settings.position_bits)
+            off = wrapped(way - direction * settings.counts_per_turn, settings.position_bits)
+            if way and off:
+                found.append((at + late + 1, 3, off))
+        last = position, direction
     return found
