@@ -11,7 +11,7 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo figures compare icarus ghdl test test-all lowest pytest verify formal formal-quick mutate upset bench studies size bitstreams docs api site lint clean
+.PHONY: help venv demo figures compare icarus ghdl dtc test test-all lowest pytest verify formal formal-quick mutate upset bench studies size bitstreams docs api site lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 16
@@ -66,13 +66,16 @@ icarus: ## Icarus Verilog, installed with apt-get if it is missing
 ghdl: ## GHDL, the compiler of VHDL, in the same way
 	$(call apt,ghdl,ghdl,https://github.com/ghdl/ghdl)
 
+dtc: ## the compiler of device trees, in the same way
+	$(call apt,dtc,device-tree-compiler,https://git.kernel.org/pub/scm/utils/dtc/dtc.git)
+
 test: $(VENV)/.test icarus ## lint, types and all tests but the nightly ones
 	@$(MAKE) --no-print-directory -j2 lint pytest
 
 pytest: $(VENV)/.test icarus
 	$(BIN)/pytest -q -n auto --dist worksteal -m "not nightly"
 
-test-all: lint icarus ghdl lowest ## lint, types and all tests: every pair of options, and every mutant that a test must catch
+test-all: lint icarus ghdl dtc lowest ## lint, types and all tests: every pair of options, and every mutant that a test must catch
 	$(BIN)/pytest -q -n auto --dist worksteal
 
 # Packages that came later may warn of what the lowest versions do.

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tachometry.hdl.export.targets import vivado
+from tachometry.hdl.export.targets import linux, vivado
 from tachometry.hdl.export.targets.litex import litex
 from tachometry.hdl.export.targets.rio import rio
 from tachometry.spec.control import AnySpec
@@ -42,6 +42,13 @@ TARGETS = {
         "IP for Vivado (IP-XACT) in DIR/NAME_ip, with --bus axi-lite, apb or none",
         vivado.BUSES,
         vivado.vivado,
+        loops=True,
+    ),
+    "linux": Target(
+        "programs in C and Python and a device-tree overlay in DIR/NAME_uio.c, DIR/NAME_uio.py and DIR/NAME.dtso, with "
+        "--bus axi-lite, apb or wishbone",
+        linux.BUSES,
+        linux.linux,
         loops=True,
     ),
 }

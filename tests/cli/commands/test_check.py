@@ -30,7 +30,7 @@ CORES = {
     "bench of a loop": f"{SMALL} m --tick 200us --max-time 2ms --loop --testbench cocotb",
     "external ticks": f"{SMALL} m --external-tick --testbench cocotb",
     "vivado": f"{SMALL} m --for vivado",
-    "track": f"{SMALL} track --tick 1ms --max-time 10ms --bus apb",
+    "track": f"{SMALL} track --tick 1ms --max-time 10ms --for linux",
 }
 Generated = Callable[..., Path]
 

@@ -195,7 +195,7 @@ def test_other_buses_are_refused(bus: str, message: str) -> None:
 
 
 def test_the_page_shows_what_is_written(tmp_path: Path) -> None:
-    page = docs.page("guides/vendor.md")
+    page, linux = docs.page("guides/vendor.md").split("\n## Linux\n")
     (command,) = re.findall(r"```sh\n(tachometry .*?)```", page, re.DOTALL)
     _, *words, _ = shlex.split(command.replace("\\\n", ""))
     assert run(*words, tmp_path) == 0
@@ -203,3 +203,8 @@ def test_the_page_shows_what_is_written(tmp_path: Path) -> None:
     named = {file.replace("NAME", "spindle") for row in table for file in re.findall(r"`([\w.]+)`", row)}
     assert {path.name for path in (tmp_path / "spindle_ip").iterdir()} == named
     assert 'xilinx.com:signal:reset:1.0 aresetn RST"' in (tmp_path / IP).read_text()
+    (command,) = re.findall(r"```console\n(tachometry .*?)\n```", linux)
+    assert run(*command.split()[1:-1], tmp_path) == 0
+    table = re.findall(r"^\| `(NAME\S+)` \|", linux, re.MULTILINE)
+    assert table == ["NAME.dtso", "NAME_uio.c", "NAME_uio.py"]
+    assert all((tmp_path / file.replace("NAME", "spindle")).exists() for file in table)
