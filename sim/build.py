@@ -17,6 +17,7 @@ from pathlib import Path
 
 import platformdirs
 
+from tachometry.sim.signals.progress import at_work
 from tachometry.sim.signals.scratch import run_tool, scratch
 from tachometry.spec.language.tools import complaint
 
@@ -199,7 +200,7 @@ def cached(key: str, suffix: str, make: Callable[[Path], Path]) -> Path:
     if (found := _intact(folder, key)) is not None:
         return found
     try:
-        with scratch(folder) as building:
+        with scratch(folder) as building, at_work("compiling, once for this core and this computer"):
             made = make(building)
             if not made.is_file():
                 raise OSError(f"there is no {made.name}, although what makes it reports no error")

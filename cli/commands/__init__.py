@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from difflib import get_close_matches
 from importlib import import_module
 
@@ -11,6 +11,7 @@ from click.shell_completion import shell_complete
 
 from tachometry.cli.files import DISK, writable_caches
 from tachometry.cli.options.option import message_of
+from tachometry.sim.signals.progress import show_work
 
 COMMANDS = {
     "plan": "Show what a core can measure: resolution and time over speed.",
@@ -96,6 +97,13 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
         return
     context.with_resource(writable_caches())
+    show_work(_working)
+
+
+def _working(what: str) -> AbstractContextManager[None]:
+    from tachometry.cli.reports.terminal import working  # rich is slow to import
+
+    return working(what)
 
 
 def run(args: Sequence[str]) -> int:

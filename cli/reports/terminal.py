@@ -4,7 +4,8 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
+from threading import Event
 
 from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -26,6 +27,7 @@ from rich.text import Text
 from tachometry.cli.reports.streams import printable
 
 _PATIENCE = 2.0  # seconds of work without a bar
+LINE_SECONDS = 10.0  # of work between two lines in a pipe
 _PLAIN_WIDTH = 1 << 16  # columns where there is no terminal: no line is broken
 _GAP = 2  # columns between two of a table
 
@@ -34,10 +36,13 @@ _GAP = 2  # columns between two of a table
 def progress_bar(verb: str, total: float, unit: str = "", *, rate: bool = False) -> Iterator[Callable[[float], None]]:
     """Yield a function to be called with how much of `total` is done, in some unit.
 
-    It shows a bar on stderr as soon as the work is seen to take more than two seconds, if stderr is a terminal.
+    It shows a bar on stderr as soon as the work is seen to take more than two seconds, if stderr is a terminal; else
+    there is a line every ten seconds.
     """
     if not sys.stderr.isatty():
-        yield lambda done: None
+        share = [0.0]
+        with _lines(lambda: f"{verb}, {share[0]:.0%}"):
+            yield lambda done: share.__setitem__(0, done / max(total, 1))
         return
     columns = [MofNCompleteColumn(), TextColumn(unit)] if unit else []
     begun = time.monotonic()
@@ -63,11 +68,13 @@ def progress_bar(verb: str, total: float, unit: str = "", *, rate: bool = False)
 
 @contextmanager
 def activity() -> Iterator[Callable[[str], None]]:
-    """Yield a function to be told what is being done; after two seconds it is shown on stderr, if
-    that is a terminal.
+    """Yield a function to be told what is being done; after two seconds it is shown on stderr, if that is a terminal,
+    else in a line every ten seconds.
     """
     if not sys.stderr.isatty():
-        yield lambda what: None
+        told = [""]
+        with _lines(lambda: told[0]):
+            yield lambda what: told.__setitem__(0, what)
         return
     columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
     with ExitStack() as stack:
@@ -79,6 +86,35 @@ def activity() -> Iterator[Callable[[str], None]]:
         stack.callback(timer.cancel)
         timer.start()
         yield lambda what: shown.update(task, description=what)
+
+
+@contextmanager
+def working(what: str) -> Iterator[None]:
+    """Show as `activity` does that one thing is being done, while the context lasts."""
+    with activity() as say:
+        say(what)
+        yield
+
+
+@contextmanager
+def _lines(state: Callable[[], str]) -> Iterator[None]:
+    """Print on stderr, every ten seconds, how far work is, and how long it has taken."""
+    over = Event()
+
+    def tell() -> None:
+        seconds = 0.0
+        while not over.wait(LINE_SECONDS):
+            seconds += LINE_SECONDS
+            with suppress(OSError, ValueError):  # nobody reads it
+                print(f"{printable(state())}: {seconds:.0f} s", file=sys.stderr, flush=True)
+
+    teller = threading.Thread(target=tell, daemon=True)
+    teller.start()
+    try:
+        yield
+    finally:
+        over.set()
+        teller.join()
 
 
 class _PerSecond(ProgressColumn):

@@ -2,14 +2,21 @@
 
 import io
 import itertools
+import shutil
 import sys
 import threading
+from pathlib import Path
+from queue import SimpleQueue
+from typing import ClassVar
 
 import pytest
 from rich.progress import Progress
 from support.command import run
 
+from tachometry.cli.commands import _working
 from tachometry.cli.reports import terminal
+from tachometry.sim import build
+from tachometry.sim.signals import progress
 
 HEADS = ("method", "updates/s", "RMS (rad/s)", "what it is")
 ROWS = [("s", "2450", "0.123456789", "a method of words"), ("rairan:estimate=n3", "1.58e+04", "12345.6789", "-")]
@@ -105,11 +112,64 @@ def test_what_takes_long_is_shown_on_a_terminal(monkeypatch: pytest.MonkeyPatch)
     assert "placing and routing" in screen.getvalue()
 
 
-def test_nothing_is_shown_where_there_is_no_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+class _Clock:
+    """Stands for the event that ends the lines: its time passes when a test says so."""
+
+    made: ClassVar[list["_Clock"]] = []
+
+    def __init__(self) -> None:
+        self._queue: SimpleQueue[bool] = SimpleQueue()
+        self.made.append(self)
+
+    def set(self) -> None:
+        self._queue.put(True)
+
+    def pass_ten_seconds(self) -> None:
+        self._queue.put(False)
+
+    def wait(self, timeout: float) -> bool:
+        assert timeout == 10
+        return self._queue.get()
+
+
+def piped(monkeypatch: pytest.MonkeyPatch) -> io.StringIO:
+    """Return what stands for stderr, and let ten seconds pass when a test says so."""
+    monkeypatch.setattr(terminal, "LINE_SECONDS", 10.0)
+    monkeypatch.setattr(terminal, "Event", _Clock)
     pipe = io.StringIO()
     monkeypatch.setattr(sys, "stderr", pipe)
-    before = threading.active_count()
+    return pipe
+
+
+def test_a_pipe_gets_nothing_of_what_is_short_and_a_line_every_ten_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    pipe = piped(monkeypatch)
     with terminal.activity() as say:
         say("packing")
-        assert threading.active_count() == before
     assert pipe.getvalue() == ""
+    with terminal.activity() as say:
+        say("routing")
+        _Clock.made[-1].pass_ten_seconds()
+        _Clock.made[-1].pass_ten_seconds()
+    with terminal.progress_bar("verifying", 8, "configurations") as report:
+        report(2)
+        _Clock.made[-1].pass_ten_seconds()
+    assert pipe.getvalue().splitlines() == ["routing: 10 s", "routing: 20 s", "verifying, 25%: 10 s"]
+
+
+def test_a_first_compilation_is_shown_and_a_second_one_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As every command shows it, `monitor` with a simulated board, too."""
+    monkeypatch.setenv("TACHOMETRY_CACHE", str(tmp_path))
+    pipe = piped(monkeypatch)
+    monkeypatch.setattr(progress, "_shown", [_working])
+
+    def made(folder: Path) -> Path:
+        _Clock.made[-1].pass_ten_seconds()
+        inner = build.cached("inner", ".h", lambda within: Path(shutil.copy(__file__, within / "x.h")))
+        assert inner.is_file()  # nothing is shown within
+        return Path(shutil.copy(__file__, folder / "x.so.txt"))
+
+    n_clocks = len(_Clock.made)
+    for _ in range(2):
+        build.cached("key", ".txt", made)
+    assert len(_Clock.made) == n_clocks + 1
+    assert pipe.getvalue() == "compiling, once for this core and this computer: 10 s\n"
