@@ -47,6 +47,19 @@ def emulator_settings(spec: TachometerSpec, words: Iterable[str]) -> Fields:
     return found
 
 
+def limits(spec: TachometerSpec) -> dict[str, tuple[float, float, str]]:
+    """Return the least and the greatest of each setting that is a number, and its unit, by its name."""
+    error, jitter, drop = (1 << ERROR_WIDTH - 1, (1 << JITTER_WIDTH) - 1, (1 << DROP_WIDTH) - 1)
+    speed, edge = float(rounded(fastest(spec), up=False, digits=6)), 100 / (1 << FINE_WIDTH)
+    return {
+        "speed": (-speed, speed, "rad/s"),
+        "jitter": (0.0, jitter * edge, "%"),
+        **{name: (-error * edge, (error - 1) * edge, "%") for name in ("phase-error", "duty-a", "duty-b")},
+        "bounce": (0.0, ((1 << BOUNCE_WIDTH) - 1) / spec.timing.clock_hz * 1e6, "us"),
+        "drop": (0.0, 100 * drop / (1 << DROP_WIDTH), "%"),
+    }
+
+
 def _speed(spec: TachometerSpec, text: str) -> Fields:
     speed, most = read_nearest("speed", text, SPEED, "rad/s"), fastest(spec)
     if abs(speed) > most:

@@ -1,13 +1,11 @@
 """`tachometry explore`: a core is configured in a page of the browser."""
 
 import importlib.util
-import os
-from collections.abc import Mapping
-from typing import Any
+from pathlib import Path
 
 import click
 
-from tachometry.cli.options.option import GroupedCommand, option
+from tachometry.cli.options.option import FilePath, GroupedCommand, option
 
 
 @click.command(
@@ -15,7 +13,16 @@ from tachometry.cli.options.option import GroupedCommand, option
     epilog="""\b
 Examples:
   tachometry explore
-  tachometry explore --port 8080""",
+  tachometry explore --port 8080
+  tachometry explore /dev/ttyUSB1 --manifest build/icebreaker/tachometer.json""",
+)
+@click.argument("board", metavar="[PORT]", required=False)
+@option(
+    "Page",
+    "--manifest",
+    type=FilePath(dir_okay=False),
+    metavar="FILE",
+    help="What `tachometry build` has written for the board at a serial PORT, which the page can then show live.",
 )
 @option(
     "Page",
@@ -24,25 +31,30 @@ Examples:
     metavar="N",
     help="Port of 127.0.0.1 at which the page is. [default: one that is free]",
 )
-def explore(port: int | None) -> int:
-    """Configure a core in a page of the browser, with its symbol, its files, and the command that writes them.
+def explore(board: str | None, manifest: Path | None, port: int | None) -> int:
+    """Configure a core in a page of the browser, and see what it does.
+
+    The page has a form of all options, the symbol of the core, its files and the command that writes them. It shows all
+    methods over speed and on a motion or a capture, and live what a board measures: the one at the serial PORT, or a
+    simulated one.
 
     The address is printed; it has a token, without which nothing is served, to whoever else uses this machine. The page
     needs no network. Ctrl-C ends it.
     """
     if missing := [name for name in ("starlette", "uvicorn") if importlib.util.find_spec(name) is None]:
         raise OSError(f"explore needs {' and '.join(missing)}: pip install 'tachometry[explore]'")
-    from tachometry.cli.explore.server import serve
+    from tachometry.cli.explore.server import Answer, Boards, serve
 
-    def answer(name: str, args: Mapping[str, Any]) -> Mapping[str, Any]:
-        from tachometry.cli.explore.answers import answer  # takes a second to import, in which the page is opened
+    def load() -> tuple[Answer, Boards]:
+        from tachometry.cli.explore.answers import FUNCTIONS, answer  # takes a second to import
+        from tachometry.cli.explore.live import Live
 
-        return answer(name, args)
+        live = Live(board, manifest)
+        return lambda name, args: answer(name, args, {**FUNCTIONS, **live.functions}), live
 
-    try:
-        serve(
-            port or 0, answer, lambda address: click.echo(f"{address}\nOpen this address in a browser; Ctrl-C ends it.")
-        )
-    except OSError as error:
-        raise OSError(f"--port {port} cannot be had: {os.strerror(error.errno or 0)}") from error
+    if board is None and manifest is None:
+        serve(port or 0, load, click.echo)
+    else:
+        loaded = load()  # what is wrong with them is said before there is an address
+        serve(port or 0, lambda: loaded, click.echo)
     return 0

@@ -86,12 +86,12 @@ def _replay(
     return _beside(spec, make), read(capture, spec)
 
 
-def answer(name: str, args: Mapping[str, Any]) -> Answer:
-    """Return what a function of `FUNCTIONS` answers; where it refuses, the line as `error` and the `field` it is of."""
+def answer(name: str, args: Mapping[str, Any], functions: Mapping[str, Callable[..., Answer]]) -> Answer:
+    """Return what one of these functions answers; where it refuses, the line as `error` and the `field` it is of."""
     try:
-        function = FUNCTIONS.get(name)
+        function = functions.get(name)
         if function is None:
-            raise Refused(f"the page must ask one of {', '.join(FUNCTIONS)}, not {name!r}")
+            raise Refused(f"the page must ask one of {', '.join(functions)}, not {name!r}")
         for given in args.values():
             texts = given.values() if isinstance(given, dict) else [given]
             if not all(isinstance(text, str) for text in texts):
@@ -107,14 +107,12 @@ def answer(name: str, args: Mapping[str, Any]) -> Answer:
 
 def options() -> Answer:
     """Return what can be asked for: options by groups, and those that most need."""
-    with _generate.make_context("generate", [], resilient_parsing=True) as context:
-        found = [one for one in _generate.get_params(context) if isinstance(one, Option) and one.name != "short"]
-        groups: dict[str, list[Answer]] = {}
-        for one in found:
-            groups.setdefault(one.group, []).append(_described(one, context))
+    of_core, groups = {**_options_of(_generate)}, dict[str, list[Answer]]()
+    for one in {**_options_of(_replay), **of_core}.values():
+        groups.setdefault(one.group, []).append(_described(one))
     return {
         "groups": [{"title": title, "part": _PARTS.get(title, "core"), "options": of} for title, of in groups.items()],
-        "needed": [_name(one) for one in needed(found)],
+        "needed": [_name(one) for one in needed([*of_core.values()])],
         "start": _START
         | {one.name: str(REAL_DISC[one.field]) for one in options_of(EncoderOptions) if one.field in REAL_DISC},
         "methods": {name: spec.facts.summary for name, spec in METHODS.items()},
@@ -154,7 +152,7 @@ def curves(options: Texts) -> Answer:
 
     The error is the greatest near each speed at constant speed, with a real disc. None: a method cannot measure there.
     """
-    core, beside = _run(_generate, options, lambda asked: asked.spec.tachometer), _common(options)
+    core, beside = _core(options), common(options)
     methods, left_out = _run(_compare, beside, lambda found: (found[0].specs, found[0].left_out))
     plans = Plans(
         core,
@@ -209,13 +207,13 @@ def respond(options: Texts, motion: Texts) -> Answer:
         truth: Encoding = record(spec)
         return _response(core, methods, Source("--motion", truth.recording, truth.true_speed))
 
-    core = _run(_generate, options, lambda asked: asked.spec.tachometer)
-    return _run(_compare, {**_common(options), **motion}, of)
+    core = _core(options)
+    return _run(_compare, {**common(options), **motion}, of)
 
 
 def replay(options: Texts, capture: Texts, name: str, data: str) -> Answer:
     """Return what they show of a capture: the bytes of a file of this name, in base64."""
-    core = _run(_generate, options, lambda asked: asked.spec.tachometer)
+    core = _core(options)
     suffixes = re.search(r"(\.[a-z0-9]{1,10}){0,2}$", name.lower())
     with scratch() as folder:
         file = folder / f"capture{suffixes[0] if suffixes else ''}"
@@ -223,7 +221,7 @@ def replay(options: Texts, capture: Texts, name: str, data: str) -> Answer:
             file.write_bytes(base64.b64decode(data, validate=True))
             return _run(
                 _replay,
-                {**_common(options), **capture},
+                {**common(options), **capture},
                 lambda found: _response(core, found[0], Source("the capture", found[1], None)),
                 str(file),
             )
@@ -289,8 +287,12 @@ def _never(method: str, texts: Texts) -> TachometerSpec:
     raise AssertionError("nothing is tuned")
 
 
-def _common(options: Texts) -> dict[str, str]:
-    """Return those options that other methods have, too."""
+def _core(options: Texts) -> TachometerSpec:
+    return _run(_generate, options, lambda asked: asked.spec.tachometer)
+
+
+def common(options: Texts) -> dict[str, str]:
+    """Return those options that are of a core of one axis, without a loop."""
     known = _options_of(_compare)
     return {name: text for name, text in options.items() if name in known}
 
@@ -329,7 +331,7 @@ def _run(command: click.Command, texts: Texts, of: Callable[[Any], Made], *words
             return of(command.invoke(context))
 
 
-def _options_of(command: click.Command) -> dict[str, click.Option]:
+def _options_of(command: click.Command) -> dict[str, Option]:
     with command.make_context(str(command.name), [], resilient_parsing=True) as context:
         return {_name(one): one for one in command.get_params(context) if isinstance(one, Option)}
 
@@ -338,8 +340,8 @@ def _name(one: click.Option) -> str:
     return one.opts[0].removeprefix("--")
 
 
-def _described(one: Option, context: click.Context) -> Answer:
-    _, help = one.get_help_record(context) or ("", "")
+def _described(one: Option) -> Answer:
+    _, help = one.get_help_record(click.Context(_generate)) or ("", "")
     metavar, choices = one.metavar or "", []
     if isinstance(one.type, click.Choice):
         choices = [*one.type.choices]

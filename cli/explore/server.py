@@ -1,6 +1,7 @@
 """The server of the page: on this machine alone, for those who know its address, and for no page of another origin."""
 
 import json
+import os
 import secrets
 import signal
 import socket
@@ -8,7 +9,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from importlib.resources import files
 from types import FrameType
-from typing import Any
+from typing import Any, Protocol
 
 import anyio
 import uvicorn
@@ -25,7 +26,7 @@ HOST = "127.0.0.1"
 MOST_BYTES = 16 << 20  # that are asked with: a capture, in base64
 _SECONDS = 20.0  # in which what is asked must have come
 _MOST_CLIENTS = 200  # at once; those beyond are told to come again
-_LIGHT = ("options", "check")  # what is answered at once, beside what takes seconds
+_LIGHT = ("options", "check", "boards", "frames", "set", "stop")  # what is answered at once, beside what takes seconds
 _TYPES = {"html": "text/html", "css": "text/css", "js": "text/javascript", "LICENSE": "text/plain"}
 # Nothing but what comes from here is loaded, run, or asked; the page stands in no other one, and no address leaks.
 _HEADERS = {
@@ -111,8 +112,27 @@ def _plain(status: int, text: str) -> Response:
     return PlainTextResponse(f"{text}\n", status)
 
 
-def serve(port: int, answer: Answer, told: Callable[[str], None]) -> None:
-    """Serve the page until Ctrl-C; `told` is given its address, when it can be opened.
+class Boards(Protocol):
+    """Describes an object that holds boards until the end."""
+
+    def close(self) -> None:
+        """Begin to give it back."""
+
+    def join(self) -> None:
+        """Wait until it is given back."""
+
+
+def serve(port: int, load: Callable[[], tuple[Answer, Boards]], told: Callable[[str], None]) -> None:
+    """Serve the page until Ctrl-C.
+
+    Parameters
+    ----------
+    port : int
+        Of this machine; 0: one that is free.
+    load : callable
+        Gives what answers, and what is given back; who opens the page meanwhile waits.
+    told : callable of str
+        Is given the address, when it can be opened.
 
     Raises
     ------
@@ -120,11 +140,16 @@ def serve(port: int, answer: Answer, told: Callable[[str], None]) -> None:
         If the port is taken.
     """
     token = secrets.token_urlsafe(24)
-    with socket.create_server((HOST, port), backlog=128) as listening:
+    try:
+        listening = socket.create_server((HOST, port), backlog=128)
+    except OSError as error:
+        raise OSError(f"--port {port} cannot be had: {os.strerror(error.errno or 0)}") from error
+    with listening, suppress(KeyboardInterrupt):  # which is how it ends
         port = listening.getsockname()[1]
-        hosts = (f"{HOST}:{port}", f"localhost:{port}")
+        told(f"http://{HOST}:{port}/{token}/\nOpen this address in a browser; Ctrl-C ends it.")
+        answer, boards = load()
         config = uvicorn.Config(
-            page(token, hosts, answer),
+            page(token, (f"{HOST}:{port}", f"localhost:{port}"), answer),
             http="h11",
             ws="none",
             lifespan="off",
@@ -136,18 +161,24 @@ def serve(port: int, answer: Answer, told: Callable[[str], None]) -> None:
             limit_concurrency=_MOST_CLIENTS,
             timeout_graceful_shutdown=2,
         )
-        server = _Server(config)
+        server = _Server(config, boards)
         for number in STOPS:
             if number not in HANDLED_SIGNALS:
                 signal.signal(number, server.handle_exit)
-        told(f"http://{HOST}:{port}/{token}/")
-        with suppress(KeyboardInterrupt):  # which is how it ends
+        try:
             server.run(sockets=[listening])
+        finally:
+            boards.join()
 
 
 class _Server(uvicorn.Server):
     """Ends with all that it has started."""
 
+    def __init__(self, config: uvicorn.Config, boards: Boards) -> None:
+        super().__init__(config)
+        self._boards = boards
+
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        self._boards.close()
         end_tools()
         super().handle_exit(sig, frame)

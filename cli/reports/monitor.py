@@ -108,8 +108,8 @@ def display(plain: bool) -> Display:
 def line(state: State) -> str:
     """Return the state in a line."""
     assert state.frame is not None
-    parts = [f"{state.frame.time:.3f} s", *(f"{name} {text}" for name, text in _measured(state))]
-    parts += [f"{name} {text}" for name, text in [*_wrong(state), *_received(state)]]
+    parts = [f"{state.frame.time:.3f} s", *(f"{name} {text}" for name, text in measured_rows(state))]
+    parts += [f"{name} {text}" for name, text in [*wrong_rows(state), *received_rows(state)]]
     return ", ".join(parts)
 
 
@@ -126,8 +126,8 @@ def view(state: State, width: int, height: int) -> RenderableType:
     side = Table.grid(padding=(0, 2))
     side.add_column(no_wrap=True)
     side.add_column(no_wrap=True)
-    measured = _measured(state)
-    for number, (name, text) in enumerate([*measured, *_wrong(state), *_received(state)]):
+    measured = measured_rows(state)
+    for number, (name, text) in enumerate([*measured, *wrong_rows(state), *received_rows(state)]):
         wrong = len(measured) <= number < len(measured) + len(_ERRORS) and text not in ("0", "-")
         side.add_row(Text(name, style="dim"), Text(text, style="bold red" if wrong else "bold" if not number else ""))
     rows = max(height - 3, 8)
@@ -175,7 +175,9 @@ def plotext() -> Any:
     return module
 
 
-def _measured(state: State) -> list[tuple[str, str]]:
+def measured_rows(state: State) -> list[tuple[str, str]]:
+    """Return names and values of what the board measures."""
+
     def shown(name: str, style: Callable[[Any], str] = str, absent: str = "-") -> str:
         value = state.value(name)
         return absent if value is None else style(value)
@@ -191,7 +193,8 @@ def _measured(state: State) -> list[tuple[str, str]]:
     return [*rows, ("stalled", shown("stalled", lambda stalled: "yes" if stalled else "no"))]
 
 
-def _wrong(state: State) -> list[tuple[str, str]]:
+def wrong_rows(state: State) -> list[tuple[str, str]]:
+    """Return names and numbers of what has been wrong with its encoder."""
     rows = []
     for name, text in _ERRORS.items():
         if name in state.counters or name != "tick_errors":
@@ -206,7 +209,8 @@ def _wrong(state: State) -> list[tuple[str, str]]:
     return rows
 
 
-def _received(state: State) -> list[tuple[str, str]]:
+def received_rows(state: State) -> list[tuple[str, str]]:
+    """Return names and numbers of what has come of its telemetry."""
     counts = state.counts
     return [("frames", str(counts.frames)), ("lost", str(counts.lost)), ("bytes dropped", str(counts.bytes_dropped))]
 

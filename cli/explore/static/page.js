@@ -94,7 +94,7 @@ function wrong(error, within = "form") {
   for (const one of $(within).querySelectorAll("[aria-invalid]")) one.removeAttribute("aria-invalid");
   if (!error) return;
   const input = error.field && $(`o-${error.field}`);
-  (input ? $(`o-${error.field}-error`) : within === "moving" ? $("o-motion-error") : $("error")).textContent = error.message;
+  (input ? $(`o-${error.field}-error`) : $({ form: "error", moving: "o-motion-error", live: "live-error" }[within])).textContent = error.message;
   if (!input) return;
   input.setAttribute("aria-invalid", "true");
   if (input.closest("details")) input.closest("details").open = true;
@@ -145,7 +145,8 @@ const HUES = { s: 225, m: 0, t: 32, mt: 130, rairan: 285, track: 190, hostmot2: 
 const dark = matchMedia("(prefers-color-scheme: dark)");
 dark.addEventListener("change", () => { for (const draw of drawn.values()) draw(); });
 const hue = name => HUES[name] ?? [...name].reduce((sum, letter) => sum * 31 + letter.charCodeAt(0), 7) % 360;
-const colour = name => name === "true" ? "var(--ink)" : `hsl(${hue(name)} ${name in HUES ? 75 : 45}% ${dark.matches ? 66 : 42}%)`;
+const named = { true: "var(--ink)", velocity: "var(--accent)", "upper bound": "var(--quiet)", "lower bound": "var(--quiet)" };
+const colour = name => named[name] ?? `hsl(${hue(name)} ${name in HUES ? 75 : 45}% ${dark.matches ? 66 : 42}%)`;
 const number = value => value == null ? "–" : Math.abs(value) >= 1e5 || (value !== 0 && Math.abs(value) < 1e-3) ? value.toExponential(1).replace("e+", "e") : String(+value.toPrecision(4));
 const seconds = value => value == null ? "–" : value >= 1 || value === 0 ? `${+value.toPrecision(3)} s`
   : value >= 1e-3 ? `${+(value * 1e3).toPrecision(3)} ms` : value >= 1e-6 ? `${+(value * 1e6).toPrecision(3)} µs` : `${+(value * 1e9).toPrecision(3)} ns`;
@@ -202,10 +203,10 @@ const hiddenOver = new Set(), hiddenOn = new Set();
 const over = latest(async () => {
   if (!checked) return;
   const { unit, x, heads, curves, left_out } = await ask("curves", { options: part("core") });
-  const named = curves.map(one => ({ ...one, what: known.methods[one.name] })), told = keyed("methods", ["errors", "delays"], heads, named, "error at the cursor", hiddenOver);
-  const moved = n => told(named.map(one => n == null ? "" : number(one.error[n]))), speed = `speed (${unit})`;
-  plot("errors", { title: "Worst error at constant speed, with a real disc", x: speed, y: `error (${unit})`, logs: true, hidden: hiddenOver, xs: x, curves: named.map(one => ({ ...one, ys: one.error })), moved });
-  plot("delays", { title: "Delay of the velocity", x: speed, y: "delay", logs: true, hidden: hiddenOver, xs: x, curves: named.map(one => ({ ...one, ys: one.delay })), texts: { y: seconds }, moved });
+  const each = curves.map(one => ({ ...one, what: known.methods[one.name] })), told = keyed("methods", ["errors", "delays"], heads, each, "error at the cursor", hiddenOver);
+  const moved = n => told(each.map(one => n == null ? "" : number(one.error[n]))), speed = `speed (${unit})`;
+  plot("errors", { title: "Worst error at constant speed, with a real disc", x: speed, y: `error (${unit})`, logs: true, hidden: hiddenOver, xs: x, curves: each.map(one => ({ ...one, ys: one.error })), moved });
+  plot("delays", { title: "Delay of the velocity", x: speed, y: "delay", logs: true, hidden: hiddenOver, xs: x, curves: each.map(one => ({ ...one, ys: one.delay })), texts: { y: seconds }, moved });
   $("left-out").textContent = Object.entries(left_out).map(([name, why]) => `${name} is left out: ${why}.`).join(" ");
 });
 
@@ -223,28 +224,111 @@ function responded({ unit, x, true: truth, heads, curves, left_out }) {
   if (truth) plot("deviation", { title: "Error of the velocity", x: "time", y: `error (${unit})`, xs: x, curves: shown.map(one => ({ ...one, ys: one.ys.map((v, n) => v - truth[n]) })), texts: { x: seconds }, moved, hidden: hiddenOn, height: 200 });
 }
 
+let capture = null;  // what is replayed: name and data; null: a motion
 const respond = latest(async () => {
   if (!checked) return;
   try {
-    responded(await ask("respond", { options: part("core"), motion: { motion: $("o-motion").value.trim(), ...part("motion") } }));
+    responded(capture ? await ask("replay", { options: part("core"), capture: part("capture"), ...capture }) : await ask("respond", { options: part("core"), motion: { motion: $("o-motion").value.trim(), ...part("motion") } }));
     wrong(null, "moving");
+    $("encoder").hidden = !!capture;
+    $("lines").hidden = !capture;
+    $("replayed").textContent = capture ? `${capture.name} is replayed; choose a motion to leave it.` : "or drop its file here: .sr, .csv, .vcd and others";
   } catch (error) { wrong(error, "moving"); }
 });
 
 function presets({ motions }) {
   const before = $("preset").value, given = $("o-motion").value;
-  $("preset").replaceChildren(...Object.entries(motions).map(([name, motion]) => made("option", { value: motion }, name)), made("option", { value: "" }, "as written"));
+  $("preset").replaceChildren(...Object.entries(motions).map(([name, motion]) => made("option", { value: motion }, name)), made("option", { value: "" }, "other"));
   const name = before && Object.keys(motions).find(one => one === $("preset").dataset.name);
   if (!before && given) $("preset").value = "";
   else { $("preset").value = motions[name] ?? Object.values(motions)[0]; $("o-motion").value = $("preset").value; }
 }
 $("preset").addEventListener("change", () => {
+  capture = null;
   $("preset").dataset.name = $("preset").selectedOptions[0].textContent;
   if ($("preset").value) $("o-motion").value = $("preset").value;
   delete values.motion;
   respond();
 });
-$("o-motion").addEventListener("input", () => { $("preset").value = ""; values.motion = $("o-motion").value.trim(); changed(); });
+$("o-motion").addEventListener("input", () => { capture = null; $("preset").value = ""; values.motion = $("o-motion").value.trim(); changed(); });
+
+async function replay(file) {
+  if (!file) return;
+  if (file.size > 12e6) return wrong({ message: `${file.name} must have at most 12 MB here: take tachometry replay`, field: "" }, "moving");
+  const url = await new Promise(done => { const reader = new FileReader(); reader.onload = () => done(reader.result); reader.readAsDataURL(file); });
+  capture = { name: file.name, data: url.slice(url.indexOf(",") + 1) };
+  $("preset").value = "";
+  $("lines").hidden = false;
+  respond();
+}
+$("file").addEventListener("change", () => { replay($("file").files[0]); $("file").value = ""; });
+for (const [kind, on] of [["dragover", true], ["dragleave", false], ["drop", false]]) $("moving").addEventListener(kind, event => {
+  event.preventDefault();
+  $("moving").classList.toggle("dropping", on);
+  if (kind === "drop") replay(event.dataTransfer.files[0]);
+});
+
+// Live: the page asks ten times a second for what has come since.
+let watching = null;
+const sleep = time => new Promise(done => setTimeout(done, time));
+async function watch({ session, title, unit, settings }) {
+  watching = session;
+  $("run").textContent = "Stop";
+  $("watched").hidden = false;
+  $("now-unit").textContent = unit;
+  sliders(session, settings);
+  const rows = [], columns = () => [0, 1, 2, 3].map(n => rows.map(row => row[n]));
+  plot("running", { title: `Velocity of ${title}`, x: "time of the board", y: `velocity (${unit})`, xs: [], height: 380, texts: { x: seconds },
+    curves: [{ name: "upper bound", ys: [], rival: true }, { name: "lower bound", ys: [], rival: true }, { name: "velocity", ys: [], own: true }] });
+  while (watching === session) {
+    const found = await ask("frames", { session, since: String(rows.at(-1)?.[0] ?? -1) });
+    rows.push(...found.rows);
+    while (rows.length && rows.at(-1)[0] - rows[0][0] > 10) rows.shift();
+    $("told").textContent = found.told;
+    if (rows.length) {
+      const [times, velocity, lower, upper] = columns();
+      $("running").plot.setData([times, upper, lower, velocity]);
+      $("now").textContent = number(velocity.at(-1));
+      $("measured").replaceChildren(...found.facts.flatMap((facts, of) => facts.filter(([name]) => name !== "speed").flatMap(([name, text]) =>
+        [made("dt", {}, name), made("dd", { class: of === 1 && !["0", "-"].includes(text) ? "bad" : "" }, text)])));
+    }
+    if (found.over) watching = null;
+    await sleep(100);
+  }
+}
+
+function sliders(session, settings) {
+  const pending = {}, send = latest(async () => {
+    const asked = { ...pending };
+    for (const name in asked) delete pending[name];
+    if (Object.keys(asked).length) await ask("set", { session, settings: asked }).catch(error => wrong(error, "live"));
+  });
+  $("sliders").replaceChildren(...settings.map(({ name, least, most, unit, value }) => {
+    const shown = made("output", {}, `${number(value)} ${unit}`);
+    const input = made("input", { type: "range", min: least, max: most, step: (most - least) / 200, id: `set-${name}`, "aria-describedby": "told" });
+    input.value = value;
+    input.addEventListener("input", () => { shown.textContent = `${number(+input.value)} ${unit}`; pending[name] = `${input.value}${unit}`; send(); });
+    return made("div", { class: "slider" }, made("label", { for: input.id }, name.replace("-", " ")), shown, input);
+  }));
+}
+
+$("run").addEventListener("click", async () => {
+  wrong(null, "live");
+  if (watching) { await ask("stop", { session: watching }).catch(() => {}); return; }
+  $("run").disabled = true;
+  try {
+    const started = await ask("start", { options: part("core"), port: $("board").value });
+    watch(started).catch(error => { wrong(error, "live"); watching = null; }).finally(() => { if (!watching) $("run").textContent = "Start"; });
+  } catch (error) { wrong({ message: error.message, field: "" }, "live"); }
+  $("run").disabled = false;
+});
+
+async function boards() {
+  const { boards } = await ask("boards", {});
+  $("board").replaceChildren(...Object.entries(boards).map(([port, title]) => made("option", { value: port }, title)));
+  if ("sim:icebreaker" in boards && Object.keys(boards)[0].startsWith("sim:")) $("board").value = "sim:icebreaker";
+  $("live").hidden = false;
+}
 
 $("measure").addEventListener("click", async () => {
   $("measure").disabled = true;
@@ -311,6 +395,9 @@ $("download").addEventListener("click", async () => {
   form();
   const ofMotion = known.groups.filter(group => group.part === "motion").flatMap(group => group.options).filter(one => one.name !== "motion");
   $("encoder").lastChild.append(...ofMotion.map(field));
+  $("lines").lastChild.append(...known.groups.filter(group => group.part === "capture").flatMap(group => group.options).map(field));
+  $("lines").hidden = true;
   $("o-motion").value = values.motion ?? "";
+  boards().catch(() => {});
   changed();
 })().catch(error => wrong(error));

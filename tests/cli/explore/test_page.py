@@ -18,8 +18,9 @@ from support.command import run
 from support.nightly import only
 
 from tachometry.cli.commands import load
-from tachometry.cli.explore.answers import answer
+from tachometry.cli.explore.answers import FUNCTIONS, answer
 from tachometry.cli.explore.server import MOST_BYTES, page
+from tachometry.sim.captures.read import read_capture, with_last_tick
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.recording import PinTrace
@@ -40,11 +41,11 @@ ORIGIN = {"origin": f"http://{HOST}"}
 def client(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
     """Return a browser at the page; when it goes, nothing is left in the folder of temporary files."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    yield TestClient(page(TOKEN, (HOST,), answer), f"http://{HOST}")
+    yield TestClient(page(TOKEN, (HOST,), lambda name, args: answer(name, args, FUNCTIONS)), f"http://{HOST}")
     assert os.listdir(tmp_path) == []
 
 
-def asked(client: TestClient, name: str, **args: Any) -> dict[str, Any]:
+def asked(client: TestClient, name: str, /, **args: Any) -> dict[str, Any]:
     reply = client.post(f"/{TOKEN}/ask/{name}", json=args, headers=ORIGIN)
     assert reply.status_code == 200
     return dict(reply.json())
@@ -61,7 +62,7 @@ def test_everything_that_the_page_loads_is_there(client: TestClient) -> None:
 
 def test_the_form_has_every_option_of_the_command(client: TestClient) -> None:
     groups = asked(client, "options")["groups"]
-    shown = {option["name"] for group in groups for option in group["options"]}
+    shown = {option["name"] for group in groups for option in group["options"] if group["part"] != "capture"}
     command = load("generate")
     with command.make_context("generate", [], resilient_parsing=True) as context:
         of_command = {one.opts[0].removeprefix("--") for one in command.get_params(context)}
@@ -230,6 +231,46 @@ def test_motions_that_are_wrong(client: TestClient, motion: dict[str, str], fiel
     found = asked(client, "respond", options=CORE, motion=motion)
     assert found["field"] == field
     assert "root" not in found["error"]
+
+
+def test_a_capture_is_replayed(client: TestClient, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """By the channels that are named, with a file of any name."""
+    rows = [f"{n * 1e-4:.4f},{n // 2 % 2},{(n + 1) // 2 % 2}" for n in range(300)]
+    text = "\n".join(["time,left,right", *rows]) + "\n"
+    path = tmp_path_factory.mktemp("capture") / "run.csv"
+    path.write_text(text)
+    found = replayed(client, "../../etc/RUN.csv", text.encode(), a="left", b="right")
+    spec = of_texts("s", {name: text for name, text in CORE.items() if name != "method"})
+    recording = with_last_tick(read_capture(path, "left", "right"), spec)
+    curve = core_curve("s", spec, PinTrace.of(recording, spec))
+    assert found["true"] is None
+    assert found["curves"][0]["velocity"] == pytest.approx(curve.estimate.at(np.array(found["x"]) + 1e-9), rel=1e-5)
+    assert abs(found["curves"][0]["velocity"][-1]) > 1
+
+
+def replayed(client: TestClient, name: str, data: bytes, **capture: str) -> dict[str, Any]:
+    coded = base64.b64encode(data).decode()
+    return asked(client, "replay", options=CORE, capture=capture, name=name, data=coded)
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "said"),
+    [
+        ("run.csv", b"", "run.csv"),
+        ("run.csv", b"time,a\n0,0\n", "run.csv"),
+        ("run.sr", b"PK\3\4 no archive", "run.sr"),
+        ("run.sal", b"x", "Saleae"),
+        ("/etc/passwd", b"x", "/etc/passwd"),
+        ("", b"x", "must be a .sr"),
+    ],
+)
+def test_captures_that_are_wrong(client: TestClient, name: str, data: bytes, said: str) -> None:
+    error = replayed(client, name, data)["error"]
+    assert said in error
+    assert tempfile.gettempdir() not in error
+    assert asked(client, "replay", options=CORE, capture={}, name=name, data="?")["error"].startswith(
+        "the capture must"
+    )
 
 
 def test_motions_that_suit_a_core_are_answered(client: TestClient) -> None:
