@@ -238,7 +238,7 @@ class State(Enum):
     """Lists what the small unit does."""
 
     RESTS = 0
-    READS = 1  # a power from the table
+    READS = 1  # the table
     ADDS = 2
     SHIFTS = 3
 
@@ -366,11 +366,12 @@ class SmallUnit(Unit):
         with m.Elif(multiplies):
             m.d.sync += self.factor.eq(self.factor.rotate_right(2))
         leading = work[CHANCE_BITS + 1]  # the leading one is there, or one below
-        found = Cat(table[:LOG_BITS], Mux(is_log, Cat(leading, pairs[:5]), table[LOG_BITS:]))
+        looked_up = Signal(TABLE_BITS, reset_less=True)  # block RAM is slow
+        m.d.sync += looked_up.eq(Cat(table[:LOG_BITS], Mux(is_log, Cat(leading, pairs[:5]), table[LOG_BITS:])))
         kept = work[CHANCE_BITS:]
         m.d.comb += [
             self.busy.eq(begins | (state != State.RESTS)),
-            self.result.eq(Cat(Mux(is_read, found, kept[:TABLE_BITS]), kept[TABLE_BITS:WIDTH]).as_signed()),
+            self.result.eq(Cat(Mux(is_read, looked_up, kept[:TABLE_BITS]), kept[TABLE_BITS:WIDTH]).as_signed()),
             self.table.en.eq(begins | ends),
             self.table.addr.eq(
                 Mux(
@@ -381,11 +382,10 @@ class SmallUnit(Unit):
             ),
         ]
         with m.If(begins):
-            begun = Mux(doing == Start.EXP, State.READS, State.ADDS)
-            m.d.sync += state.eq(Mux(doing == Start.GAIN, State.RESTS, begun))
+            m.d.sync += state.eq(Mux((doing == Start.EXP) | (doing == Start.GAIN), State.READS, State.ADDS))
         with m.Elif(reads):
-            m.d.sync += state.eq(State.ADDS)
+            m.d.sync += state.eq(Mux(is_read, State.RESTS, State.ADDS))
         with m.Elif(adds & ~multiplies):
             m.d.sync += state.eq(State.SHIFTS)
         with m.Elif(ends):
-            m.d.sync += state.eq(State.RESTS)
+            m.d.sync += state.eq(Mux(is_log, State.READS, State.RESTS))

@@ -103,7 +103,7 @@ class Small:
             max(self._seeks(leading, end) for leading in range(WIDTH - 1))
             for end in (CHANCE_BITS, self.form.factor_bits - 1)
         )
-        return Times(log=4 + log, exp=5 + power, over=4 + over, gain=2, by=4 + factor, times=3 + self.digits + product)
+        return Times(log=5 + log, exp=5 + power, over=4 + over, gain=3, by=4 + factor, times=3 + self.digits + product)
 
     @staticmethod
     def _steps(pairs: int) -> int:
