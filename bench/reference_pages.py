@@ -116,8 +116,8 @@ from the same map as the gates.
 
 A capture takes in one clock all that the core shows: the position and whatever else belongs to a tick are of the latest
 tick, the velocity and whatever else belongs to an update are of the latest update, and `age` says how many ticks came
-after what caused that. Only `swallowed_edges` and what `--health` shows are of the clock
-of the capture. There are two ways to capture:
+after what caused that. Only `swallowed_edges`, `over_speed` and what `--health` shows
+are of the clock of the capture. There are two ways to capture:
 
 - Reading VELOCITY, or VELOCITY_LOW where there are two words, captures, and answers with what has just been captured.
   This is enough for one program that polls.
@@ -132,8 +132,8 @@ to an update is not defined.
 
 `STATUS.updated` and `STATUS.indexed` say whether there was something new since the capture before.
 `COUNTERS.lost_updates` counts updates of the velocity that no capture has shown. Counters stay at 255. Writing 1 to
-`CONTROL.clear` sets all of them to 0, and what the core keeps for `swallowed_edges` and
-`--health`, which later captures show.
+`CONTROL.clear` sets all of them to 0, and what the core keeps for `swallowed_edges`,
+`over_speed` and `--health`, which later captures show.
 
 A port of several bits has a register of its own, extended to 32 bits by its sign or by zeros, or two of them,
 `NAME_LOW` and `NAME_HIGH`, if it is wider. A port of one bit is a flag of `STATUS`; `interval` and `n_ep1` can be so

@@ -116,6 +116,10 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
     if spec.health:
         code, faults = run.ticks.health[-1], plural(int(run.ticks.faults[-1]), "fault")
         rows.append(("health", f"{faults}, first: {FAULT_TEXTS[code]}" if code else "no fault"))
+    if spec.over_speed is not None:
+        tripped = np.flatnonzero(run.ticks.over_speed)
+        when = format_time(spec.times.seconds(int(run.ticks.clock[tripped[0]]))) if len(tripped) else ""
+        rows.append(("over speed", f"tripped within {when}" if when else f"never beyond {spec.over_speed}"))
     if spec.external_tick:
         rows.append(("tick errors", f"{len(run.tick_errors)} (external tick too early or missing)"))
     if n_overflows := int(np.count_nonzero(run.ticks.overflow)):

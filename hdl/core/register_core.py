@@ -68,7 +68,7 @@ class RegisterCore(wiring.Component):
         follow(m, bank, whole, spec.ports.strobes)
         m.d.comb += [
             bank.capture.eq(self.capture),
-            *(box.clear.eq(bank.clear) for box in (core.conditioner, core.watch) if box is not None),
+            *(box.clear.eq(bank.clear) for box in (core.conditioner, core.watch, core.trip) if box is not None),
             position.tick.eq(core.tick),
             position.position.eq(core.position),
             bank.position.eq(position.latest),

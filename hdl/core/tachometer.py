@@ -15,6 +15,7 @@ from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.methods import DATAPATHS
 from tachometry.hdl.methods.datapath import LongTicks, OwnStandstill, OwnTicks, TickSource
 from tachometry.hdl.output.low_pass import LowPass
+from tachometry.hdl.output.over_speed import OverSpeed
 from tachometry.hdl.output.standstill import Standstill
 from tachometry.hdl.output.update import update_layout
 from tachometry.hdl.output.update_age import UpdateAge
@@ -86,6 +87,8 @@ class Tachometer(wiring.Component):
             box = SerialVelocityOutput if spec.latency.output_serial else PipelinedVelocityOutput
             self.velocity_output = box(spec.scale.output, layout)
 
+        self.trip = None if spec.over_speed is None else OverSpeed(spec.scale.over_speed, spec.widths.velocity)
+
     @property
     def spec(self) -> TachometerSpec:
         """The spec that this core was built from."""
@@ -117,6 +120,10 @@ class Tachometer(wiring.Component):
         self._age(m, ticks, updates)
         self._index(m)
         self._watch(m)
+        if self.trip is not None:
+            m.submodules.trip = self.trip
+            follow(m, self.trip, self, ("velocity_valid", "velocity"))
+            follow(m, self, self.trip, ("over_speed",))
         if isinstance(self.sampling_clock, ExternalTick):
             m.d.comb += [
                 self.sampling_clock.tick_in.eq(self.tick_in),

@@ -10,7 +10,7 @@ from tachometry.sim.golden.axes import run_axes
 from tachometry.sim.golden.front_end import count, decoded
 from tachometry.sim.golden.low_pass import filtered
 from tachometry.sim.golden.methods import MODELS
-from tachometry.sim.golden.output import in_unit, with_age
+from tachometry.sim.golden.output import in_unit, trips, with_age, with_trip
 from tachometry.sim.golden.sampling import windows
 from tachometry.sim.golden.standstill import with_stalled
 from tachometry.sim.signals.axes import AxesTrace, Trace
@@ -52,12 +52,14 @@ def tables(spec: TachometerSpec, trace: PinTrace) -> dict[str, Table]:
     measured = golden.updates(ticks, steps, trace.n_clocks)
     measured = measured.having(cause=measured.clock - spec.latency.datapath)
     updates = in_unit(spec, filtered(spec, ticks, measured))
+    tripped = trips(spec, updates)
     found = {
-        "tick": with_age(spec, ticks, updates),
+        "tick": with_trip(spec, with_age(spec, ticks, updates), tripped),
         "velocity_valid": updates,
         "index_valid": index,
         "decode_error": Table(steps.errors, {}),
         "tick_error": Table(tick_errors, {}),
         "fault": wrong,
+        "over_speed": tripped,
     }
     return {name: table.rows(slice(np.searchsorted(table.clock, trace.n_clocks))) for name, table in found.items()}

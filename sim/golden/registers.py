@@ -191,6 +191,7 @@ class GoldenBank:
             "time": clock % (1 << WORD),
             "age": min(age, self._map.spec.timing.max_ticks),
             "swallowed_edges": 2 * min(glitches, (1 << 15) - 1),
+            "over_speed": int(self._count(self._tables["over_speed"].clock, self._cleared + 1, clock) > 0),
             **(self._faults(clock) if self._map.spec.health else {}),
         }
 

@@ -41,6 +41,9 @@ def check(spec: TachometerSpec) -> None:
     if spec.index_reset and not spec.index:
         raise ParameterError("index_reset", "must be given together with an index")
     _check_health(spec)
+    if spec.over_speed is not None and spec.scale.over_speed >= spec.scale.full_scale:
+        greatest = f"{spec.scale.full_scale * spec.scale.rad_per_s_per_lsb:.6g} rad/s, the greatest velocity"
+        raise ParameterError("over_speed", f"must be less than {greatest}, not {spec.over_speed}")
     if spec.facts.bounds:
         _check_edge_error(spec)
     if spec.lowpass is not None:

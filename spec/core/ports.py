@@ -103,6 +103,10 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
         ),
         *_health_ports(spec),
         *_if(
+            spec.over_speed,
+            held(TICK, "over_speed", help=f"A velocity was beyond {spec.over_speed}, since it was cleared."),
+        ),
+        *_if(
             spec.filter_clocks,
             held(
                 *(TICK, "swallowed_edges", 16),

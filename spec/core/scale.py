@@ -82,6 +82,14 @@ class Scale(Follows[S]):
         return 0.5 if self.spec.unit == NATIVE else 0.7
 
     @property
+    def over_speed(self) -> int:
+        """The greatest |velocity|, in its LSB, that is not beyond `over_speed`, for a core that has it."""
+        spec = self.spec
+        assert spec.over_speed is not None
+        counts = spec.over_speed.counts(spec.encoder.counts_per_rev, spec.timing.tick_seconds)
+        return math.floor(counts * self.per_count * 2**spec.widths.frac_bits)
+
+    @property
     def low_pass(self) -> LowPass:
         """The low-pass filter, for a core that has one."""
         spec = self.spec

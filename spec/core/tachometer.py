@@ -23,7 +23,7 @@ from tachometry.spec.formats.velocity_output import NATIVE, UNITS, parse_lsb
 from tachometry.spec.language.docstrings import with_inherited
 from tachometry.spec.language.option import Option, option, options_of, parse_whole
 from tachometry.spec.language.port import Port, Ports
-from tachometry.spec.language.units import FRACTION, Quantity, Speed, parse_bandwidth, written_time
+from tachometry.spec.language.units import FRACTION, Quantity, Speed, parse_bandwidth, parse_speed, written_time
 
 CHOSEN = "method-chosen"  # what `options` call why a method was taken
 
@@ -77,6 +77,8 @@ class TachometerSpec:
         So many edges of a line within a second, and none of the other, are a fault of the other.
     health_errors : int
         More illegal transitions in a second are a fault.
+    over_speed : Speed or None
+        Output `over_speed` trips at a velocity beyond it, and stays so.
     chosen : str
         Why this method was taken, where none was named; empty: it was named.
 
@@ -208,6 +210,14 @@ class TachometerSpec:
         needs="health",
         parse=parse_whole,
         tests=("0",),
+    )
+    over_speed: Speed | None = option(  # noqa: RUF009
+        None,
+        "Output over_speed trips at a velocity beyond this, in rad/s, rev/s or rpm, and stays so until a reset or "
+        "CONTROL.clear.",
+        metavar="SPEED",
+        parse=parse_speed,
+        tests=("", "30rad/s"),
     )
     chosen: str = field(default="", compare=False, repr=False)
 

@@ -338,3 +338,11 @@ class Speed:
 
     def __str__(self) -> str:
         return f"{decimal(self.value) or self.value}{self.unit}"
+
+
+def parse_speed(what: str, text: str) -> Speed:
+    """Read a speed with its unit, for an option."""
+    value, unit = read_quantity(what, text, SPEED)
+    if value <= 0:
+        raise ParameterError(what, f"must be greater than 0, not {text}")
+    return Speed(value, unit)

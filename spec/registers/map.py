@@ -5,7 +5,7 @@ by its sign or by zeros, or two of them if it is wider; ports of one bit are fla
 
 A capture takes all of these in one clock: the position and whatever else belongs to a tick is of the latest tick, the
 velocity and whatever belongs to an update is of the latest update, and the age says how many ticks came after what
-caused it. Only `swallowed_edges` and what a watch of the encoder shows are of the clock of the capture.
+caused it. Only `swallowed_edges`, `over_speed` and what a watch of the encoder shows are of the clock of the capture.
 Reading the first captured register, VELOCITY, captures, and the others keep what was captured until the next capture.
 Before the first update the velocity is 0, and what else has a unit and belongs to an update is not defined.
 """

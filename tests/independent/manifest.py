@@ -30,6 +30,7 @@ _SHARED = {
     "bounds": "bounds",
     "edge_error": "edge-error",
     "lowpass": "lowpass",
+    "over_speed": "over-speed",
     "health": "health",
     "health_edges": "health-edges",
     "health_errors": "health-errors",
@@ -80,6 +81,7 @@ def parameter(settings: Settings, name: str, shown: object) -> object:
         "multiplier": settings.words.get("multiplier", "auto"),
         "fine_bits": settings.fine_bits,
         "position_width": settings.position_bits,
+        "over_speed": settings.words.get("over-speed"),
         "health_edges": int(settings.words.get("health-edges", "256")),
         "health_errors": int(settings.words.get("health-errors", "10")),
         "filter_clocks": settings.filter,
@@ -380,6 +382,7 @@ def check_ports(expected: Expected, ports: list[dict[str, Any]]) -> None:
     single = ["velocity_valid", "forced", "tick", "decode_error", "overflow", "stalled"]
     single += ["velocity_overflow"] * (not own) + ["bounds_valid"] * settings.flag("bounds")
     single += ["out_of_range"] * beyond + ["index_valid"] * settings.flag("index")
+    single += ["over_speed"] * ("over-speed" in settings.words)
     single += ["fault"] * settings.flag("health") + ["tick_error"] * settings.external
     inputs = ["clk", "rst", "a", "b"] + ["z"] * settings.flag("index") + ["tick_in"] * settings.external
     found = {port["name"]: port for port in ports}

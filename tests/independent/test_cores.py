@@ -1,6 +1,7 @@
 """Every method, unit and option as exported Verilog, against the models of this folder."""
 
 import json
+import math
 import random
 from bisect import bisect_right
 from collections.abc import Callable
@@ -142,6 +143,12 @@ def check_core(case: Case, folder: Path, manifest: Manifest) -> None:
         check_tracking(case.settings, manifest, updates, shown, ticks)
     else:
         absent = check_updates(case.settings, manifest, updates, shown, ticks)
+    if "over-speed" in case.settings.words:
+        limit = float(case.settings.words["over-speed"].removesuffix("rpm")) * math.pi / 30
+        lsb = manifest["velocity"]["rad_per_s_per_lsb"]
+        beyond = [row["clock"] for row in rows if row["velocity_valid"] and abs(row["velocity"]) * lsb > limit + 1e-9]
+        assert beyond
+        assert all(row["over_speed"] == (row["clock"] > beyond[0]) for row in rows if row["tick"])
     if case.settings.flag("age"):
         check_age(case.settings, manifest, updates, rows)
     assert absent >= ABSENT.get(case.name, set())

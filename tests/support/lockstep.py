@@ -137,7 +137,8 @@ def watched(spec: TachometerSpec, rng: np.random.Generator) -> TachometerSpec:
     if rng.random() < 0.5:
         return spec
     edges, errors = (int(rng.integers(least, 4)) for least in (2, 0))
-    return replace(spec, health=True, health_edges=edges, health_errors=errors)
+    limit = Speed(Fraction(str(round(spec.scale.greatest_speed * rng.uniform(0.02, 0.5), 3) or 0.001)))
+    return replace(spec, health=True, health_edges=edges, health_errors=errors, over_speed=limit)
 
 
 def filter_of(method: str, clocks: int, tick_cycles: int) -> int:

@@ -102,6 +102,7 @@ def test_defaults(tmp_path: Path) -> None:
         "health": False,
         "health_edges": 256,
         "health_errors": 10,
+        "over_speed": None,
         "cancel": True,
         "reciprocal_source": "serial",
     }

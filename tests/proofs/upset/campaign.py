@@ -21,7 +21,17 @@ _OPTIONS: dict[str, dict[str, Any]] = {"m": {"average": 10}}
 # Of `track` the rounding, and the noise and the offsets that it learns gradually, outlive every rest: after an upset it
 # is not equal in all bits again.
 UPSET = [method for method in METHODS if method != "track"]
-_OF_POSITION = ("position", "index_position", "swallowed_edges", "health", "faults", "fault", "index_error")
+# And what stays until it is cleared.
+_OF_POSITION = (
+    "position",
+    "index_position",
+    "swallowed_edges",
+    "health",
+    "faults",
+    "fault",
+    "index_error",
+    "over_speed",
+)
 
 
 def spec_of(method: str) -> TachometerSpec:

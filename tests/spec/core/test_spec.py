@@ -186,6 +186,7 @@ def test_manifest_names_every_option_and_survives_json() -> None:
         "health": False,
         "health_edges": 256,
         "health_errors": 10,
+        "over_speed": None,
         "cancel": False,
         "reciprocal_source": "serial",
     }
