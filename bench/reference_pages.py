@@ -1,5 +1,6 @@
 """Writes the pages of docs/reference from what the code declares."""
 
+import inspect
 import re
 from dataclasses import replace
 from fractions import Fraction
@@ -9,6 +10,7 @@ from typing import Any
 import click
 from pages import markdown, write
 
+from tachometry import api
 from tachometry.boards.fpga.boards import BOARDS
 from tachometry.cli.commands import COMMANDS, load
 from tachometry.cli.options.option import Option
@@ -90,6 +92,12 @@ client.set(gain_position=400, gain_velocity=40, current_limit=8)
 client.enable(True)
 ```
 
+"""
+_FUNCTIONS = """\
+# Functions for scripts and notebooks
+
+`import tachometry as t` has these; [a drive in Python](../guides/python.md) uses them one after the other. They were
+written here from their docstrings by `make docs`, and a test runs their examples.
 """
 _REGISTERS = """\
 # Registers
@@ -353,11 +361,29 @@ def _cores(method: str) -> list[TachometerSpec]:
     return cores
 
 
+def functions() -> str:
+    """Return the page of `import tachometry`, from its docstrings."""
+    return _FUNCTIONS + "".join(_function(name) for name in api.__all__)
+
+
+def _function(name: str) -> str:
+    """Return the section of a function or class: its docstring, and those of what a class has."""
+    made = getattr(api, name)
+    summary, _, more = inspect.cleandoc(made.__doc__ or "").partition("\n\n")
+    members = vars(made).items() if inspect.isclass(made) else ()
+    rows = [
+        f"- `{member}`: {' '.join((value.__doc__ or '').split())}\n"
+        for member, value in members
+        if not member.startswith("_") and (isinstance(value, property) or inspect.isfunction(value))
+    ]
+    return f"\n## `t.{name}`\n\n{summary}\n\n```text\n{more}\n```\n" + ("\n" if rows else "") + "".join(rows)
+
+
 @click.command()
 @click.option("-o", "--output", "folder", type=click.Path(path_type=Path), default=DOCS, help="Folder of the pages.")
 def main(folder: Path) -> None:
     """Write the pages."""
-    for page in (options, ports, registers, boards, columns):
+    for page in (options, ports, registers, boards, columns, functions):
         write(folder / f"{page.__name__}.md", page())
 
 

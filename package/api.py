@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.cli.files import Outputs
+from tachometry.cli.options.guesses import meant
 from tachometry.hdl.export import export
 from tachometry.sim.captures.read import read_capture, with_last_tick
 from tachometry.sim.encoder.motion import parse_motion
@@ -31,6 +32,7 @@ _OPTIONS = {
     about.name.replace("-", "_"): about
     for about in (*common_options(), *(one for method in METHODS for one in own_options(method)), *options_of(LoopSpec))
 }
+_WORDS = [f"--{about.name}" for about in _OPTIONS.values()]
 
 
 def Tachometer(**options: object) -> AnySpec:  # a noun, as it makes what it says
@@ -53,6 +55,10 @@ def Tachometer(**options: object) -> AnySpec:  # a noun, as it makes what it say
     >>> spec.method, spec.timing.tick_cycles
     ('mt', 10000)
     """
+    for name in options:
+        if name not in Tachometer.__signature__.parameters:  # type: ignore[attr-defined]
+            near = [f": did you mean {one.lstrip('-').replace('-', '_')}" for one in meant(name, _WORDS)]
+            raise ParameterError(name, f"must not be given, there is no such option{''.join(near[:1])}")
     texts = {name.replace("_", "-"): _text(value) for name, value in options.items() if value is not None}
     return of_options(texts)
 

@@ -2,6 +2,7 @@
 
 import doctest
 import inspect
+import re
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,16 @@ CORE = {"ppr": 500, "clock": "1MHz", "tick": "1ms", "max_time": "20ms"}
 def test_examples_of_docstrings() -> None:
     assert doctest.testmod(api).failed == 0
     assert doctest.testmod(api).attempted >= 7
+
+
+def test_the_page_of_a_drive_in_python_is_what_python_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (Path(__file__).parent.parent / "docs" / "guides" / "python.md").read_text(encoding="utf-8")
+    cells = "\n".join(re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL))
+    (tmp_path / "build").mkdir()
+    monkeypatch.chdir(tmp_path)
+    result = doctest.DocTestRunner().run(doctest.DocTestParser().get_doctest(cells, {}, "python.md", None, 0))
+    assert (result.failed, result.attempted) == (0, cells.count(">>> "))
+    assert (tmp_path / "build" / "drive" / "spindle.v").is_file()
 
 
 def test_names_are_there_and_completed() -> None:
@@ -81,5 +92,5 @@ def test_what_is_wrong_is_said() -> None:
         tachometry.replay(spec)
     with pytest.raises(ValueError, match="specs must be of different methods"):
         tachometry.compare([spec, spec], "constant:300rpm:30ms")
-    with pytest.raises(ParameterError, match=r"colour|there is no such option"):
-        tachometry.Tachometer(**CORE, method="s", colour="red")
+    with pytest.raises(ParameterError, match="there is no such option: did you mean ppr"):
+        tachometry.Tachometer(**CORE, method="s", pprr=3)
