@@ -301,6 +301,21 @@ CONFIGURATIONS = (
     ),
     *(
         Configuration(
+            f"axes-track-{axes}",
+            f"axes of the core track, 100 us: {axes}",
+            AxesSpec(
+                tachometer=TrackTachometer(
+                    encoder=Encoder(500, 4), timing=Timing.parse("48MHz", "100us", "10ms"), max_speed=MAX_SPEED
+                ),
+                axes=axes,
+            ),
+            is_option=False,
+            targets=("ECP5",),
+        )
+        for axes in (8, 32)
+    ),
+    *(
+        Configuration(
             f"loop-{name}" if name else "loop",
             what,
             LoopSpec(tachometer=REFERENCE, **options),

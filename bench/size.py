@@ -10,6 +10,7 @@ Exit codes: 0, 1 if a bar is missed, 2 if a tool fails.
 import argparse
 import json
 import os
+import re
 import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -330,10 +331,43 @@ def tables(results: Results) -> list[Table]:
     return [table for table in made if table.rows]
 
 
+def used(tools: Mapping[str, str]) -> str:
+    """Return the tools as the page names them."""
+    return ", ".join(f"{package} {version}" for package, version in tools.items())
+
+
 def page(measured: Sequence[Table], tools: Mapping[str, str]) -> str:
     """Return the page docs/measured/size.md."""
-    used = ", ".join(f"{package} {version}" for package, version in tools.items())
-    return PAGE_HEAD.format(used=used) + "\n".join(table.markdown() for table in [*measured, PEERS, PEER_SOURCES])
+    return PAGE_HEAD.format(used=used(tools)) + "\n".join(
+        table.markdown() for table in [*measured, PEERS, PEER_SOURCES]
+    )
+
+
+def kept(text: str, tools: Mapping[str, str]) -> dict[tuple[str, str], Measurement]:
+    """Return what stands on the page.
+
+    Raises
+    ------
+    RuntimeError
+        If it was measured with other tools.
+    """
+    if used(tools) not in text:
+        raise RuntimeError(f"{PAGE.name} was not written with {used(tools)}: make size")
+    results = {}
+    for target in TARGETS:
+        section = text.partition(f"## {target} (")[2].partition("\n## ")[0]
+        lines = [line.strip("| ").split(" | ") for line in section.splitlines() if line.startswith("|")]
+        figures = [head.partition(" (")[0] for head in lines[0][2:-1]] if lines else []
+        for line in lines[2:]:
+            name, _, *cells = (cell.strip() for cell in line)
+            found = {figure: float(cell.split(" (")[0]) for figure, cell in zip(figures, cells, strict=False) if cell}
+            spread = re.search(r"\((\d+)–(\d+)\)", " ".join(cells))
+            results[name, target] = Measurement(
+                {figure: value if figure == "Fmax" else int(value) for figure, value in found.items()},
+                cells[len(figures)] if len(cells) > len(figures) else "",
+                (float(spread[1]), float(spread[2])) if spread else None,
+            )
+    return results
 
 
 def arguments(words: Sequence[str] | None) -> argparse.Namespace:
@@ -341,6 +375,7 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Measure size and speed of the cores on three FPGAs.")
     names = [configuration.name for configuration in CONFIGURATIONS]
     parser.add_argument("--only", nargs="+", choices=names, metavar="NAME", help=f"some of: {', '.join(names)}")
+    parser.add_argument("--update", action="store_true", help="write the page, where what is not measured stays")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), metavar="N", help="targets at a time (%(default)s)")
     parser.add_argument(
         "--seeds", type=int, default=len(SEEDS), metavar="N", help="routings whose median Fmax is (%(default)s)"
@@ -356,7 +391,9 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
     if options.seeds < 1:
         parser.error(f"--seeds must be at least 1, not {options.seeds}")
     everything = (options.only, options.seeds, options.targets) == (None, len(SEEDS), tuple(TARGETS))
-    if options.output is None and everything:
+    if options.update and (options.seeds, options.targets) != (len(SEEDS), tuple(TARGETS)):
+        parser.error("--update takes neither --seeds nor --targets: rows of a page are measured alike")
+    if options.output is None and (everything or options.update):
         options.output = PAGE
     return options
 
@@ -371,14 +408,20 @@ def run(options: argparse.Namespace) -> int:
         for target in found.targets
         if target in options.targets
     ]
-    asked = [(*item, options.seeds if options.only or item[0].has_speed_bar else 0) for item in work]
+    asked = [
+        (*item, options.seeds if (options.only and not options.update) or item[0].has_speed_bar else 0) for item in work
+    ]
     with ThreadPoolExecutor(options.jobs) as pool:
         done = list(with_progress(pool.map(lambda item: measure(*item), asked), len(work)))
         split = list(with_progress(pool.map(lambda item: boxes(*item), work), len(work))) if options.boxes else []
     results = {(found.name, target): result for (found, target, *_), result in zip(work, done, strict=True)}
-    measured = tables(results)
-    for table in [*measured, *split]:
+    for table in [*tables(results), *split]:
         print(table.markdown())
+    if options.update:
+        results = kept(PAGE.read_text(encoding="utf-8"), tools) | results
+        order = [(found.name, target) for found in CONFIGURATIONS for target in found.targets]
+        results = {place: results[place] for place in order if place in results}
+    measured = tables(results)
     if options.output:
         write(options.output, page(measured, tools))
         if options.output == PAGE:

@@ -1,3 +1,4 @@
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -300,6 +301,29 @@ def test_page() -> None:
         assert not line.startswith("|") or line.endswith("|")
 
 
+def test_what_is_not_measured_again_stays_on_the_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    tools = {"yosys": "0.70"}
+    found = results() | {("t", "ECP5"): size.Measurement({"COMB": 266, "latency": 20}, "")}
+    found["reference", "HX8K"] = size.Measurement(
+        found["reference", "HX8K"].figures, "a → b: logic 9.0 ns", (127.0, 133.0)
+    )
+    text = size.page(size.tables(found), tools)
+    assert size.kept(text, tools) == found
+    with pytest.raises(RuntimeError, match=r"^size\.md was not written with yosys 0\.71: make size$"):
+        size.kept(text, {"yosys": "0.71"})
+    written = tmp_path / "size.md"
+    written.write_text(text, encoding="utf-8")
+    monkeypatch.setattr(size, "PAGE", written)
+    monkeypatch.setattr(size, "CELLS", tmp_path / "cells.json")
+    monkeypatch.setattr(size, "METHOD_CELLS", {"s": "reference", "t": "t"})
+    monkeypatch.setattr(size, "versions", lambda: tools)
+    monkeypatch.setattr(size, "measure", lambda *_: size.Measurement({"COMB": 300, "latency": 21}, ""))
+    assert size.main(["--only", "t", "--update", "-o", str(written)]) == 0
+    assert "| t | ECP5 |" in written.read_text(encoding="utf-8")
+    assert size.kept(written.read_text(encoding="utf-8"), tools)["reference", "HX8K"] == found["reference", "HX8K"]
+    assert json.loads((tmp_path / "cells.json").read_text()) == {"s": 265, "t": 300}
+
+
 def test_every_peer_can_be_measured_again() -> None:
     peers = load("peers")
     assert [row[0] for row in size.PEERS.rows] == [row[0] for row in size.PEER_SOURCES.rows]
@@ -323,6 +347,7 @@ def test_every_table_is_rectangular() -> None:
     [
         ("", size.PAGE),
         ("--only x1 paper", None),
+        ("--only x1 --update", size.PAGE),
         ("--seeds 3", None),
         ("--targets ECP5", None),
         ("--only x1 -o a.md", Path("a.md")),
@@ -332,7 +357,7 @@ def test_a_part_does_not_replace_the_page(words: str, output: Path | None) -> No
     assert size.arguments(words.split()).output == output
 
 
-@pytest.mark.parametrize("words", ["--only nothing", "--jobs 0", "--seeds 0", "--targets none"])
+@pytest.mark.parametrize("words", ["--only nothing", "--jobs 0", "--seeds 0", "--targets none", "--update --seeds 3"])
 def test_refused_options(words: str) -> None:
     with pytest.raises(SystemExit, match="2"):
         size.arguments(words.split())
