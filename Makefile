@@ -11,7 +11,7 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo figures compare icarus ghdl dtc test test-all lowest pytest verify formal formal-quick mutate upset bench studies size bitstreams docs api site lint clean
+.PHONY: help venv demo figures compare icarus ghdl dtc test test-all lowest pytest verify formal formal-quick mutate upset bench studies size bitstreams docs api site dist lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 16
@@ -138,6 +138,17 @@ site: $(VENV)/.docs ## the pages of docs/ with a search, in build/www; a dead li
 	sed -i.bak 's|](\.\./\.\./|](../|g; s|](docs/|](|g; s|README\.md|index.md|g' build/pages/CONTRIBUTING.md build/pages/*/*.md && rm build/pages/*.bak build/pages/*/*.bak
 	$(BIN)/zensical build --clean --strict
 	@grep -q standstill build/www/search.json && echo "open build/www/index.html"
+
+# README.md is the page at PyPI, too, where links are those of the repository, at the tag of the version.
+dist: $(VENV)/.made ## wheel and sdist in build/dist, checked; ADDRESS and MAIL are those of the repository and its owner, if pyproject.toml has none
+	$(PIP) 'build>=1.2' 'twine>=6.1' 'check-wheel-contents>=0.6' 'pyroma>=5'
+	rm -rf build/release build/dist && mkdir -p build/release
+	git ls-files -z | tar --null -T - -cf - | tar -xf - -C build/release
+	$(BIN)/python bench/release.py build/release $(ADDRESS) $(MAIL)
+	$(BIN)/python -m build -o build/dist build/release
+	$(BIN)/twine check --strict build/dist/*
+	$(BIN)/check-wheel-contents build/dist/*.whl
+	$(BIN)/pyroma -n 9 build/dist/*.tar.gz
 
 lint: $(VENV)/.test ## ruff, and mypy --strict over layers, benchmarks and tests
 	$(BIN)/ruff check .

@@ -49,6 +49,18 @@ def test_it_holds_every_file_of_the_layers(wheel: Path) -> None:
     assert packed == {f"tachometry/{name.removeprefix('package/')}" for name in files(*LAYERS, "package")}
 
 
+def test_it_runs_from_a_zip(wheel: Path, tmp_path: Path) -> None:
+    """A wheel is one; what it needs is in this environment."""
+    program = "import sys, tachometry; from tachometry.cli.main import main; print(tachometry.__file__); main()"
+    command = [sys.executable, "-c", program, "generate", *CORE, "--testbench", "cocotb", "--bus", "apb", "-o", "core"]
+    done = subprocess.run(
+        command, cwd=tmp_path, env=ENVIRONMENT | {"PYTHONPATH": str(wheel)}, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(str(wheel))
+    assert {"tachometer_driver.h", "test_tachometer.py"} <= set(os.listdir(tmp_path / "core"))
+
+
 @nightly  # it gets all packages anew; what is in the wheel, the test above says
 def test_it_runs_in_an_empty_environment(wheel: Path, tmp_path: Path) -> None:
     run(sys.executable, "-m", "venv", "--without-pip", "v", cwd=tmp_path)

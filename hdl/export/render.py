@@ -3,9 +3,8 @@
 import json
 import textwrap
 from collections.abc import Iterable
-from pathlib import Path
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from tachometry.spec.language.port import Port
 from tachometry.spec.language.provenance import notice, version
@@ -56,7 +55,7 @@ def _vhdl_type(port: Port) -> str:
 
 # Doubled braces stand in Verilog and Python as they are, so a hole has other marks than Jinja's own.
 _TEMPLATES = Environment(
-    loader=FileSystemLoader(Path(__file__).with_name("templates")),
+    loader=PackageLoader("tachometry.hdl.export"),
     undefined=StrictUndefined,
     trim_blocks=True,
     lstrip_blocks=True,

@@ -4,7 +4,7 @@ import ctypes
 import threading
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from tachometry.spec import Port
 from tachometry.spec.registers.buses import Bus
 from tachometry.spec.registers.demo import DemoMap
 
-_DRIVER = Path(__file__).with_name("board.h").read_text(encoding="utf-8")
+_DRIVER = files(__package__).joinpath("board.h").read_text(encoding="utf-8")
 _ROOM = 1 << 16  # bytes that a call can give back
 
 

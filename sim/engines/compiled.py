@@ -10,6 +10,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,7 @@ from tachometry.sim.signals.run import Run, observed
 from tachometry.spec import CoreSpec, Port
 from tachometry.spec.control import AnySpec
 
-DRIVER = Path(__file__).with_name("driver.h").read_text(encoding="utf-8")
+DRIVER = files(__package__).joinpath("driver.h").read_text(encoding="utf-8")
 
 _CALL = 0.05  # seconds that a call should take, so that progress is seen and Ctrl-C is heard
 _FIRST_CALL = 1000  # clocks

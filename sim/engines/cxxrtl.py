@@ -10,6 +10,7 @@ import re
 import sys
 from collections.abc import Mapping
 from importlib.metadata import version as version_of
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,8 @@ from tachometry.hdl.arithmetic.idle import Idle, IdleCounter, IdleDivision, Idle
 from tachometry.sim import build
 from tachometry.sim.engines.compiled import CompiledEngine, Design
 
-IDLE = Path(__file__).with_name("idle.h").read_text(encoding="utf-8")
-_THIS = Path(__file__).read_text(encoding="utf-8")  # decides what is made of a netlist
+IDLE = files(__package__).joinpath("idle.h").read_text(encoding="utf-8")
+_THIS = files(__package__).joinpath("cxxrtl.py").read_text(encoding="utf-8")  # decides what is made of a netlist
 _MODEL = """
 using namespace cxxrtl_design;
 template <size_t N> inline const value<N> &now(const value<N> &port) {{ return port; }}

@@ -4,7 +4,7 @@ import ctypes
 import math
 from dataclasses import dataclass, fields
 from enum import IntEnum
-from pathlib import Path
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -178,7 +178,7 @@ class LoopDesign(Design):
     def source(self, model: str) -> str:
         """Write the source, as `Design.source` says."""
         head = f"#define N_COLUMNS {len(self.outputs)}\n#define GATES 0\n#include <cstdint>\n"
-        parts = [Path(__file__).with_name(part).read_text(encoding="utf-8") for part in PARTS]
+        parts = [files(__package__).joinpath(part).read_text(encoding="utf-8") for part in PARTS]
         return "\n".join([head, model, *parts])
 
 

@@ -5,6 +5,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from tachometry.spec.language.units import SpeedUnit
 _ROWS = 12  # of a table
 _UNITS = 10  # of the default range
 # Cells of an ECP5 that the core of a method takes with the options of the reference core; `make size` writes them.
-CELLS: dict[str, int] = json.loads(Path(__file__).with_name("cells.json").read_text(encoding="utf-8"))
+CELLS: dict[str, int] = json.loads(files(__package__).joinpath("cells.json").read_text(encoding="utf-8"))
 _BETTER, _SMALLER, _ALIKE = 10, 2, 1.5  # ratios: of errors that are much less, of much fewer cells, of errors as good
 _STEADY, _MULTIPLES, _DISTANCES = 1000, 1000, 16  # samples: speeds, multiples of ω_u, distances from each of them
 

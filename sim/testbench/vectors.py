@@ -3,7 +3,7 @@
 import json
 from collections.abc import Sequence
 from functools import singledispatch
-from pathlib import Path
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.provenance import LICENSE, generator, notice
 
 # It has no hole: it reads its name and its data where it lies, so it is a program that linters and mypy read.
-_BENCH = Path(__file__).parent / "templates" / "test_NAME.py"
+_BENCH = files(__package__) / "templates" / "test_NAME.py"
 # Clocks of the motion, and five times as many of the standstill after it: Icarus takes some 40,000 a second.
 _MOVING = 160_000
 _FEWEST_TICKS, _MOST_TICKS = 3, 1000

@@ -4,7 +4,7 @@ import ctypes
 import functools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
+from importlib.resources import files
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,7 +124,7 @@ def compiled(names: tuple[str, ...]) -> Rows | None:
             "#include <algorithm>\n#include <cstdint>\n#include <cstdlib>",
             *(f"static const int {name} = {value};" for name, value in numbers.items()),
             f"struct Constants {{ int64_t {', '.join(names)}; }};",
-            (Path(__file__).parent / "track.h").read_text(encoding="utf-8"),
+            files(__package__).joinpath("track.h").read_text(encoding="utf-8"),
         )
     )
     key = build.digest(text, build.version(build.compiler()), build.compiler(), build.flags())
