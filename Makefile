@@ -11,7 +11,7 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo figures compare icarus ghdl dtc test test-all lowest pytest verify formal formal-quick mutate upset bench studies size bitstreams docs api site dist lint clean
+.PHONY: help venv demo figures compare icarus ghdl dtc test test-all lowest pytest verify formal formal-quick mutate upset bench studies size bitstreams docs api page site dist lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 16
@@ -132,11 +132,15 @@ api: $(VENV)/.docs ## what every module has, from its docstrings, in build/api
 	$(BIN)/pdoc --docformat numpy -o build/api tachometry.api $(addprefix tachometry.,$(LAYERS)) \
 	  $(addprefix tachometry.,$(subst /,.,$(filter-out %/py %/export,$(basename $(wildcard spec/[a-z]* hdl/[a-z]*)))))
 
-site: $(VENV)/.docs ## the pages of docs/ with a search, in build/www; a dead link is an error
+page: $(LINKED) ## the page of `tachometry explore` without a server, in build/page: Python and Yosys run in the browser
+	rm -rf build/page && $(BIN)/python bench/page/build.py build/page
+
+site: $(VENV)/.docs page ## the pages of docs/ with a search, in build/www, and `make page` as explore; a dead link is an error
 	rm -rf build/pages && cp -r docs build/pages && cp CONTRIBUTING.md CHANGELOG.md build/pages
 	sed 's|](docs/|](|g' README.md > build/pages/index.md
 	sed -i.bak 's|](\.\./\.\./|](../|g; s|](docs/|](|g; s|README\.md|index.md|g' build/pages/CONTRIBUTING.md build/pages/*/*.md && rm build/pages/*.bak build/pages/*/*.bak
 	$(BIN)/zensical build --clean --strict
+	cp -r build/page build/www/explore
 	@grep -q standstill build/www/search.json && echo "open build/www/index.html"
 
 # README.md is the page at PyPI, too, where links are those of the repository, at the tag of the version.

@@ -9,8 +9,10 @@ import io
 import math
 import re
 import shlex
+from bisect import bisect_left
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
@@ -160,7 +162,13 @@ def curves(options: Texts) -> Answer:
         *default_range(core),
     )
     unit, near = typed_unit(core), np.geomspace(plans.low, plans.high, _POINTS + 1)[:-1]
-    starts = np.unique(np.searchsorted(plans.line.speed, near))
+    every = plans.line.speed.tolist()
+    starts = sorted({bisect_left(every, speed) for speed in near.tolist()})
+
+    def greatest(values: NDArray[np.float64]) -> list[float | None]:
+        found = _numbers(values)
+        near = (found[first:last] for first, last in pairwise([*starts, len(found)]))
+        return [max((value for value in each if value is not None), default=None) for each in near]
 
     def shown(name: str, spec: TachometerSpec, plan: Plan) -> Answer:
         error = plan.resolution + plan.disc + spec.scale.rounding_lsb * spec.scale.rad_per_s_per_lsb
@@ -171,15 +179,15 @@ def curves(options: Texts) -> Answer:
         return {
             "name": name,
             "own": name == core.method,
-            "error": _numbers(unit.of(np.fmax.reduceat(error, starts))),
-            "delay": _numbers(np.fmax.reduceat(delay, starts)),
+            "error": greatest(unit.of(error)),
+            "delay": greatest(delay),
             "cells": [worst, shown_time(np.nanmax(delay)), short_time(rest), "-" if cells is None else str(cells)],
         }
 
     each = [shown(name, plans.methods[name], plan) for name, plan in plans.lines.items()]
     return {
         "unit": unit.name,
-        "x": _numbers(unit.of(plans.line.speed[starts])),
+        "x": [float(f"{unit.of(every[start]):.6g}") for start in starts],
         "heads": ["method", f"worst error ({unit.name})", "longest delay", "standstill within", "cells (ECP5)"],
         "curves": sorted(each, key=lambda one: not one["own"]),
         "left_out": left_out,

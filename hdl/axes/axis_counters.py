@@ -25,8 +25,6 @@ class AxisCounters(wiring.Component):
     rounds : int
         Rounds of a tick: most steps of an axis in it.
     decoding : int
-    reverse : bool
-        Forward is B before A.
         Counts per period: 1, 2 or 4.
 
     Members
@@ -50,8 +48,7 @@ class AxisCounters(wiring.Component):
         Sum of its steps in this tick.
     """
 
-    def __init__(self, *, slots: int, rounds: int, decoding: int, reverse: bool = False) -> None:
-        self._reverse = reverse
+    def __init__(self, *, slots: int, rounds: int, decoding: int) -> None:
         self._take(slots, decoding, signed(rounds.bit_length() + 1))
 
     def _take(
@@ -87,11 +84,7 @@ class AxisCounters(wiring.Component):
         counted, backward, illegal = transition(self._decoding, a, b, before.a, before.b)
         counts = Signal()
         step = Signal.like(self.step)
-        m.d.comb += [
-            read.addr.eq(self.slot),
-            counts.eq(ready & counted),
-            step.eq(Cat(counts, counts & (~backward if self._reverse else backward))),
-        ]
+        m.d.comb += [read.addr.eq(self.slot), counts.eq(ready & counted), step.eq(Cat(counts, counts & backward))]
         self._add(m, before.count, first, ready, step)
         new_a, new_b = delay(m, a, b)
         m.d.sync += [

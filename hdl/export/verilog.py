@@ -2,6 +2,7 @@
 
 import os
 import re
+import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -30,7 +31,8 @@ def bundled_yosys() -> Iterator[None]:
     OSError
         If it fails, with the line that says why.
     """
-    with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
+    yosys = "javascript" if sys.platform == "emscripten" else "builtin"  # a browser runs no process
+    with patch.dict(os.environ, AMARANTH_USE_YOSYS=yosys):
         try:
             yield
         except YosysError as error:

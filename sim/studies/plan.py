@@ -24,7 +24,7 @@ _UNITS = 10  # of the default range
 # Cells of an ECP5 that the core of a method takes with the options of the reference core; `make size` writes them.
 CELLS: dict[str, int] = json.loads(files(__package__).joinpath("cells.json").read_text(encoding="utf-8"))
 _BETTER, _SMALLER, _ALIKE = 10, 2, 1.5  # ratios: of errors that are much less, of much fewer cells, of errors as good
-_STEADY, _MULTIPLES, _DISTANCES = 1000, 1000, 16  # samples: speeds, multiples of ω_u, distances from each of them
+_STEADY, _MULTIPLES, _DISTANCES = 1000, 200, 8  # samples: speeds, multiples of ω_u, distances from each of them
 
 
 @dataclass(frozen=True)
@@ -111,9 +111,9 @@ def dense_speeds(spec: TachometerSpec, low: float, high: float) -> NDArray[np.fl
     steady = np.geomspace(low, high, _STEADY)
     multiples = np.unique(np.floor(np.geomspace(low, high, _MULTIPLES) / unit + 0.5))
     edge = 1 / spec.timing.max_ticks
-    beside = np.append(np.geomspace(edge * (1 + 1e-6), 0.5, _DISTANCES), edge * (1 - 1e-6))
+    beside = np.concatenate([np.geomspace(edge * (1 + 1e-6), 0.5, _DISTANCES), [edge * (1 - 1e-6)]])
     distances = np.concatenate([-beside, [0], beside])
-    near = (multiples[:, np.newaxis] + distances).ravel() * unit
+    near = np.concatenate([multiple + distances for multiple in multiples.tolist()]) * unit
     return np.unique(np.concatenate([steady, near[(near > low) & (near < high)]]))
 
 

@@ -1,13 +1,18 @@
 "use strict";
-// All that the page asks goes through this function, so that it can be answered without a server, too.
+// All that the page asks goes through this function; without a server, `answered` is what answers.
 async function ask(name, args) {
-  const reply = await fetch(`ask/${name}`, {
-    method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(args),
-  }).catch(() => { throw Object.assign(new Error("tachometry explore has ended: start it again, and open its new address"), { field: "" }); });
-  const json = reply.headers.get("content-type").startsWith("application/json");
-  const found = json ? await reply.json() : { error: (await reply.text()).trim(), field: "" };
+  const found = await (window.answered ?? served)(name, args);
   if ("error" in found) throw Object.assign(new Error(found.error), { field: found.field });
   return found;
+}
+
+async function served(name, args) {
+  const reply = await fetch(`ask/${name}`, {
+    method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(args),
+  }).catch(() => null);
+  if (!reply) return { error: "tachometry explore has ended: start it again, and open its new address", field: "" };
+  const json = reply.headers.get("content-type").startsWith("application/json");
+  return json ? reply.json() : { error: (await reply.text()).trim(), field: "" };
 }
 
 const $ = id => document.getElementById(id);
@@ -226,7 +231,7 @@ function responded({ unit, x, true: truth, heads, curves, left_out }) {
 
 let capture = null;  // what is replayed: name and data; null: a motion
 const respond = latest(async () => {
-  if (!checked) return;
+  if (!checked || $("moving").hidden) return;
   try {
     responded(capture ? await ask("replay", { options: part("core"), capture: part("capture"), ...capture }) : await ask("respond", { options: part("core"), motion: { motion: $("o-motion").value.trim(), ...part("motion") } }));
     wrong(null, "moving");
