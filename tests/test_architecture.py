@@ -3,6 +3,7 @@
 import ast
 import re
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -72,9 +73,15 @@ ALLOWED = {
 }
 
 
+@cache
+def nodes(file: Path) -> list[ast.AST]:
+    """Return all that a file has."""
+    return [*ast.walk(ast.parse(file.read_text(encoding="utf-8")))]
+
+
 def imports(file: Path) -> set[str]:
     found = set()
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for node in nodes(file):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -137,10 +144,10 @@ def test_only_engines_import_hdl() -> None:
 
 def functions(file: Path, package: str) -> list[str]:
     """Return what a file imports from a package in lower case: functions and modules, no classes and constants."""
-    nodes = [node for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))) if isinstance(node, ast.ImportFrom)]
+    froms = [node for node in nodes(file) if isinstance(node, ast.ImportFrom)]
     return [
         alias.name
-        for node in nodes
+        for node in froms
         if (node.module or "").startswith(package)
         for alias in node.names
         if alias.name.islower()
@@ -213,7 +220,7 @@ def test_files_can_be_read_on_a_few_screens(layer: str) -> None:
 
 def test_docstrings_begin_with_a_sentence() -> None:
     for file in (file for room in (*LAYERS, "bench", "package", "tests") for file in (ROOT / room).rglob("*.py")):
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        for node in nodes(file):
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
                 words = (ast.get_docstring(node) or "").split()
                 assert words[:1] not in (["What"], ["See"]), (file, node)

@@ -4,10 +4,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.nightly import nightly
 from support.script import load
 
 from tachometry.sim.studies.size import Measurement
 
+pytestmark = nightly  # Yosys from PyPI compiles itself for a minute when it is first run on a machine
 peers = load("peers")
 COUNTER = """\
 module counter #(parameter W = 8) (input clock, input up, output reg [W-1:0] count);

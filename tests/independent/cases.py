@@ -121,7 +121,7 @@ CASES = [
         "track_rpm",
         "tick=1200 max-time=7200 max-speed=100rpm velocity-width=14 lsb=2^-4 max-memory=96000 multiplier=serial "
         f"fine-bits=4 {_PORTS}",
-        120_000,
+        60_000,
         4,
         seed="track_rpm2",  # with more counts in a tick than may be
     ),

@@ -113,7 +113,8 @@ def library(spec: TachometerSpec) -> Path:
         return build.compile_library(
             shim,
             folder,
-            *build.precompiled(include, "verilated.h"),
+            *build.precompiled(include, "verilated.h", "-O0"),
+            "-O0",
             f"-I{include}",
             f"-I{folder / 'made'}",
             *(verilator._runtime(source, tools) for source in verilator._RUNTIME),

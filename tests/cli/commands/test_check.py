@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from support.command import run
-from support.nightly import only
+from support.nightly import nightly, only
 
 from tachometry.hdl.export import export
 from tachometry.hdl.export.ci import HOSTS, ci_files
@@ -59,6 +59,8 @@ def test_what_is_generated_is_right_and_a_change_of_any_file_is_found(core: str,
         path.write_bytes(before)
 
 
+# Yosys from PyPI compiles itself for a minute when it is first run on a machine.
+@nightly
 def test_what_other_versions_wrote_is_proved(
     generated: Generated, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from support.command import run
 
-CORE = "--ppr 24 --clock 100kHz --tick 1ms --max-time 20ms".split()
+CORE = "--method s --ppr 24 --clock 100kHz --tick 1ms --max-time 20ms".split()
 LINES = "--index --index-reset --external-tick".split()
 
 

@@ -24,7 +24,7 @@ CORE = replace(SMALL, tachometer=replace(SMALL.tachometer, timing=Timing(1_000_0
 
 
 def test_as_the_golden_model() -> None:
-    run = check_core(CORE)
+    run = check_core(CORE, n_edges=1)
     current = run.tables["current_valid"]
     assert 0.2 < np.mean(current.current_saturated) < 0.98
     assert np.diff(run.tables["control_tick"].clock).tolist() == [CORE.period] * (len(run.tables["control_tick"]) - 1)
@@ -38,7 +38,7 @@ def test_exported_verilog_in_icarus(tmp_path: Path) -> None:
     options: dict[str, Any] = {"lowpass": Fraction(4000), "filter_clocks": 3, "index": True, "index_reset": True}
     tachometer = TTachometer(encoder=Encoder(500), timing=Timing(1_000_000, 100, 3), frac_bits=6, **options)
     spec = replace(SERIAL, tachometer=tachometer, command="generator", gains="inputs")
-    trace, commands, gains, changes = core_case(spec, 3, 15)
+    trace, commands, gains, changes = core_case(spec, 3, 5)
     wanted = run_loop(spec, trace, commands, golden.tables, gains)
     assert len(wanted.tables["current_valid"]) > 20
     count, first = compare(wanted, play_in_icarus(spec, tmp_path, changes, trace.n_clocks))

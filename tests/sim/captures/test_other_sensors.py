@@ -93,7 +93,7 @@ def test_other_lines_stay_where_they_are() -> None:
 def test_a_text_with_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = [f"{k / 1000},{k & 1}" for k in range(101)]
     (tmp_path / "wheel.csv").write_text("\n".join(["Time [s],crank", *rows, ""]))
-    core = "--ppr 18 --clock 100kHz --tick 1ms --max-time 100ms --sensor pulses".split()
+    core = "--method s --ppr 18 --clock 100kHz --tick 1ms --max-time 100ms --sensor pulses".split()
     assert run("replay", tmp_path / "wheel.csv", *core, "--decoding", "2") == 0
     assert "counts out 100" in [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
 
@@ -103,7 +103,7 @@ def test_teeth_that_are_two_rows_at_one_time(tmp_path: Path, capsys: pytest.Capt
     slots = [slot for slot in range(244) if slot not in (100, 101, 200, 201)]
     rows = [f"{level},{100 + 0.97 * slot:.3f}\n" for slot in slots for level in (1, 0)]
     (tmp_path / "teeth.csv").write_text("PriLevel,Time [ms]\n" + "".join(rows))
-    core = "--ppr 44 --clock 1MHz --tick 100us --max-time 20ms --sensor pulses --a PriLevel".split()
+    core = "--method s --ppr 44 --clock 1MHz --tick 100us --max-time 20ms --sensor pulses --a PriLevel".split()
     assert run("replay", tmp_path / "teeth.csv", *core, "--decoding", "1") == 0
     out = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
     assert {"counts out 240", "errors flagged 0"} <= {*out}
@@ -114,7 +114,7 @@ def test_teeth_that_are_two_rows_at_one_time(tmp_path: Path, capsys: pytest.Capt
 def test_short_pulses_raise_no_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = [f"{k + width},{level}\n" for k in range(100) for width, level in ((0, 0), (0.4, 1), (0.4002, 0))]
     (tmp_path / "c.csv").write_text("Time [ms],A\n" + "".join(rows))
-    core = "--ppr 18 --clock 100kHz --tick 1ms --max-time 100ms --sensor pulses --decoding 1".split()
+    core = "--method s --ppr 18 --clock 100kHz --tick 1ms --max-time 100ms --sensor pulses --decoding 1".split()
     assert run("replay", tmp_path / "c.csv", *core) == 0
     out = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
     assert {"counts out 100", "errors flagged 0"} <= {*out}

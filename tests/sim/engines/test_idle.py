@@ -44,10 +44,8 @@ def check(spec: AnySpec, trace: Any) -> float:
 CORES = [words for method in METHODS for words in configurations(method)]
 
 
-# One core of each method but track, which takes long to be compiled; of what it skips, a slow shaft shows most.
-@pytest.mark.parametrize(
-    "words", only([configurations(method)[3] for method in METHODS if method != "track"], CORES), ids=" ".join
-)
+# One with sums and one with a divider and a timer; of track, which takes long to be compiled, a slow shaft shows most.
+@pytest.mark.parametrize("words", only([configurations(method)[3] for method in ("m", "mt")], CORES), ids=" ".join)
 def test_rows_are_those_of_every_clock(words: tuple[str, ...]) -> None:
     """On random motions; and with edges far apart, so that whole ticks are skipped."""
     spec = spec_of(words)
@@ -83,8 +81,8 @@ def slow(method: str) -> tuple[TachometerSpec, PinTrace]:
     return slow_shaft("s", tick="5ms", **{"max-time": "50ms"}) if method == "long" else slow_shaft(method)
 
 
-# One of each kind: the divider of S, the sums of a tick and the machine, a timer, and long ticks.
-@pytest.mark.parametrize("method", only(["s", "t", "track", "long"], [*METHODS, "long"]))
+# The divider of S, the sums of a tick and the machine, and long ticks; the two cores above have a timer.
+@pytest.mark.parametrize("method", only(["s", "track", "long"], [*METHODS, "long"]))
 def test_slow_shafts(method: str) -> None:
     """Nearly all of their clocks are skipped."""
     assert check(*slow(method)) > 0.8

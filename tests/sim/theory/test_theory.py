@@ -34,7 +34,7 @@ def speeds_over_four_decades() -> list[float]:
     """Return unit velocities from 1/100 to 100, none of them special, some close to multiples and halves."""
     rng = np.random.default_rng(20)
     near = [k + d for k in (1, 2, 7, 30) for d in (-0.0021, 0.0023, 0.01, -0.04, 0.45, 0.52)]
-    return [*(10 ** rng.uniform(-2, 2, size=60)).tolist(), *near]
+    return [*(10 ** rng.uniform(-2, 2, size=25)).tolist(), *near]
 
 
 @pytest.mark.parametrize("cancel", only([True], [True, False]))  # eq. (21), which is the default
@@ -56,7 +56,7 @@ def test_interval_and_error_at_constant_speed(cancel: bool) -> None:
         else:
             bound = 1 / m_s
         assert np.all(error <= bound + HALF_LSB), units
-    assert far > 60
+    assert far > 30
 
 
 @pytest.mark.parametrize("units", [1 / 501, 1.0003, 3.001])
