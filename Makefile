@@ -11,7 +11,7 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo figures compare icarus ghdl dtc test test-all lowest pytest verify formal formal-quick mutate upset bench studies size bitstreams docs api page site dist lint clean
+.PHONY: help venv demo figures compare icarus ghdl dtc chromium test test-all lowest pytest verify formal formal-quick mutate upset bench studies size bitstreams docs api page site dist lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 16
@@ -69,13 +69,16 @@ ghdl: ## GHDL, the compiler of VHDL, in the same way
 dtc: ## the compiler of device trees, in the same way
 	$(call apt,dtc,device-tree-compiler,https://git.kernel.org/pub/scm/utils/dtc/dtc.git)
 
+chromium: ## the browser in which the page of explore is tested, in the same way
+	$(call apt,chromium,chromium,https://www.chromium.org)
+
 test: $(VENV)/.test icarus ## lint, types and all tests but the nightly ones
 	@$(MAKE) --no-print-directory -j2 lint pytest
 
 pytest: $(VENV)/.test icarus
 	$(BIN)/pytest -q -n auto --dist worksteal -m "not nightly"
 
-test-all: lint icarus ghdl dtc lowest ## lint, types and all tests: every pair of options, and every mutant that a test must catch
+test-all: lint icarus ghdl dtc chromium lowest ## lint, types and all tests: every pair of options, and every mutant that a test must catch
 	$(BIN)/pytest -q -n auto --dist worksteal
 
 # Packages that came later may warn of what the lowest versions do.
@@ -124,8 +127,9 @@ bitstreams: $(VENV)/.boards icarus ## bitstreams of three boards in build, their
 	$(BIN)/python bench/boards.py
 	$(BIN)/pytest -q -n auto tests/boards/fpga/bitstreams.py
 
-docs: demo ## the pages of options, ports and registers, written to docs/reference, and docs/demo.png
+docs: demo $(VENV)/.test chromium ## pages of options, ports and registers, in docs/reference, and the pictures of demo and explore
 	$(BIN)/python bench/reference_pages.py
+	$(BIN)/python bench/explore.py -o docs/guides/explore.png
 	cp build/demo/methods.png docs/demo.png
 
 api: $(VENV)/.docs ## what every module has, from its docstrings, in build/api

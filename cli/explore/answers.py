@@ -5,6 +5,7 @@ command line, by `Refused` with the same line.
 """
 
 import base64
+import inspect
 import io
 import math
 import re
@@ -43,10 +44,10 @@ from tachometry.sim.studies.comparing.rivals import BASELINES
 from tachometry.sim.studies.plan import Plan, Plans, cells_of, default_range
 from tachometry.sim.studies.size import CORE, SEEDS, TARGETS, measure_core, versions
 from tachometry.sim.theory.performance import REAL_DISC
-from tachometry.spec import METHODS, TachometerSpec, methods_with
+from tachometry.spec import METHODS, TachometerSpec, Timing, methods_with, of_texts
 from tachometry.spec.language.option import ParameterError, options_of
 from tachometry.spec.language.units import short_time
-from tachometry.spec.registers.buses import bus_of, ports_on
+from tachometry.spec.registers.buses import ports_on
 
 Texts = Mapping[str, str]  # of options, by their names without dashes; empty: without the option
 Answer = dict[str, Any]
@@ -62,7 +63,7 @@ _START = {"ppr": "500", "clock": "100MHz", "tick": "100us", "max-speed": "6000rp
 _FACTS = (
     *("method", "range", "worst error", "real disc", "delay", "standstill", "one LSB of velocity", "advice", "note"),
 )
-_AGES = (1980, 1, 1, 0, 0, 0)  # of all files in archives, so that equal ones have equal bytes
+_WRITTEN = (1980, 1, 1, 0, 0, 0)  # when all files of archives were: equal ones have equal bytes
 
 
 @click.command("generate", cls=GroupedCommand)
@@ -74,8 +75,10 @@ def _generate(asked: Asked) -> Asked:
 @click.command("compare", cls=GroupedCommand)
 @CORE_AND_MAKE_OPTIONS
 @OPTIONAL_MOTION_OPTIONS
-def _compare(spec: TachometerSpec, make: Make, **given: Any) -> tuple[Methods, Any, Any]:
-    return _beside(spec, make), given["record"], given["tables"]
+def _compare(
+    spec: TachometerSpec, make: Make, record: Callable[..., Encoding] | None, tables: list[Path]
+) -> tuple[Methods, Callable[..., Encoding] | None, list[Path]]:
+    return named_methods("all", make), record, tables
 
 
 @click.command("replay", cls=GroupedCommand)
@@ -85,7 +88,7 @@ def _compare(spec: TachometerSpec, make: Make, **given: Any) -> tuple[Methods, A
 def _replay(
     spec: TachometerSpec, make: Make, capture: Path, read: Callable[..., Recording]
 ) -> tuple[Methods, Recording]:
-    return _beside(spec, make), read(capture, spec)
+    return named_methods("all", make), read(capture, spec)
 
 
 def answer(name: str, args: Mapping[str, Any], functions: Mapping[str, Callable[..., Answer]]) -> Answer:
@@ -93,14 +96,18 @@ def answer(name: str, args: Mapping[str, Any], functions: Mapping[str, Callable[
     try:
         function = functions.get(name)
         if function is None:
-            raise Refused(f"the page must ask one of {', '.join(functions)}, not {name!r}")
-        for given in args.values():
-            texts = given.values() if isinstance(given, dict) else [given]
+            raise ValueError(f"it must be one of {', '.join(functions)}, not {name!r}")
+        wanted = inspect.signature(function).parameters
+        for one, given in args.items():
+            alone = one in wanted and wanted[one].annotation is str
+            texts = given.values() if isinstance(given, dict) and not alone else [given if alone else None]
             if not all(isinstance(text, str) for text in texts):
-                raise Refused("what the page asks must be texts, and texts by the names of options")
-        return function(**args)
-    except TypeError as error:
+                raise ValueError(f"{one} must be of texts")
+        inspect.signature(function).bind(**args)
+    except (TypeError, ValueError) as error:
         return {"error": f"the page must ask as it is written: {error}", "field": ""}
+    try:
+        return function(**args)
     except Refused as error:
         line = str(error).partition(" (see tachometry ")[0]
         named = re.search(r"--([a-z][a-z-]*)", line)
@@ -125,14 +132,13 @@ def check(options: Texts) -> Answer:
     """Return what a core is: the command that writes it, its ports, and rows of names and values."""
 
     def of(asked: Asked) -> Answer:
-        ports = ports_on(asked.spec, asked.on)
         return {
             "module": asked.manifest["module"],  # which also says what cannot be
             "method": asked.spec.tachometer.method,
             "command": f"tachometry generate {_typed(options)} -o build",
             "rows": asked.rows,
             "facts": _FACTS,
-            "ports": [asdict(port) for port in ports],
+            "ports": [asdict(port) for port in ports_on(asked.spec, asked.on)],
             "motions": _motions(asked.spec.tachometer),
         }
 
@@ -145,7 +151,7 @@ def files(options: Texts) -> Answer:
     packed = io.BytesIO()
     with ZipFile(packed, "w", ZIP_DEFLATED) as archive:
         for file, text in texts.items():
-            archive.writestr(ZipInfo(file, _AGES), text.encode(), ZIP_DEFLATED)
+            archive.writestr(ZipInfo(file, _WRITTEN), text.encode(), ZIP_DEFLATED)
     return {"name": f"{name}.zip", "files": [*texts], "zip": base64.b64encode(packed.getvalue()).decode()}
 
 
@@ -154,13 +160,10 @@ def curves(options: Texts) -> Answer:
 
     The error is the greatest near each speed at constant speed, with a real disc. None: a method cannot measure there.
     """
-    core, beside = _core(options), common(options)
-    methods, left_out = _run(_compare, beside, lambda found: (found[0].specs, found[0].left_out))
-    plans = Plans(
-        core,
-        {name: spec for name, spec in methods.items() if spec is not None} | {core.method: core},
-        *default_range(core),
-    )
+    core = _core(options)
+    methods = _run(_compare, _alone(options, core), lambda found: found[0])
+    specs = {name: spec for name, spec in methods.specs.items() if spec is not None} | {core.method: core}
+    plans = Plans(core, specs, *default_range(core))
     unit, near = typed_unit(core), np.geomspace(plans.low, plans.high, _POINTS + 1)[:-1]
     every = plans.line.speed.tolist()
     starts = sorted({bisect_left(every, speed) for speed in near.tolist()})
@@ -174,14 +177,16 @@ def curves(options: Texts) -> Answer:
         error = plan.resolution + plan.disc + spec.scale.rounding_lsb * spec.scale.rad_per_s_per_lsb
         late = float(spec.times.seconds(spec.latency.tick_to_velocity))
         delay = late + plan.measurement_time / 2 * (not spec.words.on_ramps)
-        worst = f"{unit.of(np.nanmax(error)):.4g}" if not np.isnan(error).all() else "-"
+        errors, delays = greatest(unit.of(error)), greatest(delay)
+        known = [(one, late) for one, late in zip(errors, delays, strict=True) if one is not None and late is not None]
+        worst = (f"{max(known)[0]:.4g}", shown_time(max(late for _, late in known))) if known else ("-", "-")
         rest, cells = spec.times.standstill_ticks * spec.timing.tick_seconds, cells_of(spec)
         return {
             "name": name,
             "own": name == core.method,
-            "error": greatest(unit.of(error)),
-            "delay": greatest(delay),
-            "cells": [worst, shown_time(np.nanmax(delay)), short_time(rest), "-" if cells is None else str(cells)],
+            "error": errors,
+            "delay": delays,
+            "cells": [*worst, short_time(rest), "-" if cells is None else str(cells)],
         }
 
     each = [shown(name, plans.methods[name], plan) for name, plan in plans.lines.items()]
@@ -190,7 +195,7 @@ def curves(options: Texts) -> Answer:
         "x": [float(f"{unit.of(every[start]):.6g}") for start in starts],
         "heads": ["method", f"worst error ({unit.name})", "longest delay", "standstill within", "cells (ECP5)"],
         "curves": sorted(each, key=lambda one: not one["own"]),
-        "left_out": left_out,
+        "left_out": methods.left_out,
     }
 
 
@@ -199,24 +204,23 @@ def respond(options: Texts, motion: Texts) -> Answer:
 
     def of(found: Any) -> Answer:
         methods, record, tables = found
-        spec = methods.specs[core.method]
         if record is None or tables:
             raise ParameterError(
                 "motion", "must be given here, and must not be a file: drop a capture, or take compare"
             )
         moved = parse_motion(motion["motion"])
-        edges = moved.max_travel * spec.encoder.counts_per_rev / math.tau
-        ticks = moved.duration / float(spec.timing.tick_seconds)
+        edges = moved.max_travel * core.encoder.counts_per_rev / math.tau
+        ticks = moved.duration / float(core.timing.tick_seconds)
         if max(edges, ticks) > _MOST:
             raise ParameterError(
                 "motion",
                 f"must be of at most {_MOST} counts and ticks, not {max(edges, ticks):.3g}: take tachometry compare",
             )
-        truth: Encoding = record(spec)
+        truth = record(core)
         return _response(core, methods, Source("--motion", truth.recording, truth.true_speed))
 
     core = _core(options)
-    return _run(_compare, {**common(options), **motion}, of)
+    return _run(_compare, {**_alone(options, core), **motion}, of)
 
 
 def replay(options: Texts, capture: Texts, name: str, data: str) -> Answer:
@@ -229,7 +233,7 @@ def replay(options: Texts, capture: Texts, name: str, data: str) -> Answer:
             file.write_bytes(base64.b64decode(data, validate=True))
             return _run(
                 _replay,
-                {**common(options), **capture},
+                {**_alone(options, core), **capture},
                 lambda found: _response(core, found[0], Source("the capture", found[1], None)),
                 str(file),
             )
@@ -246,7 +250,7 @@ def size(options: Texts) -> Answer:
         try:
             tools = versions()
             verilog = replace(asked, name=CORE).texts()[f"{CORE}.v"]
-            ports = ports_on(asked.spec, bus_of(asked.bus, asked.baud))
+            ports = ports_on(asked.spec, asked.on)
             found = measure_core(asked.spec, TARGETS["ECP5"], verilog, tools, ports, SEEDS[:3])
         except RuntimeError as error:
             raise click.ClickException(f"the size cannot be measured: {error}") from error
@@ -260,7 +264,7 @@ def size(options: Texts) -> Answer:
 def _response(core: TachometerSpec, methods: Methods, source: Source) -> Answer:
     specs = {core.method: core} | methods.specs | {core.method: core} | dict.fromkeys(BASELINES)
     found = comparison(
-        core, specs, _never, source, earliest=None, latest=math.inf, tune=False, tradeoff=False, bar=no_bar
+        core, specs, of_texts, source, earliest=None, latest=math.inf, tune=False, tradeoff=False, bar=no_bar
     )
     unit = typed_unit(core)
     heads, rows = shown_scores(found, unit)
@@ -282,24 +286,21 @@ def _response(core: TachometerSpec, methods: Methods, source: Source) -> Answer:
             }
             for curve, row in each
         ],
-        "left_out": methods.left_out,
     }
-
-
-def _beside(spec: TachometerSpec, make: Make) -> Methods:
-    """Return all methods that can be as this core is."""
-    return named_methods("all", make)
-
-
-def _never(method: str, texts: Texts) -> TachometerSpec:
-    raise AssertionError("nothing is tuned")
 
 
 def _core(options: Texts) -> TachometerSpec:
     return _run(_generate, options, lambda asked: asked.spec.tachometer)
 
 
-def common(options: Texts) -> dict[str, str]:
+def _alone(options: Texts, core: TachometerSpec) -> dict[str, str]:
+    """Return options of the same core of one axis alone, with the method and the tick that were taken."""
+    ticks = [about.name for about in options_of(Timing) if about.field == "tick_cycles"]
+    texts = {name: text for name, text in of_one_axis(options).items() if name not in ticks}
+    return texts | {"method": core.method, "tick": core.options["tick"]}
+
+
+def of_one_axis(options: Texts) -> dict[str, str]:
     """Return those options that are of a core of one axis, without a loop."""
     known = _options_of(_compare)
     return {name: text for name, text in options.items() if name in known}
@@ -360,7 +361,6 @@ def _described(one: Option) -> Answer:
         "name": _name(one),
         "help": _DEFAULT.sub("", help),
         "default": (default[1] or "") if default else "",
-        "required": one.required or help.endswith("[required]"),
         "choices": choices,
         "flag": one.is_flag,
         "metavar": "" if choices else metavar.strip("[]").replace("|", " or "),

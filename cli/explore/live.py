@@ -16,7 +16,7 @@ from tachometry.boards.monitor.session import Session
 from tachometry.boards.monitor.settings import Fields, emulator_settings, limits
 from tachometry.boards.monitor.watch import State, watch
 from tachometry.cli.commands import Refused, refusals
-from tachometry.cli.explore.answers import Answer, Texts, check, common
+from tachometry.cli.explore.answers import Answer, Texts, check, of_one_axis
 from tachometry.cli.options.core import CoreTexts
 from tachometry.cli.options.target import SIMULATED, Target, target_of
 from tachometry.cli.reports.monitor import measured_rows, received_rows, wrong_rows
@@ -126,7 +126,7 @@ class Live:
         if not port.startswith(SIMULATED):
             raise Refused(f"the board must be that of the command line or a simulated one, not {port!r}")
         check(options)  # what is wrong is said as there
-        texts = {name: text for name, text in common(options).items() if text and name != "clock"}
+        texts = {name: text for name, text in of_one_axis(options).items() if text and name != "clock"}
         with refusals():
             return target_of(port, CoreTexts(texts.pop("method", AUTO), texts, True), None)
 

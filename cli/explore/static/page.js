@@ -52,7 +52,7 @@ function field(about) {
     input = made("input", { id, type: "checkbox" });
     input.checked = about.name in values ? values[about.name] === "yes" : on;
   } else {
-    input = made("input", { id, type: "text", placeholder: about.default || about.metavar.toLowerCase(), spellcheck: "false", maxlength: 4000 });
+    input = made("input", { id, type: "text", placeholder: about.default || (about.metavar === "N" ? "number" : about.metavar.toLowerCase()), spellcheck: "false", maxlength: 4000 });
     input.value = values[about.name] ?? "";
   }
   input.setAttribute("aria-describedby", told);
@@ -84,14 +84,14 @@ function form() {
 // Shows how many options of a group are given, and hides what the method does not have.
 function dressed() {
   const method = values.method ?? "auto";
-  for (const group of document.querySelectorAll(".group")) {
-    const given = [...group.querySelectorAll("[id^=o-]")].filter(one => one.id.slice(2) in values && !one.id.endsWith("-help")).length;
+  for (const group of document.querySelectorAll(".group, #encoder, #lines")) {
+    const given = [...group.querySelectorAll("input, select")].filter(one => one.id.slice(2) in values).length;
     group.querySelector(".set").textContent = given ? `${given} set` : "";
     const fields = [...group.querySelectorAll(".field")];
     for (const one of fields) one.hidden = method !== "auto" && one.dataset.methods !== "" && !one.dataset.methods.split(" ").includes(method);
-    group.hidden = fields.every(one => one.hidden);
+    if (group.className === "group") group.hidden = fields.every(one => one.hidden);
   }
-  for (const [name] of Object.entries(values)) if ($(`o-${name}`)?.closest(".field").hidden) delete values[name];
+  for (const [name] of Object.entries(values)) if ($(`o-${name}`)?.closest(".field")?.hidden) delete values[name];
 }
 
 function wrong(error, within = "form") {
@@ -134,7 +134,8 @@ function symbol({ module, ports }) {
 }
 
 const listed = rows => rows.flatMap(([name, value]) => [made("dt", {}, name.replaceAll("_", " ")), made("dd", {}, value)]);
-const cells = (kind, texts, right = []) => made("tr", {}, ...texts.map((text, n) => made(kind, right.includes(n) ? { class: "n" } : {}, text)));
+const cells = (kind, texts, right = []) => made("tr", {}, ...texts.map((text, n) =>
+  made(kind, { class: right.includes(n) && "n", scope: kind === "th" && "col" }, text)));
 
 function show(found) {
   $("command").textContent = found.command;
@@ -393,6 +394,7 @@ $("download").addEventListener("click", async () => {
   $("download").disabled = !checked;
 });
 
+$("form").addEventListener("submit", event => event.preventDefault());
 (async () => {
   known = await ask("options", {});
   const given = [...new URLSearchParams(location.hash.slice(1))];

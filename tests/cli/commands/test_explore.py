@@ -6,10 +6,6 @@ import os
 import re
 import signal
 import socket
-import subprocess
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 from urllib.error import HTTPError
@@ -17,27 +13,10 @@ from urllib.request import Request, urlopen
 
 import pytest
 from support.command import run
+from support.explored import explored
 from support.nightly import only
 
 ADDRESS = r"http://127\.0\.0\.1:\d+/[\w-]{32}/"
-
-
-@contextmanager
-def explored(folder: Path, *args: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """Give a running command, whose temporary files are in a folder, and its address."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "tachometry", "explore", *args],
-        env={**os.environ, "TMPDIR": str(folder)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        assert process.stdout is not None
-        yield process, process.stdout.readline().strip()
-    finally:
-        process.kill()
-        process.communicate()
 
 
 def posted(address: str, name: str, **args: object) -> dict[str, object]:

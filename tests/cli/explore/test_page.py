@@ -128,7 +128,16 @@ def test_what_is_wrong_is_said_as_by_the_command(
 
 
 @pytest.mark.parametrize(
-    "args", [{}, {"options": []}, {"options": {"ppr": 500}}, {"options": {}, "more": {}}, {"options": {"output": "x"}}]
+    "args",
+    [
+        {},
+        {"options": []},
+        {"options": "ppr"},
+        {"options": {"ppr": None}},
+        {"options": {"ppr": 500}},
+        {"options": {}, "more": {}},
+        {"options": {"output": "x"}},
+    ],
 )
 def test_what_the_page_never_asks(client: TestClient, args: dict[str, Any]) -> None:
     for name in ("check", "files", "answer", "__init__"):
