@@ -15,6 +15,7 @@ from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.simulation import Axis, Simulation
 from tachometry.spec import AxesSpec, CoreSpec
 from tachometry.spec.core.health import FAULT_TEXTS
+from tachometry.spec.language.port import COMPARE
 from tachometry.spec.language.units import format_time, plural
 
 _Row = tuple[str, str]  # a name and its value
@@ -116,6 +117,10 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
     if spec.health:
         code, faults = run.ticks.health[-1], plural(int(run.ticks.faults[-1]), "fault")
         rows.append(("health", f"{faults}, first: {FAULT_TEXTS[code]}" if code else "no fault"))
+    if spec.compare is not None:
+        pulses = run.tables[COMPARE]
+        last = f", the last at position {pulses.compare_position[-1]}" if len(pulses) else ""
+        rows.append(("compare", f"{plural(len(pulses), 'pulse')}{last}"))
     if spec.over_speed is not None:
         tripped = np.flatnonzero(run.ticks.over_speed)
         when = format_time(spec.times.seconds(int(run.ticks.clock[tripped[0]]))) if len(tripped) else ""

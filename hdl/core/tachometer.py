@@ -14,6 +14,7 @@ from tachometry.hdl.front_end.pulse_counter import PulseCounter
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.methods import DATAPATHS
 from tachometry.hdl.methods.datapath import LongTicks, OwnStandstill, OwnTicks, TickSource
+from tachometry.hdl.output.compare_output import CompareOutput
 from tachometry.hdl.output.low_pass import LowPass
 from tachometry.hdl.output.over_speed import OverSpeed
 from tachometry.hdl.output.standstill import Standstill
@@ -87,6 +88,10 @@ class Tachometer(wiring.Component):
             box = SerialVelocityOutput if spec.latency.output_serial else PipelinedVelocityOutput
             self.velocity_output = box(spec.scale.output, layout)
 
+        self.compare_output: CompareOutput | None = None
+        if spec.compare is not None:
+            clocks = spec.compare.clocks(spec.timing.clock_hz)
+            self.compare_output = CompareOutput(spec.compare, clocks, spec.position_width)
         self.trip = None if spec.over_speed is None else OverSpeed(spec.scale.over_speed, spec.widths.velocity)
 
     @property
@@ -97,7 +102,8 @@ class Tachometer(wiring.Component):
     @property
     def idle(self) -> tuple[Idle, ...]:
         """Registers that a simulation may move on."""
-        boxes: dict[str, object] = {"conditioner": self.conditioner, "watch": self.watch, "datapath": self.datapath}
+        names = ("conditioner", "watch", "compare_output", "datapath")
+        boxes: dict[str, object] = {name: getattr(self, name) for name in names}
         if not self._spec.facts.own_ticks:
             boxes["sampling_clock"] = self.sampling_clock
         return idle_of(boxes)
@@ -120,6 +126,7 @@ class Tachometer(wiring.Component):
         self._age(m, ticks, updates)
         self._index(m)
         self._watch(m)
+        self._compare(m)
         if self.trip is not None:
             m.submodules.trip = self.trip
             follow(m, self.trip, self, ("velocity_valid", "velocity"))
@@ -238,3 +245,12 @@ class Tachometer(wiring.Component):
         if self.index_capture is not None:
             follow(m, watch, self.index_capture, ("index_valid", "index_position"))
             follow(m, self, watch, ("index_error",))
+
+    def _compare(self, m: Module) -> None:
+        """Make pulses at positions, if they are asked for."""
+        if self.compare_output is None:
+            return
+        m.submodules.compare_output = box = self.compare_output
+        (step,) = delay(m, self.decoder.step, clocks=self._spec.latency.tick)
+        m.d.comb += [box.step.eq(step), box.position.eq(self.position)]
+        follow(m, self, box, ("compare", "compare_valid", "compare_position", "compare_count"))

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tachometry.sim.golden import health
+from tachometry.sim.golden import compare, health
 from tachometry.sim.golden.axes import run_axes
 from tachometry.sim.golden.front_end import count, decoded
 from tachometry.sim.golden.low_pass import filtered
@@ -52,14 +52,15 @@ def tables(spec: TachometerSpec, trace: PinTrace) -> dict[str, Table]:
     measured = golden.updates(ticks, steps, trace.n_clocks)
     measured = measured.having(cause=measured.clock - spec.latency.datapath)
     updates = in_unit(spec, filtered(spec, ticks, measured))
-    tripped = trips(spec, updates)
+    tripped, pulses = trips(spec, updates), compare.pulses(spec, steps)
     found = {
-        "tick": with_trip(spec, with_age(spec, ticks, updates), tripped),
+        "tick": compare.with_compare(spec, with_trip(spec, with_age(spec, ticks, updates), tripped), pulses),
         "velocity_valid": updates,
         "index_valid": index,
         "decode_error": Table(steps.errors, {}),
         "tick_error": Table(tick_errors, {}),
         "fault": wrong,
         "over_speed": tripped,
+        "compare_valid": pulses,
     }
     return {name: table.rows(slice(np.searchsorted(table.clock, trace.n_clocks))) for name, table in found.items()}

@@ -151,6 +151,24 @@ def first_beyond(steps: Steps, last: NDArray[np.int64], limit: int) -> NDArray[n
     return found[:-1]
 
 
+def wrapped(spec: TachometerSpec, position: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return positions in two's complement."""
+    half = 1 << (spec.position_width - 1)
+    return ((position + half) & (2 * half - 1)) - half
+
+
+def _origins(spec: TachometerSpec, steps: Steps) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return sums of all steps at each index, and what is taken off the position: before any index, and after each."""
+    captured = np.append(0, np.cumsum(steps.step))[np.searchsorted(steps.clock, steps.index, side="right")]
+    return captured, np.append(0, captured) if spec.index_reset else np.zeros(len(captured) + 1, dtype=np.int64)
+
+
+def positions(spec: TachometerSpec, steps: Steps) -> NDArray[np.int64]:
+    """Return the position after each step."""
+    origin = _origins(spec, steps)[1][np.searchsorted(steps.index, steps.clock, side="right")]
+    return wrapped(spec, np.cumsum(steps.step) - origin)
+
+
 def count(
     spec: TachometerSpec,
     steps: Steps,
@@ -178,22 +196,15 @@ def count(
         left = first_beyond(steps, last, spec.widths.max_pulse_count)
         sums = np.where(left != 0, left * spec.widths.max_pulse_count, sums)
         overflow = (left != 0) | beyond
-    rises = steps.index
-    captured = np.append(0, np.cumsum(steps.step))[np.searchsorted(steps.clock, rises, side="right")]
-    # What is taken off the position: before any index, and after each.
-    origin = np.append(0, captured) if spec.index_reset else np.zeros(len(rises) + 1, dtype=np.int64)
-    shown = reached - origin[np.searchsorted(rises, last, side="right")] if spec.index_reset else reached
-
-    def wrapped(position: NDArray[np.int64]) -> NDArray[np.int64]:
-        half = 1 << (spec.position_width - 1)
-        return ((position + half) & (2 * half - 1)) - half
-
+    captured, origin = _origins(spec, steps)
+    shown = reached - origin[np.searchsorted(steps.index, last, side="right")] if spec.index_reset else reached
     strobe = last + spec.latency.tick
     glitches = places(steps.swallowed, strobe, "right")
     columns = {
         "pulse_count": np.clip(sums, -spec.widths.max_pulse_count, spec.widths.max_pulse_count),
-        "position": wrapped(shown),
+        "position": wrapped(spec, shown),
         "overflow": overflow,
         "swallowed_edges": 2 * np.minimum(glitches, (1 << 15) - 1),
     }
-    return Table(strobe, columns), Table(rises + spec.latency.tick, {"index_position": wrapped(captured - origin[:-1])})
+    index = {"index_position": wrapped(spec, captured - origin[:-1])}
+    return Table(strobe, columns), Table(steps.index + spec.latency.tick, index)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tachometry.sim import golden
-from tachometry.sim.golden import health
+from tachometry.sim.golden import compare, health
 from tachometry.sim.golden.front_end import decoded
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec.language.port import INDEX, TICK, UPDATE
@@ -192,8 +192,13 @@ class GoldenBank:
             "age": min(age, self._map.spec.timing.max_ticks),
             "swallowed_edges": 2 * min(glitches, (1 << 15) - 1),
             "over_speed": int(self._count(self._tables["over_speed"].clock, self._cleared + 1, clock) > 0),
+            **(self._pulses(clock) if self._map.spec.compare is not None else {}),
             **(self._faults(clock) if self._map.spec.health else {}),
         }
+
+    def _pulses(self, clock: int) -> dict[str, int]:
+        found = compare.shown(self._map.spec, self._tables["compare_valid"], np.array([clock]))
+        return {name: int(column[0]) for name, column in found.items()}
 
     def _faults(self, clock: int) -> dict[str, int]:
         found = self._tables["fault"]

@@ -41,6 +41,8 @@ def check(spec: TachometerSpec) -> None:
     if spec.index_reset and not spec.index:
         raise ParameterError("index_reset", "must be given together with an index")
     _check_health(spec)
+    if spec.compare is not None:
+        spec.compare.check(spec.timing.clock_hz, spec.position_width)
     if spec.over_speed is not None and spec.scale.over_speed >= spec.scale.full_scale:
         greatest = f"{spec.scale.full_scale * spec.scale.rad_per_s_per_lsb:.6g} rad/s, the greatest velocity"
         raise ParameterError("over_speed", f"must be less than {greatest}, not {spec.over_speed}")

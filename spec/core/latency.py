@@ -74,4 +74,6 @@ class Latency(Follows[S]):
             "tick_latency": self.tick,
             "tick_to_velocity": self.tick_to_velocity,
         }
+        if self.spec.compare is not None:
+            found["pin_to_compare"] = self.pin_to_count + self.tick + 1
         return found | ({"tick_in_to_window_end": TICK_IN_TO_WINDOW_END} if self.spec.external_tick else {})

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from tachometry.spec.core.compare import COUNT_WIDTH
 from tachometry.spec.core.health import FAULT_TEXTS, FAULT_WIDTH, FAULTS_WIDTH
-from tachometry.spec.language.port import INDEX, TICK, UPDATE, Port, held, pin, strobe
+from tachometry.spec.language.port import COMPARE, INDEX, TICK, UPDATE, Port, held, pin, strobe
 
 if TYPE_CHECKING:
     from tachometry.spec.core.tachometer import TachometerSpec
@@ -101,6 +102,7 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
                 "external tick came too early and was left out.",
             ),
         ),
+        *_compare_ports(spec),
         *_health_ports(spec),
         *_if(
             spec.over_speed,
@@ -116,6 +118,16 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
             ),
         ),
     )
+
+
+def _compare_ports(spec: TachometerSpec) -> Iterable[Port]:
+    if spec.compare is None:
+        return
+    yield held(TICK, "compare", help=f"Pulse at a position, of {spec.compare.width}. It does not wait for a tick.")
+    yield held(TICK, "compare_count", COUNT_WIDTH, help="Pulses of compare since reset; it wraps.")
+    yield strobe(COMPARE, "The first clock of a pulse of compare.")
+    text = "Position of the latest pulse of compare."
+    yield held(COMPARE, "compare_position", spec.position_width, signed=True, unit="counts", help=text)
 
 
 def _health_ports(spec: TachometerSpec) -> Iterable[Port]:

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 from tachometry.spec.core.bound import Bound
 from tachometry.spec.core.checks import check
+from tachometry.spec.core.compare import Compare
 from tachometry.spec.core.encoder import Encoder
 from tachometry.spec.core.facts import Facts
 from tachometry.spec.core.latency import Latency
@@ -79,6 +80,8 @@ class TachometerSpec:
         More illegal transitions in a second are a fault.
     over_speed : Speed or None
         Output `over_speed` trips at a velocity beyond it, and stays so.
+    compare : Compare or None
+        Output `compare` has pulses at these positions.
     chosen : str
         Why this method was taken, where none was named; empty: it was named.
 
@@ -218,6 +221,14 @@ class TachometerSpec:
         metavar="SPEED",
         parse=parse_speed,
         tests=("", "30rad/s"),
+    )
+    compare: Compare | None = option(  # noqa: RUF009
+        None,
+        "Output compare has pulses of WIDTH, a time or clocks, at COUNT positions (0: no end) from START on, STEP "
+        "counts apart, while the shaft turns forward, or backward with :backward at the end: 100:100:50:10us.",
+        metavar="START:STEP:COUNT:WIDTH",
+        parse=Compare.parse,
+        tests=("", "2:3:0:7clk", "-2:3:40:1clk:backward"),
     )
     chosen: str = field(default="", compare=False, repr=False)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-TICK, UPDATE, INDEX = "tick", "velocity_valid", "index_valid"
+TICK, UPDATE, INDEX, COMPARE = "tick", "velocity_valid", "index_valid", "compare_valid"
 
 
 @dataclass(frozen=True)

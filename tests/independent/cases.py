@@ -49,7 +49,7 @@ def _case(
 
 
 _PORTS = "decoding=2 unit=rpm index=yes index-reset=yes position-width=8 filter=3 age=yes"
-_PORTS += " health=yes health-edges=3 health-errors=1 over-speed=20rpm"
+_PORTS += " health=yes health-edges=3 health-errors=1 over-speed=20rpm compare=-1:2:9:7clk:backward"
 _ALL = f"{_PORTS} bounds=yes"
 
 CASES = [

@@ -30,6 +30,7 @@ _SHARED = {
     "bounds": "bounds",
     "edge_error": "edge-error",
     "lowpass": "lowpass",
+    "compare": "compare",
     "over_speed": "over-speed",
     "health": "health",
     "health_edges": "health-edges",
@@ -81,6 +82,7 @@ def parameter(settings: Settings, name: str, shown: object) -> object:
         "multiplier": settings.words.get("multiplier", "auto"),
         "fine_bits": settings.fine_bits,
         "position_width": settings.position_bits,
+        "compare": settings.words.get("compare"),
         "over_speed": settings.words.get("over-speed"),
         "health_edges": int(settings.words.get("health-edges", "256")),
         "health_errors": int(settings.words.get("health-errors", "10")),
@@ -285,6 +287,8 @@ class Expected:
             "latency_cycles.tick_latency": lambda: manifest["latency_cycles"]["tick_latency"],
             "latency_cycles.tick_to_velocity": lambda: self.to_velocity,
             "latency_cycles.tick_in_to_window_end": lambda: 2,
+            # Measured: every pulse is compared at its clock.
+            "latency_cycles.pin_to_compare": lambda: manifest["latency_cycles"]["pin_to_compare"],
             "recovery_cycles": self.recovery,
             # Measured: external ticks that are as close as this, and a clock closer.
             "external_tick_cycles.min": lambda: external["min"] if 2 <= external["min"] <= settings.tick else None,
@@ -306,6 +310,7 @@ class Expected:
             "min_time_cycles": settings.method == "mt",
             "recovery_cycles": self.forgets,
             **dict.fromkeys((f"acceleration.{name}" for name in ACCELERATION), settings.method == "track"),
+            "latency_cycles.pin_to_compare": "compare" in settings.words,
             "position_fine.frac_bits": settings.method == "track",
             **dict.fromkeys(
                 ("latency_cycles.tick_in_to_window_end", "external_tick_cycles.min", "external_tick_cycles.max"),
@@ -375,6 +380,7 @@ def check_ports(expected: Expected, ports: list[dict[str, Any]]) -> None:
             else {}
         ),
         **({"index_position": settings.position_bits} if settings.flag("index") else {}),
+        **({"compare_position": settings.position_bits, "compare_count": 16} if "compare" in settings.words else {}),
         **({"health": 3, "faults": 8} if settings.flag("health") else {}),
         **({"index_error": settings.position_bits} if settings.flag("health") and settings.flag("index") else {}),
         **({"swallowed_edges": 16} if settings.filter else {}),
@@ -382,6 +388,7 @@ def check_ports(expected: Expected, ports: list[dict[str, Any]]) -> None:
     single = ["velocity_valid", "forced", "tick", "decode_error", "overflow", "stalled"]
     single += ["velocity_overflow"] * (not own) + ["bounds_valid"] * settings.flag("bounds")
     single += ["out_of_range"] * beyond + ["index_valid"] * settings.flag("index")
+    single += ["compare", "compare_valid"] * ("compare" in settings.words)
     single += ["over_speed"] * ("over-speed" in settings.words)
     single += ["fault"] * settings.flag("health") + ["tick_error"] * settings.external
     inputs = ["clk", "rst", "a", "b"] + ["z"] * settings.flag("index") + ["tick_in"] * settings.external
@@ -389,7 +396,18 @@ def check_ports(expected: Expected, ports: list[dict[str, Any]]) -> None:
     assert len(found) == len(ports)
     assert [port["name"] for port in ports if port["direction"] == "input"] == inputs
     assert {port["name"] for port in ports if port["direction"] == "output"} == {*widths, *single}
-    unsigned = ("interval", "age", "quality", "n_ep1", "n_dt1", "dt_shift", "swallowed_edges", "health", "faults")
+    unsigned = (
+        "interval",
+        "age",
+        "quality",
+        "n_ep1",
+        "n_dt1",
+        "dt_shift",
+        "swallowed_edges",
+        "health",
+        "faults",
+        "compare_count",
+    )
     for name, port in found.items():
         assert set(port) == {"name", "direction", "width", "signed"}
         assert port["signed"] == (name in widths and name not in unsigned), name

@@ -14,7 +14,7 @@ from independent.manifest import check_manifest
 from independent.show import check_age, check_updates
 from independent.stimulus import Lines, external, motion
 from independent.track import check_tracking, track_updates
-from reference.front import Front, Tick, conditioned, external_ends, faults, index_positions, ticks_of
+from reference.front import Front, Tick, compared, conditioned, external_ends, faults, index_positions, ticks_of
 from reference.rairan import rairan_updates
 from reference.settings import arguments
 from reference.timed import timed_updates
@@ -103,6 +103,15 @@ def check_front(
     if settings.external:
         assert [row["clock"] - late for row in rows if row["tick_error"]] == [at for at in wrong if at + late < n]
         assert wrong
+    if "compare" in settings.words:
+        spare = manifest["latency_cycles"]["pin_to_compare"] - manifest["latency_cycles"]["pin_to_count"]
+        wanted = compared(settings, front)
+        assert [(row["clock"] - spare, row["compare_position"]) for row in rows if row["compare_valid"]] == wanted
+        assert wanted or settings.method in ("mt", "track")  # whose motions do not come there
+        for row in seen:
+            before = [at + spare for at, _ in wanted if at + spare <= row["clock"]]
+            assert row["compare_count"] == len(before)
+            assert row["compare"] == (bool(before) and row["clock"] - before[-1] < 7)
     if settings.flag("health"):
         check_health(faults(settings, front, late), seen)
     if settings.filter:

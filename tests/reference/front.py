@@ -199,3 +199,18 @@ def _turns(settings: Settings, front: Front, late: int) -> list[tuple[int, int, 
                 found.append((at + late + 1, 3, off))
         last = position, direction
     return found
+
+
+def compared(settings: Settings, front: Front) -> list[tuple[int, int]]:
+    """Return clocks of steps that lead to the awaited positions, and these."""
+    start, step, count, _, *direction = settings.words["compare"].split(":")
+    sign = -1 if direction == ["backward"] else 1
+    found: list[tuple[int, int]] = []
+    awaited, position, rises = int(start), 0, set(front.index)
+    for clock in sorted({*front.steps, *rises}):
+        position = wrapped(position + front.steps.get(clock, 0), settings.position_bits)
+        position = 0 if clock in rises and settings.flag("index-reset") else position
+        if front.steps.get(clock) == sign and position == awaited and (int(count) == 0 or len(found) < int(count)):
+            found.append((clock, awaited))
+            awaited = wrapped(awaited + sign * int(step), settings.position_bits)
+    return found

@@ -103,6 +103,7 @@ def test_defaults(tmp_path: Path) -> None:
         "health_edges": 256,
         "health_errors": 10,
         "over_speed": None,
+        "compare": None,
         "cancel": True,
         "reciprocal_source": "serial",
     }

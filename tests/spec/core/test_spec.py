@@ -187,6 +187,7 @@ def test_manifest_names_every_option_and_survives_json() -> None:
         "health_edges": 256,
         "health_errors": 10,
         "over_speed": None,
+        "compare": None,
         "cancel": False,
         "reciprocal_source": "serial",
     }
