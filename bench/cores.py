@@ -108,7 +108,7 @@ EVERY_CLOCK_BARS = {
     "HX8K": {"Fmax": 100},
 }
 TRACK_BARS = {
-    "ECP5": {"COMB": 1700, "FF": 900, "MULT": 0, "Fmax": 48},
+    "ECP5": {"COMB": 1100, "FF": 850, "MULT": 0, "Fmax": 60},
     "UP5K": {"Fmax": 12},
 }
 # The reference core, and 250 COMB and 100 FF for the bank.
@@ -264,14 +264,16 @@ CONFIGURATIONS = (
         TrackTachometer(**COMMON, max_speed=MAX_SPEED, multiplier="serial"),
         TRACK_BARS,
         is_option=False,
+        targets=("ECP5", "UP5K"),
         without_max_speed="track-wide",
     ),
     Configuration(
         "track-block",
         "tracking, 1000 rad/s, multiplier of the FPGA",
         TrackTachometer(**COMMON, max_speed=MAX_SPEED, multiplier="block"),
-        {"ECP5": {"COMB": 1900, "FF": 950, "MULT": 4, "Fmax": 48}},
+        {"ECP5": {"COMB": 1500, "FF": 900, "MULT": 3, "Fmax": 60}},
         is_option=False,
+        targets=("ECP5",),
     ),
     Configuration(
         "track-external-tick",
@@ -280,8 +282,11 @@ CONFIGURATIONS = (
             **COMMON, max_speed=MAX_SPEED, multiplier="serial", external_tick=True, max_tick_cycles=MAX_TICK
         ),
         is_option=False,
+        targets=("ECP5",),
     ),
-    Configuration("track-wide", "tracking, no max_speed", TrackTachometer(**COMMON), is_option=False),
+    Configuration(
+        "track-wide", "tracking, no max_speed", TrackTachometer(**COMMON), is_option=False, targets=("ECP5",)
+    ),
     Configuration("t-tick", "T method, times in ticks", TTachometer(**COMMON, timer="tick"), is_option=False),
     Configuration("mt-tick", "M/T method, times in ticks", MTTachometer(**COMMON, timer="tick"), is_option=False),
     *(
