@@ -91,8 +91,6 @@ def test_the_core_that_lies_there_is_simulated(generated: Generated, capsys: pyt
     folder = generated("core", *CORES["s"].split())
     wrong = folder / "netlist.v"
     text = (folder / "core.v").read_text()
-    assert run("check", folder) == 0
-    assert capsys.readouterr().out.splitlines()[-1].endswith("1 agree with the golden model")
     wrong.write_text(re.sub(r" - ", " + ", text, count=1))
     assert wrong.read_text() != text
     assert run("check", folder / "core.json", "--verilog", wrong, "--waves", folder / "waves") == 1
@@ -130,5 +128,8 @@ def test_the_jobs_run_as_a_shell_would_run_them(generated: Generated, tmp_path: 
     (tmp_path / "tools").mkdir()
     (tmp_path / "tools" / "verilator").symlink_to(home() / "bin" / "verilator")  # where apt puts it
     path = os.pathsep.join([str(tmp_path / "tools"), str(Path(sys.executable).parent), os.environ["PATH"]])
+    told = ""
     for step in steps[2:]:
-        subprocess.run(step, shell=True, cwd=folder, check=True, env=os.environ | {"PATH": path})
+        environment = os.environ | {"PATH": path}
+        told += subprocess.run(step, shell=True, cwd=folder, check=True, env=environment, stdout=-1, text=True).stdout
+    assert "1 agree with the golden model" in told

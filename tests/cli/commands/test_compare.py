@@ -82,7 +82,7 @@ def test_what_cannot_be_is_told_in_one_line(
 
 def test_a_capture_in_place_of_a_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Edges of a capture give the same updates, and no errors, for nobody knows the truth."""
-    saved = [*"simulate --motion ramp:0:40rad/s:200ms --save-capture".split(), tmp_path / "c.sr"]
+    saved = [*"simulate --method s --motion ramp:0:40rad/s:200ms --save-capture".split(), tmp_path / "c.sr"]
     assert run(*saved, *CORE) == 0
     capsys.readouterr()
     names = ["--methods", "s,m,odrive"]
