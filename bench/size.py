@@ -391,8 +391,8 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
     if options.seeds < 1:
         parser.error(f"--seeds must be at least 1, not {options.seeds}")
     everything = (options.only, options.seeds, options.targets) == (None, len(SEEDS), tuple(TARGETS))
-    if options.update and (options.seeds, options.targets) != (len(SEEDS), tuple(TARGETS)):
-        parser.error("--update takes neither --seeds nor --targets: rows of a page are measured alike")
+    if options.update and options.seeds != len(SEEDS):
+        parser.error("--update does not take --seeds: rows of a page are measured alike")
     if options.output is None and (everything or options.update):
         options.output = PAGE
     return options
@@ -418,7 +418,9 @@ def run(options: argparse.Namespace) -> int:
     for table in [*tables(results), *split]:
         print(table.markdown())
     if options.update:
-        results = kept(PAGE.read_text(encoding="utf-8"), tools) | results
+        names = {found.name for found in chosen}  # on targets that are left out, they are not those of today
+        before = kept(PAGE.read_text(encoding="utf-8"), tools)
+        results |= {place: found for place, found in before.items() if place[0] not in names}
         order = [(found.name, target) for found in CONFIGURATIONS for target in found.targets]
         results = {place: results[place] for place in order if place in results}
     measured = tables(results)

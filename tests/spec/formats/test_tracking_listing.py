@@ -9,6 +9,7 @@ from support.tracking import Interpreter, core, windows
 
 from tachometry.sim.golden.methods.track import rows
 from tachometry.spec import TrackTachometer
+from tachometry.spec.formats.tracking_code import Jump, assembled
 
 # Ticks of few clocks and of many, of one length and of several; words as wide as they come.
 CORES = [
@@ -38,6 +39,25 @@ def test_listing() -> None:
     labels = {place: label for label, place in code.labels.items()}
     missed = [(labels.get(place), one) for place, one in enumerate(code.instructions) if not met[place]]
     assert not missed
+
+
+@pytest.mark.parametrize(
+    ("lines", "word"),
+    [
+        ("a + b; if neg goto there; c; end; there:; d; end", "c"),
+        ("a + b; if neg goto there; - c; end; there:; d; end", "c"),
+        ("a + b; if neg goto there; c; end; there:; - d; end", ""),  # there the sum is still needed
+        ("a + b; if neg goto there; c keep; end; there:; zero s+ d; end", ""),  # and the sign
+        ("a + b; if neg goto there; c = d; end; there:; d; end", ""),  # a jump does not store
+        ("a + b; if neg goto there; c log; end; there:; d; end", ""),
+        ("c = a + b; if neg goto there; c; end; there:; d; end", ""),  # it is not there yet
+        ("a + b; goto there; there:; c; end", "c"),
+        ("if neg goto there; back:; c; goto back; there:; d; goto back", ""),  # it is gone to as well
+    ],
+)
+def test_a_jump_adds_the_term_behind_it(lines: str, word: str) -> None:
+    code = assembled(lines.replace(";", "\n")).instructions
+    assert next(one.word for one in code if one.jump not in (Jump.NEVER, Jump.END)) == word
 
 
 @nightly
