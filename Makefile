@@ -78,7 +78,7 @@ test: $(VENV)/.test icarus ## lint, types and all tests but the nightly ones
 pytest: $(VENV)/.test icarus
 	$(BIN)/pytest -q -n auto --dist worksteal -m "not nightly"
 
-test-all: lint icarus ghdl dtc chromium lowest ## lint, types and all tests: every pair of options, and every mutant that a test must catch
+test-all: lint icarus ghdl dtc chromium $(VENV)/.docs lowest ## lint, types and all tests: every pair of options, and every mutant that a test must catch
 	$(BIN)/pytest -q -n auto --dist worksteal
 
 # Packages that came later may warn of what the lowest versions do.
@@ -140,12 +140,8 @@ page: $(LINKED) ## the page of `tachometry explore` without a server, in build/p
 	rm -rf build/page && $(BIN)/python bench/page/build.py build/page
 
 site: $(VENV)/.docs page ## the pages of docs/ with a search, in build/www, and `make page` as explore; a dead link is an error
-	rm -rf build/pages && cp -r docs build/pages && cp CONTRIBUTING.md CHANGELOG.md build/pages
-	sed 's|](docs/|](|g' README.md > build/pages/index.md
-	sed -i.bak 's|](\.\./\.\./|](../|g; s|](docs/|](|g; s|README\.md|index.md|g' build/pages/CONTRIBUTING.md build/pages/*/*.md && rm build/pages/*.bak build/pages/*/*.bak
-	$(BIN)/zensical build --clean --strict
+	$(BIN)/python bench/website.py
 	cp -r build/page build/www/explore
-	@grep -q standstill build/www/search.json && echo "open build/www/index.html"
 
 # README.md is the page at PyPI, too, where links are those of the repository, at the tag of the version.
 dist: $(VENV)/.made ## wheel and sdist in build/dist, checked; ADDRESS and MAIL are those of the repository and its owner, if pyproject.toml has none
