@@ -30,6 +30,7 @@ _OPTIONS = [
         metavar="CHANNEL",
         help="Channel of line B. [default of --a and --b: the channels named A and B, else the first two]",
     ),
+    option(_CAPTURE, "--c", metavar="CHANNEL", help="Channel of line C of halls. [default: c with --sensor hall]"),
     option(
         _CAPTURE, "--z", metavar="CHANNEL", help="Channel of line Z, the index. [default: z with --index, else none]"
     ),
@@ -38,15 +39,6 @@ _OPTIONS = [
         "--tick-in",
         metavar="CHANNEL",
         help="Channel of the external tick. [default: tick_in with --external-tick, else none]",
-    ),
-    option(
-        _CAPTURE,
-        "--sensor",
-        type=click.Choice(["quadrature", "pulses", "step-dir"], case_sensitive=False),
-        default="quadrature",
-        help="What was captured. pulses: only line A, as of a tooth wheel, which always turns forward; --decoding 2 "
-        "counts all edges, 1 the rising ones. step-dir: each rise of line A is a step, forward where line B is high; "
-        "four steps are one pulse of --ppr.",
     ),
     option(
         _CAPTURE,
@@ -97,29 +89,30 @@ def _read(
     *,
     a: str | None,
     b: str | None,
+    c: str | None,
     z: str | None,
     tick_in: str | None,
     time: str | None,
     time_unit: str | None,
     threshold: str | None,
     samplerate: str | None,
-    sensor: str,
     count: str | None,
     wrap: int | None,
     **others: Any,
 ) -> dict[str, Any]:
-    lines = dict(a=a, b=b, z=z, tick_in=tick_in, threshold=threshold, samplerate=samplerate)
+    lines = dict(a=a, b=b, c=c, z=z, tick_in=tick_in, threshold=threshold, samplerate=samplerate)
 
     def read(capture: Path, spec: CoreSpec, axis: int = 0) -> Recording:
         from tachometry.sim.captures.cells import parse_threshold
         from tachometry.sim.captures.count_log import read_count_log
         from tachometry.sim.captures.file import SAME, OptionError
         from tachometry.sim.captures.header import TextOptions
-        from tachometry.sim.captures.other_sensors import converted
+        from tachometry.sim.captures.other_sensors import fitted
         from tachometry.sim.captures.read import read_capture, with_last_tick
         from tachometry.sim.captures.time_unit import parse_time_unit
 
         alone, axes = spec.tachometer, spec.axes
+        sensor = alone.encoder.sensor
         text = TextOptions(
             time,
             None if time_unit is None else parse_time_unit("time_unit", time_unit),
@@ -127,20 +120,22 @@ def _read(
             slowest_s=float(alone.times.seconds(alone.times.longest)),
         )
         if count is not None:
-            _refuse_lines({**lines, "sensor": None if sensor == "quadrature" else sensor, "index": alone.index or None})
+            _refuse_lines({**lines, "sensor": None if alone.encoder.plain else sensor, "index": alone.index or None})
             log = read_count_log(capture, _of_axis("count", count, axis, axes) or "", text, wrap)
             return with_last_tick(log.recording(alone.encoder.decoding), spec)
         if wrap is not None:
             raise OptionError("wrap", "must not be given without --count")
-        if sensor == "pulses" and b is not None:
-            raise OptionError("b", "must not be given together with --sensor pulses")
+        for line, text_of_line in (("b", b), ("c", c)):
+            if text_of_line is not None and line not in alone.encoder.kind.lines:
+                raise OptionError(line, f"must not be given together with --sensor {sensor}")
         line_a, line_b = (_of_axis(line, text, axis, axes) for line, text in (("a", a), ("b", b)))
         index = _of_axis("z", z, axis, axes) if z is not None or alone.index else None
         tick = "tick_in" if tick_in is None and alone.external_tick else tick_in
         rate = None if samplerate is None else float(parse_frequency("samplerate", samplerate))
         second = SAME if sensor == "pulses" else line_b
-        recording = read_capture(capture, line_a, second, rate, index, tick, text)
-        return with_last_tick(converted(recording, sensor, alone), spec)
+        third = (c or "c") if sensor == "hall" else None
+        recording = read_capture(capture, line_a, second, rate, index, tick, text, third)
+        return with_last_tick(fitted(recording, alone.encoder), spec)
 
     if others.get("capture") is None:
         refuse_without("--replay", _OPTIONS)

@@ -82,10 +82,9 @@ def _record(encoder: VirtualEncoder, motion: str, spec: TachometerSpec) -> Encod
             "motion", f"has times without a unit: {name} must have it in its name, as time_ms"
         ) from None
     # In the middle of a quarter period, for rounding not to make or lose an edge.
-    angle = (log.count * (4.0 / spec.encoder.decoding) + 0.5) * encoder.disc.pitch_rad
+    angle = (log.count * (encoder.edges_per_rev / spec.encoder.counts_per_rev) + 0.5) * encoder.disc.pitch_rad
     encoding = encoder.record(Motion.of_table(log.time, angle.astype("float64")))
-    source = log.recording(spec.encoder.decoding).source
-    return replace(encoding, recording=replace(encoding.recording, source=source))
+    return replace(encoding, recording=replace(encoding.recording, source=log.source))
 
 
 def _read_encoder(**given: Any) -> dict[str, Any]:
@@ -94,7 +93,7 @@ def _read_encoder(**given: Any) -> dict[str, Any]:
     def encoder(spec: TachometerSpec) -> VirtualEncoder:
         from tachometry.sim.encoder.virtual import VirtualEncoder
 
-        return VirtualEncoder(spec.encoder.pulses_per_rev, index=spec.index, **values)
+        return VirtualEncoder.of(spec.encoder, index=spec.index, **values)
 
     return dict(encoder=encoder, **given)
 

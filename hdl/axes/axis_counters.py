@@ -25,6 +25,8 @@ class AxisCounters(wiring.Component):
     rounds : int
         Rounds of a tick: most steps of an axis in it.
     decoding : int
+    reverse : bool
+        Forward is B before A.
         Counts per period: 1, 2 or 4.
 
     Members
@@ -48,7 +50,8 @@ class AxisCounters(wiring.Component):
         Sum of its steps in this tick.
     """
 
-    def __init__(self, *, slots: int, rounds: int, decoding: int) -> None:
+    def __init__(self, *, slots: int, rounds: int, decoding: int, reverse: bool = False) -> None:
+        self._reverse = reverse
         self._take(slots, decoding, signed(rounds.bit_length() + 1))
 
     def _take(
@@ -84,7 +87,11 @@ class AxisCounters(wiring.Component):
         counted, backward, illegal = transition(self._decoding, a, b, before.a, before.b)
         counts = Signal()
         step = Signal.like(self.step)
-        m.d.comb += [read.addr.eq(self.slot), counts.eq(ready & counted), step.eq(Cat(counts, counts & backward))]
+        m.d.comb += [
+            read.addr.eq(self.slot),
+            counts.eq(ready & counted),
+            step.eq(Cat(counts, counts & (~backward if self._reverse else backward))),
+        ]
         self._add(m, before.count, first, ready, step)
         new_a, new_b = delay(m, a, b)
         m.d.sync += [

@@ -41,10 +41,13 @@ class AxisTickCounts(AxisCounters):
     form : Tracking
         That of an axis.
     decoding : int
+    reverse : bool
+        Forward is B before A.
         Counts per period: 1, 2 or 4.
     """
 
-    def __init__(self, *, slots: int, form: Tracking, decoding: int) -> None:
+    def __init__(self, *, slots: int, form: Tracking, decoding: int, reverse: bool = False) -> None:
+        self._reverse = reverse
         self._form = form
         self._take(slots, decoding, counts_layout(form), BLOCK)
 

@@ -1,6 +1,7 @@
 """The whole core for many axes."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from amaranth import Module, Signal, Value
 from amaranth.lib import wiring
@@ -44,14 +45,14 @@ class AxesTachometer(wiring.Component):
         self.axis_filter: AxisFilter | None = None
         if spec.axis.filter_clocks:
             self.axis_filter = AxisFilter(slots=spec.slots, looks=spec.axis.filter_clocks, lines=spec.lines)
-        decoding = spec.axis.encoder.decoding
+        decoded: dict[str, Any] = {"decoding": spec.axis.encoder.decoding, "reverse": spec.axis.encoder.reverse}
         self.axis_counters: AxisCounters
         self.datapath: AxesDatapath | AxesTrackDatapath
         if isinstance(spec.axis, TrackAxis):
-            self.axis_counters = AxisTickCounts(slots=spec.slots, form=spec.axis.form, decoding=decoding)
+            self.axis_counters = AxisTickCounts(slots=spec.slots, form=spec.axis.form, **decoded)
             self.datapath = AxesTrackDatapath(spec)
         else:
-            self.axis_counters = AxisCounters(slots=spec.slots, rounds=times.longest_tick, decoding=decoding)
+            self.axis_counters = AxisCounters(slots=spec.slots, rounds=times.longest_tick, **decoded)
             self.datapath = AxesDatapath(spec)
         self.axis_index: AxisIndex | None = None
         if spec.axis.index:
@@ -80,6 +81,7 @@ class AxesTachometer(wiring.Component):
         if spec.axis.external_tick:
             m.d.comb += [rounds.tick_in.eq(level["tick_in"]), self.tick_error.eq(rounds.tick_error)]
         at, level, known = self._looks(m, {name: level[name] for name in spec.lines})
+        level |= {name: ~level[name] for name in spec.axis.encoder.inverted}
         m.d.comb += [
             *(getattr(counters, name).eq(at[name]) for name in ("slot", "first", "last")),
             counters.ready.eq(at["ready"] & known["a"] & known["b"]),

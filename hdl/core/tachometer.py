@@ -1,11 +1,14 @@
 """The whole core."""
 
-from amaranth import Module, Signal
+from functools import reduce
+from operator import and_
+
+from amaranth import Module, Signal, Value
 from amaranth.lib import stream, wiring
 
 from tachometry.hdl.arithmetic.idle import Idle, idle_of
 from tachometry.hdl.front_end.conditioner import InputConditioner
-from tachometry.hdl.front_end.decoder import QuadratureDecoder
+from tachometry.hdl.front_end.decoder import decoder_of
 from tachometry.hdl.front_end.encoder_watch import EncoderWatch
 from tachometry.hdl.front_end.external_tick import ExternalTick
 from tachometry.hdl.front_end.index_capture import IndexCapture
@@ -39,7 +42,7 @@ class Tachometer(wiring.Component):
 
     Members
     -------
-    The ports of the spec, less `clk` and `rst`, which are those of the `sync` domain: `a`, `b` in; `velocity`,
+    The ports of the spec, less `clk` and `rst`, which are those of the `sync` domain: the lines in; `velocity`,
     `velocity_valid`, `interval`, `forced`, `tick`, `pulse_count`, `position`, `decode_error`, `overflow`, `stalled`
     out; and those of its options.
     """
@@ -47,8 +50,8 @@ class Tachometer(wiring.Component):
     def __init__(self, spec: TachometerSpec) -> None:
         self._spec = spec
         super().__init__(members(spec.ports))
-        self.conditioner = InputConditioner(spec.filter_clocks, ("a", "b", "z") if spec.index else ("a", "b"))
-        self.decoder = QuadratureDecoder(spec.encoder.decoding)
+        self.conditioner = InputConditioner(spec.filter_clocks, spec.lines)
+        self.decoder = decoder_of(spec.encoder)
         self.pulse_counter = PulseCounter(
             max(spec.times.longest_tick, spec.widths.max_pulse_count),
             spec.widths.max_pulse_count,
@@ -144,12 +147,11 @@ class Tachometer(wiring.Component):
         """Count the steps of the pins: the position, and the pulses of a window."""
         conditioner, decoder = self.conditioner, self.decoder
         position_counter, pulse_counter = self.position_counter, self.pulse_counter
+        lines = self._spec.encoder.kind.lines
         m.d.comb += [
-            conditioner.a.eq(self.a),
-            conditioner.b.eq(self.b),
-            decoder.level_a.eq(conditioner.level_a),
-            decoder.level_b.eq(conditioner.level_b),
-            decoder.ready.eq(conditioner.ready_a & conditioner.ready_b),
+            *(getattr(conditioner, line).eq(getattr(self, line)) for line in lines),
+            *(getattr(decoder, f"level_{line}").eq(self._level(line)) for line in lines),
+            decoder.ready.eq(reduce(and_, (getattr(conditioner, f"ready_{line}") for line in lines))),
             self.decode_error.eq(decoder.decode_error),
             position_counter.step.eq(decoder.step),
             self.position.eq(position_counter.position),
@@ -159,6 +161,11 @@ class Tachometer(wiring.Component):
             self.pulse_count.eq(pulse_counter.pulse_count),
             self.overflow.eq(pulse_counter.overflow),
         ]
+
+    def _level(self, line: str) -> Value:
+        """Return the level of a line that is in the clock domain, as it should be read."""
+        level: Value = getattr(self.conditioner, f"level_{line}")
+        return ~level if line in self._spec.encoder.inverted else level
 
     def _measure(self, m: Module, step: Signal, ticks: Signal) -> None:
         """Give the datapath what its method takes of ticks, counts and steps."""
@@ -226,7 +233,7 @@ class Tachometer(wiring.Component):
         m.submodules.index_capture = index = self.index_capture
         m.d.comb += [
             self.conditioner.z.eq(self.z),
-            index.level_z.eq(self.conditioner.level_z),
+            index.level_z.eq(self._level("z")),
             index.ready.eq(self.conditioner.ready_z),
             index.position.eq(self.position_counter.next),
             self.position_counter.clear.eq(index.rises & int(self._spec.index_reset)),

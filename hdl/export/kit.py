@@ -3,7 +3,7 @@
 from functools import singledispatch
 
 from tachometry.hdl.export.render import render_files
-from tachometry.spec import AxesSpec, TachometerSpec
+from tachometry.spec import AxesSpec, Encoder, TachometerSpec
 from tachometry.spec.control import AnySpec
 from tachometry.spec.language.port import Port
 from tachometry.spec.registers.buses import Bus, ports_on
@@ -18,7 +18,7 @@ KIT = {
     "NAME.sdc": "constraints for Quartus and others",
 }
 _STEPS_PER_TICK, _LONGEST_HOLD = 4, 5000
-_MOVED = 40 - 16  # quarter periods that the smoke test turns the encoder
+_STEPS, _MOVED = 40 + 16, 40 - 16  # quarter periods that the smoke test turns the encoder
 
 
 def kit(spec: AnySpec, name: str, bus: Bus | None = None) -> dict[str, str]:
@@ -42,10 +42,10 @@ def kit(spec: AnySpec, name: str, bus: Bus | None = None) -> dict[str, str]:
         inputs=[port for port in ports if port.direction == "input"],
         outputs=[port for port in ports if port.direction == "output"],
         help=_help,
-        idle=bus.idle if bus else {},
         paths=_synchronizers(spec, bus),
         bits="" if spec.axes is None else "*",
         tick_cycles=spec.timing.tick_cycles,
+        idle={**(bus.idle if bus else {}), **_first_levels(spec)},
         **_bench(spec),
     )
 
@@ -63,38 +63,87 @@ def _synchronizers(spec: AnySpec, bus: Bus | None) -> dict[str, list[str]]:
     return {pin: [*path, f"sync_{pin}"] for pin, path in boxes.items()}
 
 
+def _first_levels(spec: AnySpec) -> dict[str, int]:
+    """Return levels of the sensor's lines before it turns, those that are not 0, and of an index that is inverted."""
+    encoder, all_ones = spec.tachometer.encoder, (1 << (spec.axes or 1)) - 1
+    first = dict(zip(encoder.kind.lines, encoder.kind.legal[0], strict=True)) | {"z": 0}
+    return {line: all_ones for line, level in first.items() if level ^ (line in encoder.inverted)}
+
+
+def _turned(encoder: Encoder) -> tuple[dict[str, str], int]:
+    """Return levels of the lines after a step of the smoke test, as Verilog, and the counts of all its steps."""
+    kind = encoder.kind
+    levels = {"a": "quarter[1] ^ quarter[0]", "b": "quarter[1]"}
+    counts = _MOVED * encoder.decoding // 4
+    if encoder.sensor == "hall":
+        by_place = zip(*kind.cycle, strict=True)
+        each = (sum(level << number for number, level in enumerate(of_line)) for of_line in by_place)
+        levels = {line: f"6'd{bits} >> quarter" for line, bits in zip(kind.lines, each, strict=True)}
+        counts = _MOVED
+    elif encoder.sensor == "pulses":
+        levels = {"a": levels["a"]}
+        counts = _STEPS * encoder.decoding // 4 * (-1 if encoder.reverse else 1)
+    elif not kind.cycle:
+        levels = {
+            "a": "1'b1" if encoder.sensor == "step-dir" else "forward",
+            "b": "forward" if encoder.sensor == "step-dir" else "!forward",
+        }
+        counts = _MOVED
+    return levels, counts
+
+
+def _wired(encoder: Encoder, levels: dict[str, str]) -> dict[str, str]:
+    """Return levels of the pins: those of the lines, but of inverted ones the others."""
+    return {line: f"~({level})" if line in encoder.inverted else level for line, level in levels.items()}
+
+
 @singledispatch
 def _bench(spec: AnySpec) -> dict[str, object]:
     """Return how the smoke test turns one encoder, or many, and the position that must follow."""
     tacho = spec.tachometer
+    encoder = tacho.encoder
+    levels, expected = _turned(encoder)
+    low = {line: f"1'b{int(line in encoder.inverted)}" for line in ("a", "b")}
+    if encoder.sensor == "step-dir":
+        del low["b"]
     return {
         "axes": None,
         "hold": max(_hold(tacho), min(2 * (tacho.filter_clocks + 8), tacho.filter_clocks + 300)),
-        "a": "quarter[1] ^ quarter[0]",
-        "b": "quarter[1]",
+        "levels": _wired(encoder, levels),
+        "ends": {} if encoder.kind.cycle else low,
+        "places": 6 if encoder.sensor == "hall" else 4,
         "velocity": "velocity",
         "lsb": 2.0**-tacho.widths.frac_bits,
         "compared": "generate --testbench cocotb",
-        "expected": _MOVED * tacho.encoder.decoding // 4,
+        "expected": expected,
+        # Forward, as it counts; a line alone does not tell.
+        "mirrored": encoder.reverse and encoder.sensor != "pulses",
+        "backward": encoder.reverse and encoder.sensor == "pulses",
+        "steps": "quarter periods" if encoder.kind.cycle else "steps",
     }
 
 
 @_bench.register
 def _(tacho: AxesSpec) -> dict[str, object]:
     # Every other one goes backward, its lines exchanged.
-    lines = ["quarter[1] ^ quarter[0]", "quarter[1]"]
-    a, b = ([lines[(axis + line) % 2] for axis in reversed(range(tacho.axes))] for line in range(2))
+    encoder = tacho.axis.encoder
+    every, expected = _turned(encoder)
+    lines = [every["a"], every["b"]]
+    turned = ([lines[(axis + line + encoder.reverse) % 2] for axis in reversed(range(tacho.axes))] for line in range(2))
     stores = " ".join(f"positions[{axis}] <= position_{axis};" for axis in range(tacho.axes))
     return {
         "axes": tacho,
         # Before the first edge there are rounds in which no axis is counted.
         "hold": max(_hold(tacho), (4 + tacho.axis.filter_clocks) * tacho.slots),
-        "a": f"{{{', '.join(a)}}}",
-        "b": f"{{{', '.join(b)}}}",
+        "levels": _wired(encoder, {line: f"{{{', '.join(each)}}}" for line, each in zip("ab", turned, strict=True)}),
+        "ends": {},
+        "places": 4,
         "velocity": "velocity_0" if tacho.parallel else "velocity",
         "store": f"begin {stores} end" if tacho.parallel else "positions[axis] <= position;",
         "compared": "generate --testbench cocotb",
-        "expected": _MOVED * tacho.axis.encoder.decoding // 4,
+        "expected": expected,
+        "mirrored": False,
+        "steps": "quarter periods",
     }
 
 

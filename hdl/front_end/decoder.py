@@ -1,8 +1,11 @@
 """From levels to counts."""
 
-from amaranth import Cat, Module, Signal, Value, signed
+from amaranth import Cat, Const, Module, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
+
+from tachometry.spec.core.encoder import Encoder
+from tachometry.spec.core.sensors import Levels, changes, packed_levels
 
 
 class QuadratureDecoder(wiring.Component):
@@ -16,6 +19,8 @@ class QuadratureDecoder(wiring.Component):
     ----------
     decoding : int
         Counts per period: 1, 2 or 4.
+    reverse : bool
+        Forward is B before A.
 
     Members
     -------
@@ -34,10 +39,11 @@ class QuadratureDecoder(wiring.Component):
         If `decoding` is none of these.
     """
 
-    def __init__(self, decoding: int) -> None:
+    def __init__(self, decoding: int, *, reverse: bool = False) -> None:
         if decoding not in (1, 2, 4):
             raise ValueError(f"decoding must be 1, 2 or 4, not {decoding}")
         self._decoding = decoding
+        self._reverse = reverse
         super().__init__(
             {
                 "level_a": In(1),
@@ -57,7 +63,7 @@ class QuadratureDecoder(wiring.Component):
         count = Signal()
         m.d.comb += [
             count.eq(self.ready & counted),
-            self.step.eq(Cat(count, count & backward)),
+            self.step.eq(Cat(count, count & (~backward if self._reverse else backward))),
             self.decode_error.eq(self.ready & illegal),
         ]
         return m
@@ -76,3 +82,77 @@ def transition(
     }[decoding]
     backward = ~(level_a ^ past_b)
     return counted, backward, change_a & change_b
+
+
+class SensorDecoder(wiring.Component):
+    """Decoder of any sensor: one step of −1, 0 or +1 per clock, without latency.
+
+    It looks up what a change of the lines counts, see `Sensor.change`. Levels that no sensor has, as of halls that are
+    all equal, are reported when they come, and the levels before them are remembered.
+
+    Parameters
+    ----------
+    encoder : Encoder
+
+    Members
+    -------
+    level_a … : In(1)
+        Levels of the lines in this clock.
+    ready : In(1)
+        Low while the levels before these are not real: neither a step nor an error.
+    step : Out(signed(2))
+        −1, 0 or +1.
+    decode_error : Out(1)
+        The lines did what they should not.
+    """
+
+    def __init__(self, encoder: Encoder) -> None:
+        self._encoder = encoder
+        lines = {f"level_{line}": In(1) for line in encoder.kind.lines}
+        super().__init__({**lines, "ready": In(1), "step": Out(signed(2)), "decode_error": Out(1)})
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        encoder, sensor = self._encoder, self._encoder.kind
+        level = Cat(getattr(self, f"level_{line}") for line in sensor.lines)
+        past = Signal(len(level))
+        table = changes(encoder.sensor, encoder.decoding)
+        forward, backward, wrong = (
+            _looked_up({pair for pair, (step, error) in table.items() if of(step, error)}, level, past)
+            for of in (lambda step, _: step > 0, lambda step, _: step < 0, lambda _, error: error)
+        )
+        if encoder.reverse:
+            forward, backward = backward, forward
+        if len(sensor.legal) == 1 << len(level):
+            m.d.sync += past.eq(level)
+        else:
+            illegal = Signal()
+            told = Signal()
+            m.d.comb += illegal.eq(~_among(sensor.legal, level))
+            m.d.sync += told.eq(illegal & self.ready)
+            with m.If(~illegal | ~self.ready):
+                m.d.sync += past.eq(level)
+            wrong |= illegal & ~told
+        m.d.comb += [
+            self.step.eq(Cat(self.ready & (forward | backward), self.ready & backward)),
+            self.decode_error.eq(self.ready & wrong),
+        ]
+        return m
+
+
+def _among(some: tuple[Levels, ...], level: Value) -> Value:
+    """Tell whether the lines have one of these levels."""
+    return Const(sum(1 << packed_levels(levels) for levels in some), 1 << len(level)).bit_select(level, 1)
+
+
+def _looked_up(pairs: set[tuple[Levels, Levels]], level: Value, past: Value) -> Value:
+    """Tell whether the levels before and these are one of the pairs."""
+    bits = sum(1 << (packed_levels(before) << len(level) | packed_levels(after)) for before, after in pairs)
+    return Const(bits, 1 << 2 * len(level)).bit_select(Cat(level, past), 1)
+
+
+def decoder_of(encoder: Encoder) -> QuadratureDecoder | SensorDecoder:
+    """Return the decoder of a sensor."""
+    if encoder.sensor == "quadrature":
+        return QuadratureDecoder(encoder.decoding, reverse=encoder.reverse)
+    return SensorDecoder(encoder)

@@ -1,7 +1,7 @@
 """A log of time and count, as a microcontroller's own counter gives it, is read as what turned the counter."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +40,12 @@ class CountLog:
     name: str
     notes: tuple[str, ...]
 
+    @property
+    def source(self) -> Source:
+        """Tells what the log says of itself; a change is one of the count."""
+        total = int(np.abs(np.diff(self.count)).sum())
+        return Source({"count": self.name}, float(self.time[-1]), total, () if total else ("count",), notes=self.notes)
+
     def recording(self, decoding: int) -> Recording:
         """Return the lines of an encoder whose shaft turns evenly between two rows; a decoding makes these counts."""
         steps = np.diff(self.count) * (4 // decoding)
@@ -50,9 +56,8 @@ class CountLog:
         start, end = np.repeat(self.time[:-1], each), np.repeat(self.time[1:], each)
         time = np.minimum(start + (end - start) * (part / np.repeat(each, each)), end)
         level = quadrature(np.cumsum(np.append(0, np.repeat(np.sign(steps), each))))
-        still = () if total else ("count",)
         duration = float(self.time[-1])
-        source = Source({"count": self.name}, duration, total, still, notes=self.notes)
+        source = replace(self.source, n_changes=total)
         return Recording(np.append(0.0, time), level & np.uint8(1), level >> np.uint8(1), duration, source=source)
 
 

@@ -1,34 +1,46 @@
-"""Captures of other sensors become the quadrature that counts the same."""
+"""Captures of sensors other than quadrature become what their lines show, with a width for pulses that have none."""
 
-from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.captures.file import CaptureError, OptionError
-from tachometry.sim.signals.recording import Recording, quadrature
-from tachometry.spec import TachometerSpec
+from tachometry.sim.signals.recording import Recording
+from tachometry.spec import Encoder
+
+Floats = NDArray[np.float64]
+Levels = NDArray[np.uint8]
 
 
-def of_pulses(recording: Recording, decoding: int) -> Recording:
-    """Return a single line, here A, as of a tooth wheel: always forward.
+def fitted(recording: Recording, encoder: Encoder) -> Recording:
+    """Return the recording of a sensor as its lines are: one of a line alone has none on B.
 
-    What counts edges of A alone counts each at its time: B changes halfway between two of them. What counts rises alone
-    needs these only, and the falls may come at any time, also at that of a rise: three quarters of a period are spread
-    up to the next rise.
+    Loggers of engines write a pulse as two rows with one time, 1 and 0. Where a rise is a count, such a pulse lasts for
+    half the time to the next row.
+
+    Raises
+    ------
+    OptionError
+        If pulses have no width, and each of their edges is a count.
+    CaptureError
+        If two pulses of a line come at one time.
     """
+    if encoder.sensor in ("quadrature", "hall"):
+        return recording
     recording = _with_first_pulse(recording)
-    steps = np.diff(recording.a.astype(np.int8))
-    parts = 2 if decoding == 2 else 4
-    counted = recording.time[1:][steps != 0 if decoding == 2 else steps == 1]
-    if decoding == 2 and (together := np.flatnonzero(np.diff(counted) == 0)).size:
-        at = f"{len(together)} in this capture, the first at {counted[together[0]]:.9g} s"
-        raise OptionError("decoding", f"must be 1, which counts rises alone, for pulses of no width ({at}), not 2")
-    between = [counted[:-1] + np.diff(counted) * part / parts for part in range(1, parts)]
-    # Forward, A is the next line to change where the quarter is even, and low in quarter 0.
-    first = 2 * int(recording.a[0]) if decoding == 2 else 0
-    return _moved(recording, counted, np.sort(np.concatenate([counted, *between])), first, 1)
+    lines: tuple[str, ...] = ("a", "b") if encoder.sensor == "up-down" else ("a",)
+    for line in lines:
+        recording = _with_width(recording, line, edges=encoder.decoding == 2)
+    if encoder.sensor != "pulses":
+        return recording
+    source = recording.source and replace(
+        recording.source,
+        lines={line: name for line, name in recording.source.lines.items() if line != "b"},
+        still=tuple(line for line in recording.source.still if line != "b"),
+    )
+    return replace(recording, b=np.zeros_like(recording.b), source=source)
 
 
 def _with_first_pulse(recording: Recording) -> Recording:
@@ -39,69 +51,41 @@ def _with_first_pulse(recording: Recording) -> Recording:
     if not (later.size and recording.time[:2].tolist() == [0, 0] and recording.a[0] == 1):
         return recording
     lead = float(later[0])
-    a, b = (np.append(line[:1], line) for line in (recording.a, recording.b))
-    z, tick_in = (None if line is None else np.append(line[:1], line) for line in (recording.z, recording.tick_in))
-    a[0] = 0
-    return Recording(np.append(0, recording.time + lead), a, b, recording.duration + lead, z, tick_in, recording.source)
+    lines: dict[str, Any] = {name: np.append(line[:1], line) for name, line in recording.lines.items()}
+    lines["a"][0] = 0
+    time = np.append(0, recording.time + lead)
+    return replace(recording, time=time, duration=recording.duration + lead, **lines)
 
 
-def of_steps(recording: Recording, decoding: int) -> Recording:
-    """Return the quadrature of step and direction: each rise of A is a count, forward where B is high after it."""
-    rises = np.flatnonzero(np.diff(recording.a.astype(np.int8)) == 1) + 1
-    times = recording.time[rises]
-    return _moved(recording, times, times, 0, np.where(recording.b[rises] == 1, 1, -1))
-
-
-def _moved(
-    recording: Recording,
-    counted: NDArray[np.float64],
-    times: NDArray[np.float64],
-    first: int,
-    steps: NDArray[np.int64] | int,
-) -> Recording:
-    """Return the recording with lines A and B that begin in a quarter period, and change by these steps at these
-    times; those of what is counted are among them, and differ.
-    """
-    if (together := np.flatnonzero(np.diff(counted) == 0)).size:
+def _with_width(recording: Recording, line: str, *, edges: bool) -> Recording:
+    """Return the recording with pulses of a line that have no width made longer."""
+    level = recording.lines[line]
+    row = np.flatnonzero(np.diff(level)) + 1  # of its changes
+    time, rises = recording.time[row], level[row] == 1
+    none = np.append(False, ~rises[1:] & (np.diff(time) == 0))  # falls that come with their rise
+    if edges and none.any():
+        at = f"{np.count_nonzero(none)} in this capture, the first at {time[none][0]:.9g} s"
+        raise OptionError("decoding", f"must be 1, which counts rises alone, for pulses of no width ({at}), not 2")
+    if (together := np.flatnonzero(np.diff(time[rises]) == 0)).size:
         raise CaptureError(
             f"two pulses of a capture must not come at one time, as {len(together)} do here, the first at "
-            f"{counted[together[0]]:.9g} s"
+            f"{time[rises][together[0]]:.9g} s"
         )
-    time = np.unique(np.concatenate([recording.time, times]))
-    travelled = np.append(0, np.cumsum(np.broadcast_to(steps, times.shape)))
-    level = quadrature(first + travelled[np.searchsorted(times, time, side="right")])
-    row = np.searchsorted(recording.time, time, side="right") - 1
-    z, tick_in = (None if line is None else line[row] for line in (recording.z, recording.tick_in))
-    return Recording(time, level & np.uint8(1), level >> np.uint8(1), recording.duration, z, tick_in)
-
-
-# What makes a quadrature of the lines of a sensor, and the decodings that count what the sensor counts.
-SENSORS: dict[str, tuple[Callable[[Recording, int], Recording], tuple[int, ...]]] = {
-    "pulses": (of_pulses, (1, 2)),
-    "step-dir": (of_steps, (4,)),
-}
-
-
-def converted(recording: Recording, sensor: str, spec: TachometerSpec) -> Recording:
-    """Return the recording of a sensor as quadrature; that of `quadrature` is as it is.
-
-    Raises
-    ------
-    OptionError
-        If the core's decoding would count something else.
-    CaptureError
-        If two pulses come at one time.
-    """
-    if sensor == "quadrature":
+    if not none.any():
         return recording
-    convert, decodings = SENSORS[sensor]
-    if spec.encoder.decoding not in decodings:
-        allowed = " or ".join(map(str, decodings))
-        raise OptionError("decoding", f"must be {allowed} for {sensor}, not {spec.encoder.decoding}")
-    # The second line is invented, or is a direction that may stay.
-    source = recording.source and replace(
-        recording.source,
-        lines={line: name for line, name in recording.source.lines.items() if (sensor, line) != ("pulses", "b")},
-        still=tuple(line for line in recording.source.still if line != "b"),
-    )
-    return replace(convert(recording, spec.encoder.decoding), source=source)
+    distinct = np.unique(recording.time)
+    place = np.searchsorted(distinct, time[none], side="right")
+    kept = np.append(True, ~none)
+    kept[1:][none] = place < len(distinct)  # the last one stays high
+    time[none] = (time[none] + distinct[np.minimum(place, len(distinct) - 1)]) / 2
+    at, of_line = (np.append(first, rest)[kept] for first, rest in ((0.0, time), (level[0], level[row])))
+    return _merged(recording, line, at, of_line)
+
+
+def _merged(recording: Recording, line: str, at: Floats, level: Levels) -> Recording:
+    """Return the recording with other changes of one line."""
+    every = np.unique(np.concatenate([recording.time, at]))
+    rows = np.searchsorted(recording.time, every, side="right") - 1
+    lines: dict[str, Any] = {name: levels[rows] for name, levels in recording.lines.items()}
+    lines[line] = level[np.searchsorted(at, every, side="right") - 1]
+    return replace(recording, time=every, **lines)

@@ -52,6 +52,7 @@ def read_capture(
     z: Channel | None = None,
     tick_in: Channel | None = None,
     text: TextOptions = PLAIN,
+    c: Channel | None = None,
 ) -> Recording:
     """Read the encoder lines from a capture; the suffix tells its kind.
 
@@ -69,6 +70,8 @@ def read_capture(
         Channels of the index line and of the external tick, likewise; what is not given, the recording has not.
     text : TextOptions
         Only for a text, see `read_csv`.
+    c : str, int or None
+        Channel of a third line, likewise.
 
     Raises
     ------
@@ -92,7 +95,7 @@ def read_capture(
                 name = "time_unit" if option == "unit" else option
                 why = "it has levels" if option == "threshold" else "it has its times"
                 raise OptionError(name, f"must not be given for {path}: {why}")
-    others = {name: channel for name, channel in (("z", z), ("tick_in", tick_in)) if channel is not None}
+    others = {name: channel for name, channel in (("c", c), ("z", z), ("tick_in", tick_in)) if channel is not None}
     recording = reader(path, a, b, samplerate_hz, others)
     return _with_moving(recording, lambda number: reader(path, number, SAME, samplerate_hz, NONE))
 

@@ -169,15 +169,46 @@ def chattering(
 
 
 def gated_index(
-    time: FloatArray, level: Levels, slot_time: FloatArray, slot: NDArray[np.bool_]
+    time: FloatArray,
+    level: Levels,
+    slot_time: FloatArray,
+    slot: NDArray[np.bool_],
+    z: np.uint8 = np.uint8(4),  # noqa: B008
+    gate: int | None = 0,
 ) -> tuple[FloatArray, Levels]:
-    """Return times, and levels with 4 Z: high while the shaft is in the slot of the index and both lines are low."""
+    """Return times, and levels with the bit `z`: high while the shaft is in the slot of the index and the lines have
+    the levels `gate`, None for any.
+    """
     times = np.union1d(time, slot_time)
     level = level[np.searchsorted(time, times, side="right") - 1]
     slot = slot[np.searchsorted(slot_time, times, side="right") - 1]
-    level = np.where(slot & (level == 0), np.uint8(4), level)
+    level = np.where(slot if gate is None else slot & (level == gate), level | z, level)
     changed = np.append(True, level[1:] != level[:-1])
     return times[changed], level[changed]
+
+
+def pulsed(time: FloatArray, step: NDArray[np.int64], duration: float, *, directed: bool) -> tuple[FloatArray, Levels]:
+    """Return times and levels of pulses, each of which lasts for half the time to the next one.
+
+    Parameters
+    ----------
+    time : float64 array, shape (n + 1,), seconds
+        The start, and the times of the steps.
+    step : int64 array, shape (n,), −1 or +1
+    duration : float, seconds
+    directed : bool
+        Pulses are on line A, and B is high for those forward, from the end of the pulse before; else they are on A for
+        those forward and on B for those backward.
+    """
+    begin, end = time[1:], (time[1:] + np.append(time[2:], duration)) / 2
+    if directed:
+        direction = np.append(np.where(step > 0, 2, 0), 2 * int(len(step) and step[-1] > 0))
+        rise, fall, first = direction[:-1] | 1, direction[1:], direction[0]
+    else:
+        rise, fall, first = np.where(step > 0, 1, 2), np.zeros_like(step), np.int64(0)
+    times = np.append(time[0], np.stack([begin, end], axis=1).ravel())
+    level = np.append(first, np.stack([rise, fall], axis=1).ravel())
+    return times, level.astype(np.uint8)
 
 
 def uniform(random: np.random.PCG64, n: int) -> FloatArray:

@@ -4,9 +4,11 @@ from functools import singledispatch
 
 import numpy as np
 
+from tachometry.sim.encoder.imperfections import pulsed
 from tachometry.sim.signals.axes import AxesTrace, Trace
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
+from tachometry.spec.core.sensors import packed_levels
 
 _SPEEDS = (0.3, 1.01, 1.5, 2.2, 3.25, 0.1)  # counts per tick
 
@@ -24,23 +26,37 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     rng = np.random.default_rng(seed)
     cycles, longest = spec.timing.tick_cycles, spec.timing.tick_cycles * spec.timing.max_ticks
     gaps, turns = [], []
+    sensor = spec.encoder.kind
+    steps = not sensor.cycle  # each is a pulse
+    per_period = 1 if steps else 6 if sensor.name == "hall" else 4  # edges
+    least = (1.0 + steps) * (1 + spec.filter_clocks)
     for speed in _SPEEDS:
-        gap = max(1.0 + spec.filter_clocks, cycles * spec.encoder.decoding / 4 / speed)
+        gap = max(least, cycles * spec.encoder.decoding / per_period / speed)
         jitter = rng.choice([0, 0.2])
         sign = rng.choice([1, -1])
         gaps.append(gap * (1 + jitter * rng.standard_normal(n_edges)))
         turns.append(np.where(rng.random(n_edges) < 0.01, 2, sign))
     # Longer than a measurement: forced updates, the count after them, a standstill.
-    edges = 4 // spec.encoder.decoding
+    edges = per_period // spec.encoder.decoding
     gaps.append(np.full(3 * edges, 0.7 * longest / edges))
     gaps.append(np.full(edges, 1.3 * longest / edges))
     turns.append(np.full(4 * edges, rng.choice([1, -1])))
-    clock = np.cumsum(np.maximum(1, np.rint(np.concatenate(gaps))).astype(np.int64))
-    level = quadrature(np.append(0, np.cumsum(np.concatenate(turns))))
-    clock = np.append(0, clock)
+    clock = np.append(0, np.cumsum(np.maximum(1 + steps, np.rint(np.concatenate(gaps))).astype(np.int64)))
+    turn = np.concatenate(turns)
+    if steps:
+        at, level = pulsed(clock.astype(np.float64), turn, float(clock[-1] + 2), directed=sensor.name == "step-dir")
+        clock = at.astype(np.int64)
+        level[rng.random(len(level)) < 0.05] = 3  # both lines rise
+    else:
+        place = np.append(0, np.cumsum(turn))
+        levels = np.array([packed_levels(each) for each in sensor.cycle], dtype=np.uint8)
+        level = levels[place % 6] if sensor.name == "hall" else quadrature(place)
+        if sensor.name == "hall":
+            level[rng.random(len(level)) < 0.01] = 7
     z = (rng.random(len(clock)) < 0.05).astype(np.uint8)
     n_clocks = int(clock[-1]) + spec.facts.rest_tenths * longest // 10 + 40 * cycles + 300
-    trace = PinTrace(clock, level & np.uint8(1), level >> np.uint8(1), n_clocks, z)
+    a, b, c = (level >> np.uint8(line) & np.uint8(1) for line in range(3))
+    trace = PinTrace(clock, a, b, n_clocks, z, c=c if "c" in sensor.lines else None)
     if not spec.external_tick:
         return trace
     apart = np.full(trace.n_clocks // cycles + 1, cycles)

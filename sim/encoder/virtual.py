@@ -6,6 +6,7 @@ The truth is computed from the shaft's angle, never from the lines, so that it c
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,11 +16,25 @@ from tachometry.sim.encoder.crossings import Disc, IntArray, find_crossings
 from tachometry.sim.encoder.imperfections import BOUNCE, ILLEGAL, JITTER, LOST, NONUNIFORMITY
 from tachometry.sim.encoder.motion import FloatArray, Motion, Vibration, sin2pi
 from tachometry.sim.encoder.options import EncoderOptions
-from tachometry.sim.signals.recording import MAX_EDGES, Recording, quadrature
+from tachometry.sim.signals.recording import MAX_EDGES, Recording, packed, quadrature
+from tachometry.spec import Encoder
+from tachometry.spec.core.sensors import SENSORS
 from tachometry.spec.language.option import ParameterError
 
 MAX_PULSES_PER_REV = 1 << 26
 MAX_UNEVEN_PULSES = 1 << 20  # of a disc whose edges are all displaced: each takes memory
+# Edges in a period of the disc, where these are not those of quadrature; and sensors that may have a fault.
+_EDGES = {"step-dir": 1, "up-down": 1, "hall": 6}
+_HALLS = packed([np.array(line, dtype=np.uint8) for line in zip(*SENSORS["hall"].cycle, strict=True)])
+_FAULTS_OF = {
+    "phase_error_deg": ("quadrature",),
+    "illegal": ("quadrature",),
+    "broken": ("quadrature",),
+    "stuck": ("quadrature",),
+    "duty_error_deg": ("quadrature", "pulses"),
+    "bounce": ("quadrature", "pulses", "hall"),
+    "lost": ("quadrature", "pulses"),
+}
 
 
 @dataclass(frozen=True)
@@ -72,6 +87,15 @@ class VirtualEncoder(EncoderOptions):
     index : bool
         Whether there is an index line Z: high once a turn, in the quarter that begins at shaft angle 0, and gated as
         usual: only while A and B are low.
+    sensor : str
+        What it is instead of an incremental encoder with lines A and B, see `tachometry.spec.core.sensors`. Of pulses
+        there is line A alone. Halls change six times in each of `pulses_per_rev` periods. Of steps and of pulses up and
+        down there are as many in a turn; each lasts for half the time to the next one, and the direction changes as it
+        ends. Of these a pitch is a step, and neither they nor halls have faults of quadrature.
+    reverse : bool
+        It is mounted the other way round, so its lines are those of a shaft that turns backward.
+    invert : str or None
+        Lines that are low where others are high, with commas between.
 
     Raises
     ------
@@ -82,6 +106,15 @@ class VirtualEncoder(EncoderOptions):
     pulses_per_rev: int
     start_angle_rad: float = 0.0
     index: bool = False
+    sensor: str = "quadrature"
+    reverse: bool = False
+    invert: str | None = None
+
+    @classmethod
+    def of(cls, encoder: Encoder, **values: Any) -> "VirtualEncoder":
+        """Return the encoder that a core is made for, with these values of its other parameters."""
+        own: dict[str, Any] = {"sensor": encoder.sensor, "reverse": encoder.reverse, "invert": encoder.invert}
+        return cls(encoder.pulses_per_rev, **own, **values)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -91,13 +124,21 @@ class VirtualEncoder(EncoderOptions):
             if getattr(self, name) and self.pulses_per_rev > MAX_UNEVEN_PULSES:
                 rest = f"must be 0 with more than {MAX_UNEVEN_PULSES} pulses per revolution, not {getattr(self, name)}"
                 raise ParameterError(name, rest)
+        for name, sensors in _FAULTS_OF.items():
+            if getattr(self, name) and self.sensor not in sensors:
+                raise ParameterError(name, f"must not be given with --sensor {self.sensor}")
         if not math.isfinite(self.start_angle_rad):
             raise ValueError(f"start_angle_rad must be finite, not {self.start_angle_rad}")
+
+    @property
+    def edges_per_rev(self) -> int:
+        """Edges of the disc in a turn."""
+        return _EDGES.get(self.sensor, 4) * self.pulses_per_rev
 
     @cached_property
     def disc(self) -> Disc:
         """The edges of the disc."""
-        n_edges = 4 * self.pulses_per_rev
+        n_edges = self.edges_per_rev
         offset = np.zeros(1)
         if self.nonuniformity > 0:
             random = self._stream(NONUNIFORMITY)
@@ -137,7 +178,14 @@ class VirtualEncoder(EncoderOptions):
         """Return what the lines make of quarters that begin at some times, and how many edges came together or were
         lost.
         """
-        level, n_lost, n_illegal = quadrature(quarter), 0, 0
+        n_lost, n_illegal = 0, 0
+        turned = -quarter if self.reverse else quarter
+        if self.sensor in ("step-dir", "up-down"):
+            times, level = imperfections.pulsed(time, np.diff(turned), duration, directed=self.sensor == "step-dir")
+            return self._indexed(times, level, time, quarter, duration), 0, 0
+        level = _HALLS[turned % 6] if self.sensor == "hall" else quadrature(turned)
+        if self.sensor == "pulses":
+            level &= np.uint8(1)
         if self.lost:
             level, n_lost = imperfections.lose_pulses(level, self.lost, self._stream(LOST))
         row = np.flatnonzero(np.append(True, level[1:] != level[:-1]))
@@ -149,13 +197,23 @@ class VirtualEncoder(EncoderOptions):
             times, level = imperfections.chattering(time, level, row, duration, self.bounce, random)
         else:
             times, level = time[row], level[row]
+        return self._indexed(times, level, time, quarter, duration), n_illegal, n_lost
+
+    def _indexed(
+        self, times: FloatArray, level: NDArray[np.uint8], at: FloatArray, quarter: IntArray, duration: float
+    ) -> Recording:
+        """Return the recording of the lines, with the index if there is one; `quarter` begin at times `at`."""
+        lines = ("a", "b", "c") if self.sensor == "hall" else ("a", "b")
         if self.index:
-            slot = quarter % (4 * self.pulses_per_rev) == 0
-            times, level = imperfections.gated_index(times, level, time, slot)
+            slot, gate = quarter % self.edges_per_rev == 0, 0 if self.sensor == "quadrature" else None
+            times, level = imperfections.gated_index(times, level, at, slot, np.uint8(1 << len(lines)), gate)
+            lines = (*lines, "z")
+        inverted = self.invert.split(",") if self.invert else ()
+        level = level ^ np.uint8(sum(1 << place for place, line in enumerate(lines) if line in inverted))
         for fault, high in ((self.broken, True), (self.stuck, False)):
             if fault is not None and fault.time_s < duration:
                 times, level = fault.applied(times, level, high=high)
-        return Recording.of_level(times, level, duration, ("a", "b", "z")[: 2 + self.index]), n_illegal, n_lost
+        return Recording.of_level(times, level, duration, lines)
 
     def _stream(self, which: int) -> np.random.PCG64:
         return imperfections.stream(self.seed, which)
@@ -190,15 +248,33 @@ class Encoding:
         disc (nonuniformity, eccentricity, phase and duty error) are in it; jitter, bounce, lost pulses and illegal
         transitions, which are faults of the lines, are not.
         """
-        if decoding not in (1, 2, 4):
+        sign = -1 if self.encoder.reverse else 1
+        if self.encoder.sensor == "pulses":
+            return sign * np.searchsorted(self._pulses(decoding), t, side="right")
+        if self.encoder.sensor == "quadrature" and decoding not in (1, 2, 4):
             raise ParameterError("decoding", f"must be 1, 2 or 4, not {decoding}")
-        lead, shift = {4: (0, 0), 2: (1, 1), 1: (3, 2)}[decoding]
-        now, start = (self.encoder.disc.quarter(self._shaft.angle(time)) for time in (t, 0.0))
-        return ((now + lead) >> shift) - ((start + lead) >> shift)
+        lead, shift = {2: (1, 1), 1: (3, 2)}.get(decoding, (0, 0))
+        if self.encoder.sensor != "quadrature":
+            lead = shift = 0
+        now, start = (sign * self.encoder.disc.quarter(self._shaft.angle(time)) for time in (t, 0.0))
+        return sign * (((now + lead) >> shift) - ((start + lead) >> shift))
+
+    def _pulses(self, decoding: int) -> FloatArray:
+        """Return times at which line A alone counts, on an ideal line."""
+        time, quarter = find_crossings(self._shaft, self.encoder.disc)
+        first = self.encoder.disc.quarter(self._shaft.angle(np.zeros(1)))
+        change = np.diff((quadrature(np.append(first, quarter)) & 1).astype(np.int8))
+        counted: FloatArray = time[change != 0 if decoding == 2 else change > 0]
+        return counted
 
     def true_speed(self, t: ArrayLike) -> FloatArray:
-        """Return speed of the shaft in rad/s, vibration included, at times `t` in seconds."""
-        return self._shaft.speed(t)
+        """Return speed of the shaft in rad/s, vibration included, at times `t` in seconds; of pulses, which do not tell
+        the direction, its magnitude.
+        """
+        speed = self._shaft.speed(t)
+        if self.encoder.sensor == "pulses":
+            return -np.abs(speed) if self.encoder.reverse else np.abs(speed)
+        return speed
 
     def motion_speed(self, t: ArrayLike) -> FloatArray:
         """Return speed of the motion in rad/s, without vibration, at times `t` in seconds."""

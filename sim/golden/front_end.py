@@ -1,14 +1,17 @@
 """The golden front end turns sampled levels into steps, pulse numbers and positions."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.ordered import places
-from tachometry.sim.signals.recording import PinTrace, merged
+from tachometry.sim.signals.recording import PinTrace, merged, packed
 from tachometry.sim.signals.run import Table
-from tachometry.spec import TachometerSpec
+from tachometry.spec import Encoder, TachometerSpec
+from tachometry.spec.core.sensors import changes as changes_of
+from tachometry.spec.core.sensors import packed_levels
 
 # Where a pair of levels stands in the forward cycle 00, 10, 11, 01 of (A, B).
 _PHASE = np.array([[0, 3], [1, 2]], dtype=np.uint8)
@@ -37,6 +40,51 @@ def decode(a: NDArray[np.uint8], b: NDArray[np.uint8], decoding: int) -> tuple[N
         of_a = a[1:] != a[:-1]
         step[~(of_a if decoding == 2 else of_a & (b[1:] == 0))] = 0
     return step, turn == 2
+
+
+def looked_up(
+    encoder: Encoder, levels: Sequence[NDArray[np.uint8]], *, brief: bool
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Step of each row of a list of levels of any sensor, 0 for the first, and whether it is wrong.
+
+    Parameters
+    ----------
+    encoder : Encoder
+    levels : sequence of uint8 arrays, shape (n,)
+        Of each line of the sensor, each row different from the one before.
+    brief : bool
+        The first row lasts for a clock only, in which the decoder does not yet look.
+
+    Returns
+    -------
+    step : int64 array, shape (n,)
+        −1, 0 or +1.
+    wrong : bool array, shape (n,)
+    """
+    bits = len(levels)
+    table = np.zeros((1 << bits, 1 << bits, 2), dtype=np.int64)
+    for (before, after), counted in changes_of(encoder.sensor, encoder.decoding).items():
+        table[packed_levels(before), packed_levels(after)] = counted
+    legal = np.isin(np.arange(1 << bits), [packed_levels(each) for each in encoder.kind.legal])
+    now = packed(levels)
+    rows = np.arange(len(now))
+    illegal = ~legal[now] & ~((rows == 0) & brief)
+    latest = np.maximum.accumulate(np.where(legal[now], rows, 0))  # the row whose levels are remembered
+    step, wrong = table[now[np.append(0, latest[:-1])], now].T
+    return step, (wrong == 1) | (illegal & ~np.append(False, illegal[:-1]))
+
+
+def counted(
+    encoder: Encoder, lines: Mapping[str, NDArray[np.uint8]], *, brief: bool = False
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Step of each row of a list of levels as they are on the pins, and whether it is wrong, see `looked_up`."""
+    levels = [lines[name] ^ np.uint8(name in encoder.inverted) for name in encoder.kind.lines]
+    if encoder.sensor == "quadrature":
+        step, wrong = decode(levels[0], levels[1], encoder.decoding)
+        step, wrong = np.append(0, step), np.append(False, wrong)
+    else:
+        step, wrong = looked_up(encoder, levels, brief=brief)
+    return step * (-1 if encoder.reverse else 1), wrong
 
 
 def filter_line(
@@ -104,17 +152,18 @@ class Steps:
 
 
 def together(
-    at_a: NDArray[np.int64], a: NDArray[np.uint8], at_b: NDArray[np.int64], b: NDArray[np.uint8]
-) -> tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.uint8]]:
-    """Change lists of both lines as one, from the first clock on from which both are known."""
-    clock = merged(at_a, at_b)
-    clock = clock[clock >= max(at_a[0], at_b[0])]
-    return clock, a[np.searchsorted(at_a, clock, side="right") - 1], b[np.searchsorted(at_b, clock, side="right") - 1]
+    lines: Sequence[tuple[NDArray[np.int64], NDArray[np.uint8]]],
+) -> tuple[NDArray[np.int64], list[NDArray[np.uint8]]]:
+    """Change lists of lines as one, from the first clock on from which all are known."""
+    clock = merged(*(at for at, _ in lines))
+    clock = clock[clock >= max(at[0] for at, _ in lines)]
+    return clock, [level[np.searchsorted(at, clock, side="right") - 1] for at, level in lines]
 
 
 def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     """Return conditioned and decoded lines."""
     returned = [np.empty(0, dtype=np.int64)]
+    encoder = spec.encoder
 
     def conditioned(name: str) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
         clock, level = changes(trace, name)
@@ -123,20 +172,18 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
             returned.append(gone)
         return clock, level
 
-    if spec.filter_clocks:
-        clock, a, b = together(*conditioned("a"), *conditioned("b"))
-    else:
-        changed = np.append(True, (trace.a[1:] != trace.a[:-1]) | (trace.b[1:] != trace.b[:-1]))
-        clock, a, b = trace.clock[changed], trace.a[changed], trace.b[changed]
-    step, illegal = decode(a, b, spec.encoder.decoding)
-    changed = (a[1:] ^ a[:-1]) | (b[1:] ^ b[:-1]) << np.uint8(1)
-    at = clock[1:] + spec.latency.pin_to_count
+    clock, levels = together([conditioned(name) for name in encoder.kind.lines])
+    lines = dict(zip(encoder.kind.lines, levels, strict=True))
+    step, wrong = counted(encoder, lines, brief=bool(np.any(np.diff(clock[:2]) == 1)))
+    # The level before the first is not real.
+    at = clock + spec.latency.pin_to_count + (np.arange(len(clock)) == 0)
+    changed = packed([line[1:] ^ line[:-1] for line in levels])
     rises = at[:0]
     if spec.index:
         at_z, z = conditioned("z")
-        rises = at_z[1:][z[1:] == 1] + spec.latency.pin_to_count
+        rises = at_z[1:][z[1:] == ("z" not in encoder.inverted)] + spec.latency.pin_to_count
     # Two clocks for the synchroniser, one for the counter of glitches.
-    return Steps(at, step, at[illegal], rises, np.sort(np.concatenate(returned)) + 3, changed)
+    return Steps(at[1:], step[1:], at[wrong], rises, np.sort(np.concatenate(returned)) + 3, changed)
 
 
 def first_beyond(steps: Steps, last: NDArray[np.int64], limit: int) -> NDArray[np.int64]:

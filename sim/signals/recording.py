@@ -17,7 +17,7 @@ from tachometry.spec import TachometerSpec
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 from tachometry.spec.language.units import format_time
 
-LINES = ("a", "b", "z", "tick_in")
+LINES = ("a", "b", "c", "z", "tick_in")
 
 # What a computer's memory holds: an edge and a tick take some 300 bytes each on their way to a report.
 MAX_EDGES = 10_000_000
@@ -51,6 +51,7 @@ def merged(*clocks: NDArray[np.int64]) -> NDArray[np.int64]:
 class _Lines:
     a: NDArray[np.uint8]
     b: NDArray[np.uint8]
+    c: NDArray[np.uint8] | None
     z: NDArray[np.uint8] | None
     tick_in: NDArray[np.uint8] | None
 
@@ -88,6 +89,8 @@ class Recording(_Lines):
         Length of the recording; not before the last change.
     z, tick_in : uint8 arrays, shape (n,), 0 or 1, or None
         Levels of the index line and of the external tick; None if it is absent.
+    c : uint8 array, shape (n,), 0 or 1, or None
+        Levels of a third line, as of halls. A sensor of one line has 0 in `b`.
     source : Source or None
         Of a capture, what it says of itself.
     """
@@ -99,6 +102,7 @@ class Recording(_Lines):
     z: NDArray[np.uint8] | None = None
     tick_in: NDArray[np.uint8] | None = None
     source: Source | None = None
+    c: NDArray[np.uint8] | None = None
 
     def __post_init__(self) -> None:
         if not (len(self.time) and _same_length(self.time, *self.lines.values())):
@@ -145,21 +149,22 @@ class Recording(_Lines):
 
     @property
     def _edges(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Rows in which A or B changes, and how many of both do."""
-        changes = np.count_nonzero(np.diff(np.stack([self.a, self.b])), axis=0)
+        """Rows in which a line other than the index changes, and how many of them do."""
+        lines = [self.a, self.b] if self.c is None else [self.a, self.b, self.c]
+        changes = np.count_nonzero(np.diff(np.stack(lines)), axis=0)
         row = np.flatnonzero(changes) + 1
         return row, changes[row - 1]
 
     def n_merged(self, clock_hz: int, n_clocks: int) -> int:
-        """Return edges of A and B that come in the same clock as an edge before them, within the first `n_clocks`."""
+        """Return edges, but of Z, that come in the clock of an edge before them, within the first `n_clocks`."""
         row, _ = self._edges
         clock = self._clock(clock_hz)[row]
         return int(np.count_nonzero(np.diff(clock[clock < n_clocks]) == 0))
 
     @property
     def n_together(self) -> int:
-        """Instants at which A and B both change."""
-        return int(np.count_nonzero(self._edges[1] == 2))
+        """Instants at which more than one of A, B and C changes."""
+        return int(np.count_nonzero(self._edges[1] > 1))
 
 
 @dataclass(frozen=True)
@@ -175,6 +180,8 @@ class PinTrace(_Lines):
         Number of clocks to run.
     z, tick_in : uint8 arrays, shape (n,), 0 or 1, or None
         Index line and external tick; None if it is absent.
+    c : uint8 array, shape (n,), 0 or 1, or None
+        A third line.
     """
 
     clock: NDArray[np.int64]
@@ -183,6 +190,7 @@ class PinTrace(_Lines):
     n_clocks: int
     z: NDArray[np.uint8] | None = None
     tick_in: NDArray[np.uint8] | None = None
+    c: NDArray[np.uint8] | None = None
 
     def __post_init__(self) -> None:
         if not (len(self.clock) and _same_length(self.clock, *self.lines.values())):

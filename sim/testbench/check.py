@@ -196,6 +196,7 @@ def _again(spec: AnySpec, name: str, vectors: Path) -> dict[str, str]:
         traces = []
         for axis in range(spec.axes or 1):
             of_axis = {pin: (row >> axis * (pin != "tick_in") & 1).astype(np.uint8) for pin, row in lines.items()}
+            of_axis.setdefault("b", np.zeros(len(clock), dtype=np.uint8))  # of a sensor of one line
             traces.append(PinTrace(clock, n_clocks=int(there["clocks"]), **of_axis))
         return bench_of(spec, name, traces)
     except (ValueError, KeyError, TypeError, IndexError, OverflowError, MemoryError):

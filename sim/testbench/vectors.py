@@ -84,7 +84,8 @@ def _vectors(core: AnySpec, traces: Sequence[PinTrace]) -> dict[str, Any]:
 def _put(core: AnySpec, traces: Sequence[PinTrace]) -> tuple[list[str], list[NDArray[Any]], Run]:
     """Return names of the inputs, the clocks of changes with their values, and what the core must show."""
     (trace,) = traces
-    return [*trace.lines], [trace.clock, *trace.lines.values()], golden.run(core.tachometer, trace)
+    lines = {name: line for name, line in trace.lines.items() if name in {pin.name for pin in core.ports.pins}}
+    return [*lines], [trace.clock, *lines.values()], golden.run(core.tachometer, trace)
 
 
 @_put.register
@@ -117,11 +118,12 @@ def usual_motion(spec: TachometerSpec, seed: int = 1, most: int = _MOVING) -> Re
     It moves for at most so many clocks. The rest outlasts the maximum time, so that the core reads zero, unless that
     takes as many as a million clocks for 160,000 of them.
     """
-    encoder = VirtualEncoder(
-        spec.encoder.pulses_per_rev,
+    bounces = spec.filter_clocks and spec.encoder.sensor in ("quadrature", "pulses", "hall")
+    encoder = VirtualEncoder.of(
+        spec.encoder,
         jitter=0.1,
-        illegal=0.01,
-        bounce=Bounce(1, float(spec.filter_clocks / spec.timing.clock_hz)) if spec.filter_clocks else None,
+        illegal=0.01 if spec.encoder.sensor == "quadrature" else 0,
+        bounce=Bounce(1, float(spec.filter_clocks / spec.timing.clock_hz)) if bounces else None,
         start_angle_rad=-3.5 * np.pi / (2 * spec.encoder.pulses_per_rev),
         seed=seed,
         index=spec.index,
@@ -135,7 +137,7 @@ def _usual_form(spec: TachometerSpec, longest: int, *, backward: bool) -> str:
     moving = max(min(longest, _MOST_TICKS * cycles), _FEWEST_TICKS * cycles)
     standing = min(5 * longest, cycles * (8 * spec.timing.max_ticks // 5 + 10))
     # Counts per tick that the lines can have: an edge in two clocks, slower with a filter.
-    most = cycles * spec.encoder.decoding / 8 / (1 + spec.filter_clocks)
+    most = cycles * spec.encoder.decoding / (12 if spec.encoder.sensor == "hall" else 8) / (1 + spec.filter_clocks)
     part = moving / 8 / clock_hz
 
     def speed(counts_per_tick: float) -> str:

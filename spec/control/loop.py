@@ -82,6 +82,8 @@ class LoopSpec(Law):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if not self.tachometer.encoder.plain:
+            raise ParameterError("sensor", "must be quadrature with a control loop, its lines as they come")
         if not 8 <= self.current_width <= 24:
             raise ParameterError("current_width", f"must be from 8 to 24, not {self.current_width}")
         if self.multiplier not in MULTIPLIERS:

@@ -53,6 +53,10 @@ def check(spec: TachometerSpec) -> None:
 
 
 def _check_health(spec: TachometerSpec) -> None:
+    if spec.health and spec.encoder.sensor != "quadrature":
+        raise ParameterError(
+            "health", f"must be left out for {spec.encoder.sensor}: it watches two lines in quadrature"
+        )
     for name, least, most in (("health_edges", 2, 1 << 16), ("health_errors", 0, (1 << 16) - 1)):
         value = getattr(spec, name)
         if not least <= value <= most:

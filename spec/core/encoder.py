@@ -1,18 +1,21 @@
-"""The incremental encoder."""
+"""The incremental encoder, or another sensor of motion."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from tachometry.spec.core.sensors import SENSORS, Sensor
 from tachometry.spec.language.option import REQUIRED, Option, ParameterError, option, parse_whole
 
 _GROUP = "Encoder"
 _MOST = 1 << 24  # counts
+_INVERTIBLE = ("a", "b", "c", "z")
 _OF_TURN: dict[str, Any] = {"metavar": "N", "group": _GROUP, "parse": parse_whole}
 
 
 def _of_counts(what: str, text: str, known: Mapping[str, Any]) -> int:
-    counts, decoding = parse_whole(what, text), int(known["decoding"])
+    sensor = SENSORS.get(known["sensor"], SENSORS["quadrature"])
+    counts, decoding = parse_whole(what, text), int(known["decoding"] or sensor.decodings[0])
     if not decoding <= counts <= _MOST:
         raise ParameterError(what, f"must be from {decoding} to {_MOST}, not {counts}")
     if counts % decoding:
@@ -24,23 +27,43 @@ def _of_counts(what: str, text: str, known: Mapping[str, Any]) -> int:
     return counts // decoding
 
 
+def _pole_pairs(what: str, text: str, known: Mapping[str, Any]) -> int:
+    if known["sensor"] != "hall":
+        raise ParameterError(what, f"must be given with --sensor hall, not {known['sensor']}: type --ppr")
+    return parse_whole(what, text)
+
+
 def _factor(what: str, text: str) -> int:
-    factors = {form.format(factor): factor for factor in (1, 2, 4) for form in ("{}", "x{}", "{}x")}
+    factors = {form.format(factor): factor for factor in (1, 2, 4, 6) for form in ("{}", "x{}", "{}x")}
     if (word := text.strip().lower()) not in factors:
         raise ParameterError(what, f"must be 1, 2 or 4, or x1, x2 or x4, not {text!r}")
     return factors[word]
 
 
+def _inverted(what: str, text: str) -> str:
+    names = {name.strip().lower() for name in text.split(",")}
+    if wrong := sorted(names - {*_INVERTIBLE}):
+        raise ParameterError(what, f"must be of {', '.join(_INVERTIBLE)}, with commas between, not {wrong[0]!r}")
+    return ",".join(name for name in _INVERTIBLE if name in names)
+
+
 @dataclass(frozen=True)
 class Encoder:
-    """A two-line incremental encoder and how its edges are counted.
+    """An incremental encoder, or another sensor of motion, and how its edges are counted.
 
     Parameters
     ----------
     pulses_per_rev : int
-        Periods of one line in a revolution (PPR, also called lines or cycles per revolution).
+        Periods of one line in a revolution (PPR, also called lines or cycles per revolution); of halls, pole pairs.
     decoding : int
-        Counts per period: 4 (every edge), 2 (both edges of A) or 1 (A while B is low).
+        Counts per period. Of quadrature: 4 (every edge), 2 (both edges of A) or 1 (A while B is low). Of pulses: 2
+        (every edge) or 1 (rises). Of steps 1, of halls 6. Not given: the usual one of the sensor.
+    sensor : str
+        `quadrature`, `pulses`, `step-dir`, `up-down` or `hall`.
+    reverse : bool
+        What would be forward counts backward.
+    invert : str or None
+        Lines that are low where others are high, with commas between.
 
     Raises
     ------
@@ -63,26 +86,82 @@ class Encoder:
                 parse_at=_of_counts,
                 **_OF_TURN,
             ),
+            Option(
+                "Pole pairs of the motor, which are periods of its halls in a turn (instead of --ppr).",
+                name="pole-pairs",
+                parse_at=_pole_pairs,
+                **_OF_TURN,
+            ),
         ),
     )
     decoding: int = option(
-        4,
-        "Counts per pulse: 4 (or x4) counts every edge, 2 both edges of A, 1 the edges of A while B is low.",
+        None,
+        "Counts per pulse: 4 (or x4) counts every edge, 2 both edges of A, 1 the edges of A while B is low. Of pulses, "
+        "2 counts every edge, which is their default, and 1 rises. A step is always 1, a period of halls 6.",
         parse=_factor,
         shown="4",
         metavar="[4|2|1]",
         group=_GROUP,
         tests=("", "2", "1"),
     )
+    sensor: str = option(
+        "quadrature",
+        "What moves the lines: quadrature (A and B), pulses (A alone, as of a tooth wheel, fan or flow meter: always "
+        "forward), step-dir (each rise of A is a step, forward while B is high), up-down (each rise of A counts up, "
+        "of B down), or hall (A, B and C of a motor, 120 electrical degrees apart).",
+        choices=tuple(SENSORS),
+        group=_GROUP,
+        tests=(),
+        tacit=True,
+    )
+    reverse: bool = option(False, "Count backward what would be forward.", group=_GROUP, tacit=True)
+    invert: str | None = option(
+        None,
+        "Lines to be inverted, which are high where they should be low: a, b, c, z, with commas between.",
+        metavar="LINES",
+        group=_GROUP,
+        parse=_inverted,
+        tests=("", "a"),
+        tacit=True,
+    )
 
     def __post_init__(self) -> None:
-        if self.decoding not in (1, 2, 4):
-            raise ParameterError("decoding", f"must be 1, 2 or 4, or x1, x2 or x4, not {self.decoding}")
+        if self.sensor not in SENSORS:
+            raise ParameterError("sensor", f"must be one of {', '.join(SENSORS)}, not {self.sensor!r}")
+        if self.decoding is None:
+            object.__setattr__(self, "decoding", self.kind.decodings[0])
+        self._check_decoding()
         if not 1 <= self.counts_per_rev <= _MOST:
             raise ParameterError(
                 "pulses_per_rev",
                 f"must be from 1 to {_MOST // self.decoding} with x{self.decoding} decoding, not {self.pulses_per_rev}",
             )
+        if wrong := sorted(self.inverted - {*self.kind.lines, "z"}):
+            lines = ", ".join((*self.kind.lines, "z"))
+            raise ParameterError("invert", f"must be of {lines} for {self.sensor}, not {wrong[0]}")
+
+    def _check_decoding(self) -> None:
+        if self.decoding in self.kind.decodings:
+            return
+        if self.sensor == "quadrature":
+            raise ParameterError("decoding", f"must be 1, 2 or 4, or x1, x2 or x4, not {self.decoding}")
+        allowed = " or ".join(map(str, sorted(self.kind.decodings)))
+        raise ParameterError("decoding", f"must be {allowed} for {self.sensor}, not {self.decoding}")
+
+    @property
+    def kind(self) -> Sensor:
+        """Facts of the sensor."""
+        return SENSORS[self.sensor]
+
+    @property
+    def inverted(self) -> frozenset[str]:
+        """Names of the lines that are inverted."""
+        return frozenset(self.invert.split(",")) if self.invert else frozenset()
+
+    @property
+    def plain(self) -> bool:
+        """Whether it is quadrature, whose lines are as they come."""
+        return self.sensor == "quadrature" and not self.reverse and not self.invert
 
     @property
     def counts_per_rev(self) -> int:

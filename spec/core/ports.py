@@ -21,8 +21,7 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
     return (
         pin("clk", "Clock; all outputs change at its rising edge."),
         pin("rst", "Synchronous reset, active high."),
-        pin("a", "Encoder line A, asynchronous. Forward is A before B."),
-        pin("b", "Encoder line B, asynchronous."),
+        *(pin(line, help) for line, help in zip(spec.encoder.kind.lines, spec.encoder.kind.pins, strict=True)),
         *_if(spec.index, pin("z", "Index line, asynchronous; its rising edge captures the position.")),
         *_if(
             spec.external_tick,
@@ -59,7 +58,7 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
         ),
         strobe(
             "decode_error",
-            "One clock: both lines changed at once, so the direction is unknown and nothing was counted.",
+            f"One clock: {wrong}" if (wrong := spec.encoder.kind.wrong) else "Never high: one line cannot be wrong.",
         ),
         held(TICK, "overflow", help="pulse_count was saturated at the maximum speed; position is exact all the same."),
         held(

@@ -255,6 +255,11 @@ class TachometerSpec:
         check(self)
 
     @property
+    def lines(self) -> tuple[str, ...]:
+        """Lines of the sensor, the index included."""
+        return (*self.encoder.kind.lines, "z") if self.index else self.encoder.kind.lines
+
+    @property
     def tachometer(self) -> "TachometerSpec":
         """The core of one axis that it is."""
         return self
@@ -330,7 +335,9 @@ class TachometerSpec:
         found: dict[str, Any] = {"method": self.method}
         for part in (self.encoder, self.timing, self):
             for about in options_of(type(part)):
-                found[about.field] = about.canonical(getattr(part, about.field))
+                value = getattr(part, about.field)
+                if not (about.tacit and value == about.default):
+                    found[about.field] = about.canonical(value)
         del found["external_tick"]
         return found | {
             "frac_bits": self.widths.frac_bits,
@@ -346,7 +353,7 @@ def written(part: Any, spec: TachometerSpec) -> dict[str, str]:
     found = {}
     for about in reversed(fitting.values()):
         value = getattr(part, about.field)
-        if value is None or (about.needs and value == about.default):
+        if value is None or ((about.needs or about.tacit) and value == about.default):
             continue
         clocks = spec.timing.tick_cycles if about.unit == "ticks" else 1
         timed = about.parse_at is not None

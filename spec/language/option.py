@@ -105,6 +105,8 @@ class Option:
         None: both values of a flag, all choices, else no values.
     few : int
         For a method that hardly depends on the option, the first so many of these values are enough.
+    tacit : bool
+        Whether manifests say nothing of it where it has its default.
     field : str
         Name of the field; set by `options_of`.
     default : object
@@ -126,6 +128,7 @@ class Option:
     fits: Callable[[type[Any]], bool] | None = None
     tests: tuple[str, ...] | None = None
     few: int = 2
+    tacit: bool = False
     field: str = ""
     default: Any = None
 

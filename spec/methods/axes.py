@@ -202,6 +202,9 @@ class AxesSpec:
         for name, value, why in _LEFT_OUT:
             if getattr(spec, name) != value:
                 raise ParameterError(name, f"must not be given together with axes: {why}")
+        if spec.encoder.sensor != "quadrature":
+            why = f"the decoder of {spec.encoder.sensor} {_FOR_ONE}"
+            raise ParameterError("sensor", f"must not be given together with axes: {why}")
         self._check_tick()
 
     def _check_tick(self) -> None:

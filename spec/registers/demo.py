@@ -33,6 +33,10 @@ class DemoMap(RegisterMap):
     spec : TachometerSpec
     """
 
+    def __post_init__(self) -> None:
+        if not self.spec.encoder.plain:
+            raise ParameterError("sensor", "must be quadrature with a demo, its lines as they come: it emulates these")
+
     @cached_property
     def ports(self) -> tuple[Port, ...]:
         """Outputs of the core that are captured, and the time."""

@@ -48,7 +48,8 @@ def test_commands_are_listed(flag: str, capsys: pytest.CaptureFixture[str]) -> N
 
 
 CORE = """
-    --ppr --decoding --clock --tick --max-time --external-tick --max-tick-period --unit --frac-bits --lsb
+    --ppr --pole-pairs --decoding --sensor --reverse --invert
+    --clock --tick --max-time --external-tick --max-tick-period --unit --frac-bits --lsb
     --velocity-width --cancel --no-cancel --max-speed --position-width --filter --index --index-reset
 """.split()
 DEFAULTS = (
@@ -114,7 +115,11 @@ def test_every_option_is_explained(
 
 
 def test_shared_options_say_what_every_method_does(capsys: pytest.CaptureFixture[str]) -> None:
-    text = re.sub(r"(?<=-edge)- (?=error)", "-", " ".join(shown(capsys, "help", "plan").split()))
+    text = re.sub(
+        r"(?<=-edge)- (?=error)|(?<=step)- (?=dir)|(?<=up)- (?=down)",
+        "-",
+        " ".join(shown(capsys, "help", "plan").split()),
+    )
     for method in METHODS:
         assert f"{method} {METHODS[method].facts.summary}" in text
         for about in own_options(method):

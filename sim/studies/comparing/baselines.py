@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tachometry.sim.encoder.motion import FloatArray
-from tachometry.sim.golden.front_end import decode
+from tachometry.sim.golden.front_end import counted
 from tachometry.sim.signals.recording import MAX_TICKS, Recording
+from tachometry.spec import Encoder
 
 IntArray = NDArray[np.int64]
 
@@ -54,9 +55,14 @@ class Steps:
     @staticmethod
     def of_recording(recording: Recording, counts_per_rev: int, decoding: int = 4) -> "Steps":
         """Return what an ideal decoder counts; a change of both lines at once counts as none."""
-        step, _ = decode(recording.a, recording.b, decoding)
+        return Steps.of_sensor(recording, Encoder(counts_per_rev // decoding, decoding))
+
+    @staticmethod
+    def of_sensor(recording: Recording, encoder: Encoder) -> "Steps":
+        """Return what an ideal decoder of a sensor counts."""
+        step, _ = counted(encoder, recording.lines)
         row = np.flatnonzero(step)
-        return Steps(recording.time[row + 1], step[row], recording.duration, counts_per_rev)
+        return Steps(recording.time[row], step[row], recording.duration, encoder.counts_per_rev)
 
     @property
     def count_rad(self) -> float:

@@ -11,8 +11,9 @@ from tachometry.sim.encoder.motion import FloatArray, parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.progress import Bar
 from tachometry.sim.signals.recording import PinTrace, Recording
+from tachometry.sim.studies.comparing.baselines import Steps
 from tachometry.sim.studies.comparing.compare import Curve, Score, TrueSpeed, common_instants, core_curve, score
-from tachometry.sim.studies.comparing.rivals import baseline_curve, baseline_model, settings
+from tachometry.sim.studies.comparing.rivals import baseline_model, settings, steps_curve
 from tachometry.sim.studies.comparing.tune import (
     SETTLED_S,
     TUNED,
@@ -188,7 +189,7 @@ class Setting:
             If its options are wrong, or do not fit the recording.
         """
         if self.spec is None:
-            return baseline_curve(self.name, recording, self.encoder.counts_per_rev, self.encoder.decoding)
+            return steps_curve(self.name, Steps.of_sensor(recording, self.encoder))
         return core_curve(self.name, self.spec, PinTrace.of(recording, self.spec))
 
 
@@ -241,7 +242,7 @@ class _Trial:
             raise ValueError("--motion must move the shaft where there is a --tradeoff")
         found: dict[str, list[Cost]] = {}
         index = any(spec is not None and spec.index for spec in specs.values())
-        moving = VirtualEncoder(self.encoder.pulses_per_rev, index=index).record(parse_motion(triangle(speed)))
+        moving = VirtualEncoder.of(self.encoder, index=index).record(parse_motion(triangle(speed)))
         tick_s = float(self.instants[1] - self.instants[0])
         after = common_instants([], moving.recording.duration, tick_s, SETTLED_S)
         for name, tried in self._counted(self._settings(specs, of_cores=True), "measuring"):

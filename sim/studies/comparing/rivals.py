@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from tachometry.sim.signals.recording import Recording
 from tachometry.sim.studies.comparing import baselines, estimators
 from tachometry.sim.studies.comparing.baselines import Estimate, Steps
 from tachometry.sim.studies.comparing.compare import Curve
@@ -227,19 +226,10 @@ def baseline_model(name: str) -> tuple[str, Callable[[Steps], Estimate]]:
     return f"{baseline.title}: {settings}", partial(baseline.model, **arguments)
 
 
-def baseline_curve(name: str, recording: Recording, counts_per_rev: int, decoding: int) -> Curve:
-    """Return what a baseline shows, with an ideal decoder.
-
-    Raises
-    ------
-    ValueError
-        If the name or its options are not known, or it is shorter than two of its periods.
-    """
-    return steps_curve(name, Steps.of_recording(recording, counts_per_rev, decoding))
-
-
 def steps_curve(name: str, steps: Steps) -> Curve:
-    """Return what a baseline shows of steps; errors as of `baseline_curve`."""
+    """Return what a baseline shows of steps; ValueError if its name or options are not known, or it is shorter than two
+    of its periods.
+    """
     what, model = baseline_model(name)
     estimate = model(steps)
     if len(estimate.time) < 2:

@@ -134,7 +134,7 @@ def test_a_controller_in_gates(tmp_path: Path) -> None:
         ("--jobs 1 --scheduler tcp://nobody:1", "--jobs must not be given together with --scheduler"),
         ("--vary kv=1,2 --log log.csv", "--log must be of one loop on this machine"),
         ("--methods s,m --plot plot.png", "--vary must be given together with --plot of several loops"),
-        ("--vary speed=1,2", "--vary must be of ppr, lines, cpr, decoding, clock, "),
+        ("--vary speed=1,2", "--vary must be of ppr, lines, cpr, pole-pairs, decoding, sensor, reverse, "),
         ("--vary kv=1,-2", "--kv must be greater than 0, not -2 (method s, kv=-2)"),
         ("--min-time 1ms", "--min-time must be given with a method that has it: mt"),
         ("--methods s,x", "--methods must be of auto, s, m, t, mt, rairan, track, or all, not 'x'"),

@@ -161,7 +161,7 @@ speed = ["5rad/s", "50rad/s"]
 tick = ["100us", "1ms"]
 """
 BAD = [
-    (["--vary", "turns=1"], "--vary must be of ppr, lines, cpr, decoding, "),
+    (["--vary", "turns=1"], "--vary must be of ppr, lines, cpr, pole-pairs, decoding, "),
     (["--vary", "turns=1"], "or of a name in braces within --motion, such as {speed}, not 'turns'"),
     (["--motion", "stop:1s"], "not 'speed'"),
     (["--motion", "constant:{speed}:{tick}"], "--motion must have names in braces that are no option or column, not "),

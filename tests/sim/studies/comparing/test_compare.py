@@ -8,8 +8,9 @@ from support.lines import PPR, record
 
 from tachometry.sim.plots.compare import save_comparison
 from tachometry.sim.studies.comparing import baselines
+from tachometry.sim.studies.comparing.baselines import Steps
 from tachometry.sim.studies.comparing.compare import Curve, common_instants, core_curve, score
-from tachometry.sim.studies.comparing.rivals import BASELINES, baseline_curve
+from tachometry.sim.studies.comparing.rivals import BASELINES, steps_curve
 from tachometry.spec import METHODS, Encoder, Timing
 
 
@@ -68,7 +69,7 @@ def test_every_method_follows_a_constant_speed(tmp_path: Path) -> None:
     specs = {name: spec(encoder=Encoder(PPR), timing=timing) for name, spec in METHODS.items()}
     trace = truth.recording.place(timing.clock_hz)
     curves = [core_curve(name, spec, trace) for name, spec in specs.items()]
-    curves += [baseline_curve(name, truth.recording, 4 * PPR, 4) for name in BASELINES]
+    curves += [steps_curve(name, Steps.of_recording(truth.recording, 4 * PPR)) for name in BASELINES]
     instants = common_instants(curves, 0.4, 1e-3)
     instants = instants[instants > 0.2]  # filters have settled
     scores = [score(each, 0.4, instants, truth.true_speed) for each in curves]
@@ -84,4 +85,4 @@ def test_every_method_follows_a_constant_speed(tmp_path: Path) -> None:
 
 def test_too_short_for_a_control_period() -> None:
     with pytest.raises(ValueError, match=r"^motion must last at least two control periods of hostmot2, not 0.001 s$"):
-        baseline_curve("hostmot2", record("stop:1ms").recording, 400, 4)
+        steps_curve("hostmot2", Steps.of_recording(record("stop:1ms").recording, 400))

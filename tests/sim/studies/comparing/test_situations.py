@@ -9,8 +9,9 @@ import pytest
 from support.command import run
 from support.nightly import only
 
+from tachometry.sim.studies.comparing.baselines import Steps
 from tachometry.sim.studies.comparing.compare import common_instants, rms_error
-from tachometry.sim.studies.comparing.rivals import baseline_curve
+from tachometry.sim.studies.comparing.rivals import steps_curve
 from tachometry.sim.studies.comparing.situations import OTHERS, SITUATIONS, Situation
 
 ALL = (*SITUATIONS, *OTHERS)
@@ -23,7 +24,7 @@ def test_names_are_different() -> None:
 @pytest.mark.parametrize("situation", only(ALL[::6], ALL), ids=lambda situation: situation.name)
 def test_options_are_of_what_is_recorded(situation: Situation, tmp_path: Path) -> None:
     truth = situation.record(3)
-    curve = baseline_curve("hostmot2", truth.recording, situation.counts_per_rev, 4)
+    curve = steps_curve("hostmot2", Steps.of_recording(truth.recording, situation.counts_per_rev))
     instants = common_instants([curve], truth.recording.duration, 1e-4, situation.start_s)
     core = "--clock 10MHz --tick 100us --max-time 10ms --max-speed 400rad/s".split()
     lines = [] if "--ppr" in situation.options else ["--ppr", 500]

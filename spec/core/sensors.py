@@ -1,0 +1,122 @@
+"""Facts of the sensors: the lines of each, the order of their levels, and what a change of them counts."""
+
+from dataclasses import dataclass
+from functools import cache
+
+Levels = tuple[int, ...]  # of the lines, 0 or 1
+
+
+def packed_levels(levels: Levels) -> int:
+    """Return levels of lines as a number, the first lowest."""
+    return sum(level << line for line, level in enumerate(levels))
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A kind of sensor.
+
+    Parameters
+    ----------
+    name : str
+    lines : tuple of str
+        Its lines, beside the index.
+    decodings : tuple of int
+        Counts per pulse that it can have, the usual one first.
+    cycle : tuple of tuple of int
+        Levels of the lines in a period, in forward order; empty where levels do not tell a place in a period.
+    pins : tuple of str
+        What each line is.
+    wrong : str
+        In which clocks `decode_error` is high, and what is counted then; empty: never.
+    """
+
+    name: str
+    lines: tuple[str, ...]
+    decodings: tuple[int, ...]
+    cycle: tuple[Levels, ...]
+    pins: tuple[str, ...]
+    wrong: str
+
+    @property
+    def legal(self) -> tuple[Levels, ...]:
+        """Levels that there may be."""
+        return self.cycle or tuple((number & 1, number >> 1) for number in range(4))
+
+    def change(self, decoding: int, before: Levels, after: Levels) -> tuple[int, bool]:
+        """Return what a change from legal levels to legal levels counts, −1, 0 or +1, and whether it is wrong.
+
+        In a cycle a change to the next levels is forward and one to those before is backward. A greater one is wrong
+        and counts nothing. Quadrature x2 counts where A changes, x1 where it does so while B is low.
+        """
+        if before == after:
+            return 0, False
+        match self.name:
+            case "pulses":
+                return int(decoding == 2 or after == (1,)), False
+            case "step-dir":
+                rises = before[0] < after[0]
+                return (2 * after[1] - 1) * rises, rises and before[1] != after[1]
+            case "up-down":
+                up, down = (now > then for then, now in zip(before, after, strict=True))
+                return up - down, up and down
+        turn = (self.cycle.index(after) - self.cycle.index(before)) % len(self.cycle)
+        step = {1: 1, len(self.cycle) - 1: -1}.get(turn, 0)
+        counted = decoding >= 4 or (before[0] != after[0] and (decoding == 2 or after[1] == 0))
+        return step * counted, step == 0
+
+
+_SENSORS = (
+    Sensor(
+        "quadrature",
+        ("a", "b"),
+        (4, 2, 1),
+        ((0, 0), (1, 0), (1, 1), (0, 1)),
+        ("Encoder line A, asynchronous. Forward is A before B.", "Encoder line B, asynchronous."),
+        "both lines changed at once, so the direction is unknown and nothing was counted.",
+    ),
+    Sensor("pulses", ("a",), (2, 1), ((0,), (1,)), ("Line of the sensor, asynchronous.",), ""),
+    Sensor(
+        "step-dir",
+        ("a", "b"),
+        (1,),
+        (),
+        (
+            "Step line, asynchronous: each rise is a count.",
+            "Direction, asynchronous: high is forward. It must be stable for a clock before the step rises.",
+        ),
+        "the direction changed together with a step, which was counted in the new direction.",
+    ),
+    Sensor(
+        "up-down",
+        ("a", "b"),
+        (1,),
+        (),
+        (
+            "Line of the pulses up, asynchronous: each rise is a count forward.",
+            "Line of the pulses down, asynchronous: each rise is a count backward.",
+        ),
+        "a pulse up and one down rose at once, and nothing was counted.",
+    ),
+    Sensor(
+        "hall",
+        ("a", "b", "c"),
+        (6,),
+        ((1, 0, 1), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)),
+        (
+            "Hall sensor A, asynchronous. Forward is A before B before C, 120 electrical degrees apart.",
+            "Hall sensor B, asynchronous.",
+            "Hall sensor C, asynchronous.",
+        ),
+        "all lines became equal, or more than one changed from one state to another; nothing was counted.",
+    ),
+)
+SENSORS = {sensor.name: sensor for sensor in _SENSORS}
+
+
+@cache
+def changes(name: str, decoding: int) -> dict[tuple[Levels, Levels], tuple[int, bool]]:
+    """Return what each change of legal levels counts, and whether it is wrong, see `Sensor.change`."""
+    sensor = SENSORS[name]
+    return {
+        (before, after): sensor.change(decoding, before, after) for before in sensor.legal for after in sensor.legal
+    }

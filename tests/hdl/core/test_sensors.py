@@ -1,0 +1,98 @@
+"""Cores of other sensors: hardware against golden model, the exported Verilog in Icarus, and wrong decoders."""
+
+import subprocess
+from pathlib import Path
+from unittest.mock import patch
+
+import pytest
+from support.options import had_by
+
+from tachometry.hdl.export import export
+from tachometry.hdl.front_end import decoder
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.stress import stress
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.studies.lockstep import lockstep
+from tachometry.spec import Encoder, of_options, of_texts
+from tachometry.spec.core.sensors import SENSORS, Levels, changes
+
+Table = dict[tuple[Levels, Levels], tuple[int, bool]]
+
+BASE = {"ppr": "8", "clock": "1MHz", "tick": "40us", "max-time": "400us"}
+CASES = {
+    "pulses": {"decoding": "1", "filter": "2"},
+    "step-dir": {"reverse": "yes"},
+    "up-down": {"invert": "a,b"},
+    "hall": {"filter": "2", "invert": "b,z", "index": "yes"},
+    "quadrature": {"reverse": "yes", "invert": "a,z", "index": "yes"},
+}
+
+
+@pytest.mark.parametrize("sensor", CASES)
+def test_every_step_and_every_error(sensor: str) -> None:
+    spec = of_texts("s", BASE | CASES[sensor] | {"sensor": sensor})
+    found = lockstep(spec, stress(spec, 1, 40), PySim())
+    assert found.n_mismatches == 0, found.first
+    assert bool(len(found.actual.errors)) == (sensor != "pulses" and not (spec.filter_clocks and sensor != "hall"))
+    assert len(found.actual.updates) > 20
+
+
+@pytest.mark.parametrize("sensor", ["hall", "up-down"])
+def test_a_wrong_table_is_seen(sensor: str) -> None:
+    spec = of_texts("s", BASE | {"sensor": sensor})
+
+    def wrong(name: str, decoding: int) -> Table:
+        table = changes(name, decoding)
+        pair = next(pair for pair, (step, _) in table.items() if step)
+        return {**table, pair: (0, False)}
+
+    with patch.object(decoder, "changes", wrong):
+        assert lockstep(spec, stress(spec, 1, 40), PySim()).n_mismatches
+
+
+@pytest.mark.parametrize("sensor", CASES)
+def test_the_virtual_encoder_makes_what_the_core_counts(sensor: str) -> None:
+    """Also one that is mounted the other way round, with lines that are inverted."""
+    texts = BASE | CASES[sensor] | {"sensor": sensor, "filter": "0"}
+    spec = of_texts("s", texts)
+    encoder = VirtualEncoder.of(spec.encoder, index=spec.index, jitter=0.2, seed=3, start_angle_rad=0.013)
+    truth = encoder.record(parse_motion("ramp:0:90rad/s:30ms+sine:60rad/s:40Hz:40ms+constant:150rad/s:60ms"))
+    found = lockstep(spec, PinTrace.of(truth.recording, spec), PySim())
+    assert found.n_mismatches == 0, found.first
+    assert len(found.actual.errors) == 0
+    counted = int(truth.true_position(truth.motion.duration, spec.encoder.decoding))
+    assert abs(found.actual.ticks.position[-1] - counted) <= 1
+    assert abs(counted) > 3
+
+
+@pytest.mark.parametrize("fault", ["phase_error_deg", "illegal", "lost"])
+def test_faults_of_quadrature_are_refused(fault: str) -> None:
+    with pytest.raises(ValueError, match=f"^{fault} must not be given with --sensor hall$"):
+        VirtualEncoder.of(Encoder(4, sensor="hall"), **{fault: 0.1})
+
+
+@pytest.mark.parametrize("sensor", CASES)
+def test_exported_verilog_counts_in_icarus(sensor: str, tmp_path: Path) -> None:
+    files = export(of_texts("m", had_by("m", BASE | CASES[sensor] | {"sensor": sensor})), "spindle")
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    subprocess.run(["iverilog", "-g2012", "-o", "tb", "spindle.v", "spindle_tb.sv"], cwd=tmp_path, check=True)
+    said = subprocess.run([tmp_path / "tb"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+    assert "PASS: position" in said
+
+
+def test_many_axes_invert_and_reverse(tmp_path: Path) -> None:
+    texts = {"method": "s", "axes": "3", "reverse": "yes", "invert": "b", "decoding": "1"}
+    for name, text in export(of_options(BASE | texts), "spindle").items():
+        (tmp_path / name).write_text(text)
+    subprocess.run(["iverilog", "-g2012", "-o", "tb", "spindle.v", "spindle_tb.sv"], cwd=tmp_path, check=True)
+    assert "PASS" in subprocess.run([tmp_path / "tb"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+
+
+@pytest.mark.parametrize("sensor", SENSORS)
+def test_options_of_a_manifest_make_the_core_again(sensor: str) -> None:
+    spec = of_texts("s", BASE | {"sensor": sensor})
+    assert of_options(spec.options) == spec
+    assert ("sensor" in spec.options) == ("sensor" in spec.parameters) == (sensor != "quadrature")

@@ -1,0 +1,88 @@
+"""Every change of the lines of every sensor, against where a data sheet draws them."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from reference.sensors import Decoder, possible
+from support.simulate import clock_by_clock
+
+from tachometry.hdl.front_end.decoder import decoder_of
+from tachometry.sim.golden.front_end import looked_up
+from tachometry.spec import Encoder
+from tachometry.spec.core.sensors import SENSORS, changes
+
+EVERY = [(name, decoding) for name, sensor in SENSORS.items() for decoding in sensor.decodings]
+
+
+def walk(lines: int) -> list[tuple[int, ...]]:
+    """Return levels in an order in which each comes before each, and each pair between any two."""
+    every = list(itertools.product((0, 1), repeat=lines))
+    rng = np.random.default_rng(lines)
+    order = [levels for pair in itertools.product(every, repeat=2) for levels in pair]
+    return order + [every[place] for place in rng.integers(0, len(every), 200)]
+
+
+@pytest.mark.parametrize(("name", "decoding"), EVERY)
+def test_the_table_is_that_of_the_data_sheet(name: str, decoding: int) -> None:
+    table = changes(name, decoding)
+    legal = possible(name, len(SENSORS[name].lines))
+    assert {*SENSORS[name].legal} == {*legal}
+    assert table.keys() == {*itertools.product(legal, repeat=2)}
+    for (before, after), found in table.items():
+        decoder = Decoder(name, decoding)
+        assert decoder.see(before) == (0, False)
+        assert found == decoder.see(after), (before, after)
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+@pytest.mark.parametrize(("name", "decoding"), EVERY)
+def test_every_change_in_every_order(name: str, decoding: int, reverse: bool) -> None:
+    encoder = Encoder(8, decoding, name, reverse)
+    lines = encoder.kind.lines
+    levels = walk(len(lines))
+    rows = [{f"level_{line}": level for line, level in zip(lines, each, strict=True)} for each in levels]
+    rows = [{"ready": 0, **rows[0]}, {"ready": 1, **rows[0]}, *rows[1:]]
+    seen = clock_by_clock(decoder_of(encoder), [*rows, {}], ["step", "decode_error"])
+    program = Decoder(name, decoding, reverse=reverse)
+    expected = [program.see(each) for each in levels]
+    assert [(row["step"], bool(row["decode_error"])) for row in seen[1 : len(levels) + 1]] == expected
+    assert {step for step, _ in expected} == ({0, -1 if reverse else 1} if name == "pulses" else {-1, 0, 1})
+    assert any(wrong for _, wrong in expected) == (name != "pulses")
+
+
+@pytest.mark.parametrize(("name", "decoding"), [pair for pair in EVERY if pair[0] != "quadrature"])
+def test_the_golden_model_sees_every_change(name: str, decoding: int) -> None:
+    encoder = Encoder(8, decoding, name)
+    levels = [each for each, _ in itertools.groupby(walk(len(encoder.kind.lines)))]
+    columns = [np.array(line, dtype=np.uint8) for line in zip(*levels, strict=True)]
+    step, wrong = looked_up(encoder, columns, brief=False)
+    program = Decoder(name, decoding)
+    assert list(zip(step.tolist(), wrong.tolist(), strict=True)) == [program.see(each) for each in levels]
+
+
+def test_halls_that_are_all_equal_are_told_once_and_forgotten() -> None:
+    """A connector that is not plugged in, then turns again: the count goes on from the state before."""
+    encoder = Encoder(8, sensor="hall")
+    levels = [(1, 1, 1), (1, 1, 1), (1, 0, 1), (0, 0, 0), (1, 1, 1), (1, 0, 0), (1, 1, 0)]
+    rows = [dict(zip(("level_a", "level_b", "level_c"), each, strict=True)) for each in levels]
+    seen = clock_by_clock(
+        decoder_of(encoder), [{"ready": 0, **rows[0]}, {"ready": 1}, *rows, {}], ["step", "decode_error"]
+    )
+    assert [(row["step"], row["decode_error"]) for row in seen[1:]] == [
+        *((0, 1), (0, 0), (0, 0), (0, 0), (0, 1), (0, 0), (1, 0), (1, 0), (0, 0))
+    ]
+
+
+def test_an_encoder_says_what_it_cannot_be() -> None:
+    assert Encoder(4, sensor="hall").counts_per_rev == 24
+    assert replace(Encoder(4), sensor="quadrature").decoding == 4
+    for given, message in (
+        ({"sensor": "sin-cos"}, "^sensor must be one of quadrature, pulses, step-dir, up-down, hall, not 'sin-cos'$"),
+        ({"sensor": "pulses", "decoding": 4}, "^decoding must be 1 or 2 for pulses, not 4$"),
+        ({"sensor": "hall", "decoding": 4}, "^decoding must be 6 for hall, not 4$"),
+        ({"invert": "c"}, "^invert must be of a, b, z for quadrature, not c$"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            Encoder(4, **given)
