@@ -93,7 +93,7 @@ def _read_encoder(**given: Any) -> dict[str, Any]:
     def encoder(spec: TachometerSpec) -> VirtualEncoder:
         from tachometry.sim.encoder.virtual import VirtualEncoder
 
-        return VirtualEncoder.of(spec.encoder, index=spec.index, **values)
+        return VirtualEncoder.of(spec.encoder, index=spec.index, index_state=spec.index_place, **values)
 
     return dict(encoder=encoder, **given)
 

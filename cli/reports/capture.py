@@ -99,6 +99,11 @@ def _index_place(axis: Axis) -> list[str]:
     recording = axis.recording
     if not len(near) or recording.z is None:
         return []
+    if axis.spec.index_state is not None:
+        return [
+            f"to and fro, the index is found {int(near.max())} counts apart: z is high for longer than a period of A, "
+            "and meets its state twice; find it in one direction alone"
+        ]
     high = float(np.diff(recording.time, append=recording.duration) @ recording.z) / recording.duration
     why = (
         f"z is high {100 * high:.3g} % of the time, so it may be low at the index, and must be inverted"

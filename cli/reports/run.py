@@ -15,7 +15,7 @@ from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.simulation import Axis, Simulation
 from tachometry.spec import AxesSpec, CoreSpec
 from tachometry.spec.core.health import FAULT_TEXTS
-from tachometry.spec.language.port import COMPARE
+from tachometry.spec.language.port import COMPARE, WIDE
 from tachometry.spec.language.units import format_time, plural
 
 _Row = tuple[str, str]  # a name and its value
@@ -113,7 +113,9 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         rows.append(("edges swallowed", f"{run.ticks.swallowed_edges[-1]} (glitch filter)"))
     if spec.index:
         last = f", the last at position {run.index.index_position[-1]}" if len(run.index.clock) else ""
-        rows.append(("index", f"{len(run.index.clock)} times{last}{index_distance(axis)}"))
+        wide = len(run.tables[WIDE]) if WIDE in run.tables else 0
+        told = f"; wider than a period {wide} times" if wide else ""
+        rows.append(("index", f"{len(run.index.clock)} times{last}{index_distance(axis)}{told}"))
     if spec.health:
         code, faults = run.ticks.health[-1], plural(int(run.ticks.faults[-1]), "fault")
         rows.append(("health", f"{faults}, first: {FAULT_TEXTS[code]}" if code else "no fault"))

@@ -15,6 +15,7 @@ from tachometry.hdl.axes.axis_index import AxisIndex
 from tachometry.hdl.axes.axis_tick_counts import AxisTickCounts
 from tachometry.hdl.axes.held_outputs import HeldOutputs
 from tachometry.hdl.axes.rounds import Rounds
+from tachometry.hdl.front_end.index_state import in_state
 from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import follow, members
 from tachometry.hdl.wires.synchronizer import Synchronizer
@@ -100,11 +101,14 @@ class AxesTachometer(wiring.Component):
         self._show(m, UPDATE, datapath.velocity_valid, "axis", datapath.axis, datapath)
         if self.axis_index is not None:
             m.submodules.axis_index = index = self.axis_index
+            state, all_known = spec.axis.index_state, known["z"] & known["a"] & known["b"]
             m.d.comb += [
                 index.slot.eq(at["slot"]),
                 index.ready.eq(at["ready"]),
-                index.known.eq(at["ready"] & known["z"]),
-                index.level_z.eq(level["z"]),
+                index.known.eq(at["ready"] & known["z"] if state is None else at["ready"] & all_known),
+                index.level_z.eq(
+                    level["z"] if state is None else level["z"] & in_state((level["a"], level["b"]), state)
+                ),
                 index.step.eq(counters.step),
             ]
             if spec.axis.index_reset:

@@ -3,7 +3,7 @@
 from functools import reduce
 from operator import and_
 
-from amaranth import Module, Signal, Value
+from amaranth import Cat, Module, Signal, Value
 from amaranth.lib import stream, wiring
 
 from tachometry.hdl.arithmetic.idle import Idle, idle_of
@@ -12,6 +12,7 @@ from tachometry.hdl.front_end.decoder import decoder_of
 from tachometry.hdl.front_end.encoder_watch import EncoderWatch
 from tachometry.hdl.front_end.external_tick import ExternalTick
 from tachometry.hdl.front_end.index_capture import IndexCapture
+from tachometry.hdl.front_end.index_state import IndexState
 from tachometry.hdl.front_end.position_counter import PositionCounter
 from tachometry.hdl.front_end.pulse_counter import PulseCounter
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
@@ -60,6 +61,10 @@ class Tachometer(wiring.Component):
         )
         self.position_counter = PositionCounter(spec.position_width, spec.latency.tick)
         self.index_capture = IndexCapture(spec.position_width, spec.latency.tick) if spec.index else None
+        self.index_state: IndexState | None = None
+        if spec.index_state is not None:
+            after = spec.encoder.kind.after(spec.index_state)
+            self.index_state = IndexState(spec.index_state, after, spec.latency.tick)
         self.watch: EncoderWatch | None = None
         if spec.health:
             self.watch = EncoderWatch(
@@ -231,15 +236,33 @@ class Tachometer(wiring.Component):
         if self.index_capture is None:
             return
         m.submodules.index_capture = index = self.index_capture
+        level, ready = self._index_level(m)
         m.d.comb += [
             self.conditioner.z.eq(self.z),
-            index.level_z.eq(self._level("z")),
-            index.ready.eq(self.conditioner.ready_z),
+            index.level_z.eq(level),
+            index.ready.eq(ready),
             index.position.eq(self.position_counter.next),
             self.position_counter.clear.eq(index.rises & int(self._spec.index_reset)),
             self.index_position.eq(index.index_position),
             self.index_valid.eq(index.index_valid),
         ]
+
+    def _index_level(self, m: Module) -> tuple[Value, Value]:
+        """Return Z as it is, or in its state alone, and whether it is real, as is the level before."""
+        level: Value
+        ready: Value
+        level, ready = self._level("z"), self.conditioner.ready_z
+        if self.index_state is not None:
+            m.submodules.index_state = state = self.index_state
+            lines = self._spec.encoder.kind.lines
+            m.d.comb += [
+                state.level.eq(Cat(getattr(self.decoder, f"level_{line}") for line in lines)),
+                state.level_z.eq(level),
+                state.ready.eq(ready & self.decoder.ready),
+                self.index_wide.eq(state.index_wide),
+            ]
+            level, ready = state.index, state.ready
+        return level, ready
 
     def _watch(self, m: Module) -> None:
         """Tell what is wrong with the encoder, if that is watched."""

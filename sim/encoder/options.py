@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tachometry.spec.language.option import ParameterError, option
-from tachometry.spec.language.units import DEGREES, FRACTION, number_reader
+from tachometry.spec.language.units import DEGREES, FRACTION, TIME, number_reader, read_nearest
 
 if TYPE_CHECKING:  # numpy is slow to import
     from tachometry.sim.encoder.imperfections import Bounce, LineFault
@@ -39,6 +39,10 @@ def _seed(what: str, text: str) -> int:
         return int(text)
     except ValueError:
         raise ParameterError(what, f"must be a whole number, not {text!r}") from None
+
+
+def _time(what: str, text: str) -> float:
+    return read_nearest(what, text, TIME)
 
 
 def _fault(help: str, metavar: str, parse: Callable[[str, str], float], name: str = "") -> float:
@@ -78,6 +82,11 @@ class EncoderOptions:
         An edge is not late if the one before it is, or if the next one is of the same line, as after a reversal.
     broken, stuck : LineFault or None
         A line that is high from some time on, as an open input is, and one that stays as it is then.
+    index_width : int, 1 to 16
+        Quarter periods for which Z is high. At 1 it is gated: high only while the lines are in its state. A wider one
+        is not, and is about that state: 2 quarters go on forward, 4 begin one before it.
+    index_skew_s : float, seconds
+        Z comes so much later than the lines, or earlier; then it is not gated.
     seed : int, at least 0
         Of all random numbers. Each imperfection has a stream of its own.
 
@@ -155,6 +164,22 @@ class EncoderOptions:
         group=_FAULTS,
         parse=_line_fault,
     )
+    index_width: int = option(
+        1,
+        "Quarter periods for which the index is high, 1 to 16. A wider one than 1 is not gated by A and B.",
+        metavar="N",
+        group=_FAULTS,
+    )
+    index_skew_s: float = option(
+        None,
+        "The index comes so much later than A and B, or earlier, as 3us or -3us (s, ms, us or ns); then it is not "
+        "gated.",
+        text="0s",
+        name="index-skew",
+        metavar="TIME",
+        group=_FAULTS,
+        parse=_time,
+    )
     seed: int = option(
         0, "Seed of all random numbers; equal seeds give equal files.", metavar="N", group=_FAULTS, parse=_seed
     )
@@ -177,5 +202,7 @@ class EncoderOptions:
                 "phase error, duty error and 180 times nonuniformity and eccentricity together must be less than 90 "
                 f"electrical degrees, not {errors:.6g}"
             )
+        if not 1 <= self.index_width <= 16:
+            raise ParameterError("index_width", f"must be from 1 to 16, not {self.index_width}")
         if self.seed < 0:
             raise ParameterError("seed", f"must be at least 0, not {self.seed}")

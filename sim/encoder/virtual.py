@@ -85,8 +85,10 @@ class VirtualEncoder(EncoderOptions):
     start_angle_rad : float, rad
         Added to the angle of the motion. At 0, a motion from angle 0 begins exactly on edge 0, which has been passed.
     index : bool
-        Whether there is an index line Z: high once a turn, in the quarter that begins at shaft angle 0, and gated as
-        usual: only while A and B are low.
+        Whether there is an index line Z: high once a turn, in the first period from shaft angle 0, and gated as usual:
+        only while A and B are as in `index_state`.
+    index_state : int
+        Place of the index in its period: in quadrature 0, where A and B are low, to 3.
     sensor : str
         What it is instead of an incremental encoder with lines A and B, see `tachometry.spec.core.sensors`. Of pulses
         there is line A alone. Halls change six times in each of `pulses_per_rev` periods. Of steps and of pulses up and
@@ -107,6 +109,7 @@ class VirtualEncoder(EncoderOptions):
     start_angle_rad: float = 0.0
     index: bool = False
     sensor: str = "quadrature"
+    index_state: int = 0
     reverse: bool = False
     invert: str | None = None
 
@@ -182,7 +185,7 @@ class VirtualEncoder(EncoderOptions):
         turned = -quarter if self.reverse else quarter
         if self.sensor in ("step-dir", "up-down"):
             times, level = imperfections.pulsed(time, np.diff(turned), duration, directed=self.sensor == "step-dir")
-            return self._indexed(times, level, time, quarter, duration), 0, 0
+            return self._indexed(times, level, time, turned, duration), 0, 0
         level = _HALLS[turned % 6] if self.sensor == "hall" else quadrature(turned)
         if self.sensor == "pulses":
             level &= np.uint8(1)
@@ -197,15 +200,19 @@ class VirtualEncoder(EncoderOptions):
             times, level = imperfections.chattering(time, level, row, duration, self.bounce, random)
         else:
             times, level = time[row], level[row]
-        return self._indexed(times, level, time, quarter, duration), n_illegal, n_lost
+        return self._indexed(times, level, time, turned, duration), n_illegal, n_lost
 
     def _indexed(
         self, times: FloatArray, level: NDArray[np.uint8], at: FloatArray, quarter: IntArray, duration: float
     ) -> Recording:
-        """Return the recording of the lines, with the index if there is one; `quarter` begin at times `at`."""
+        """Return the recording of the lines, with the index if there is one; their `quarter` begin at times `at`."""
         lines = ("a", "b", "c") if self.sensor == "hall" else ("a", "b")
         if self.index:
-            slot, gate = quarter % self.edges_per_rev == 0, 0 if self.sensor == "quadrature" else None
+            begin = self.index_state - (self.index_width - 1) // 2
+            slot = (quarter - begin) % self.edges_per_rev < self.index_width
+            gated = self.sensor == "quadrature" and self.index_width == 1 and not self.index_skew_s
+            gate = int(quadrature(np.array(self.index_state))) if gated else None
+            at = np.append(0.0, np.clip(at[1:] + self.index_skew_s, 0, duration))
             times, level = imperfections.gated_index(times, level, at, slot, np.uint8(1 << len(lines)), gate)
             lines = (*lines, "z")
         inverted = self.invert.split(",") if self.invert else ()

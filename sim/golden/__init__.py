@@ -57,6 +57,7 @@ def tables(spec: TachometerSpec, trace: PinTrace) -> dict[str, Table]:
         "tick": compare.with_compare(spec, with_trip(spec, with_age(spec, ticks, updates), tripped), pulses),
         "velocity_valid": updates,
         "index_valid": index,
+        "index_wide": Table(steps.wide + spec.latency.tick, {}),
         "decode_error": Table(steps.errors, {}),
         "tick_error": Table(tick_errors, {}),
         "fault": wrong,

@@ -149,6 +149,7 @@ class Steps:
     index: NDArray[np.int64]
     swallowed: NDArray[np.int64]
     changed: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, dtype=np.uint8))
+    wide: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
 
 def together(
@@ -178,12 +179,50 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     # The level before the first is not real.
     at = clock + spec.latency.pin_to_count + (np.arange(len(clock)) == 0)
     changed = packed([line[1:] ^ line[:-1] for line in levels])
-    rises = at[:0]
+    rises = wide = at[:0]
     if spec.index:
         at_z, z = conditioned("z")
-        rises = at_z[1:][z[1:] == ("z" not in encoder.inverted)] + spec.latency.pin_to_count
+        z = z ^ np.uint8("z" in encoder.inverted)
+        if spec.index_state is not None:
+            at_z, levels_z = together([*zip([clock] * len(levels), levels, strict=True), (at_z, z)])
+            z, again = in_state(spec, levels_z)
+            wide = at_z[again] + spec.latency.pin_to_count
+        rises = at_z[1:][z[1:] > z[:-1]] + spec.latency.pin_to_count
     # Two clocks for the synchroniser, one for the counter of glitches.
-    return Steps(at[1:], step[1:], at[wrong], rises, np.sort(np.concatenate(returned)) + 3, changed)
+    return Steps(at[1:], step[1:], at[wrong], rises, np.sort(np.concatenate(returned)) + 3, changed, wide)
+
+
+def in_state(spec: TachometerSpec, levels: Sequence[NDArray[np.uint8]]) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    """Return the index as it is in the state in which it is taken, and where it meets that state a second time.
+
+    Parameters
+    ----------
+    spec : TachometerSpec
+    levels : sequence of uint8 arrays, shape (n,)
+        Of the lines as they are on the pins, and of Z as it should be read, at each change.
+
+    Returns
+    -------
+    z : uint8 array, shape (n,)
+    again : bool array, shape (n,)
+        Z has been high since the lines left the state on the other side.
+    """
+    *lines, z = levels
+    kind, state = spec.encoder.kind, spec.index_state
+    assert state is not None
+    place = packed(
+        [line ^ np.uint8(name in spec.encoder.inverted) for name, line in zip(kind.lines, lines, strict=True)]
+    )
+    here = place == packed_levels(state)
+    after = (place == packed_levels(kind.after(state))) & (len(lines) > 1)
+    again = np.zeros(len(z), dtype=np.bool_)
+    left = -1  # the row in which the state was left
+    for row in np.flatnonzero(np.diff(here, prepend=here[:1])).tolist():
+        if not here[row]:
+            left = row
+        elif left >= 0 and z[left : row + 1].all():
+            again[row] = len(lines) == 1 or after[left] != after[row - 1]
+    return z & here, again
 
 
 def first_beyond(steps: Steps, last: NDArray[np.int64], limit: int) -> NDArray[np.int64]:

@@ -9,7 +9,7 @@ from tachometry.sim import golden
 from tachometry.sim.golden import compare, health
 from tachometry.sim.golden.front_end import decoded
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.spec.language.port import INDEX, TICK, UPDATE
+from tachometry.spec.language.port import INDEX, TICK, UPDATE, WIDE
 from tachometry.spec.registers.map import COUNTER_WIDTH, WORD, Field, Register, RegisterMap
 
 
@@ -79,6 +79,7 @@ class GoldenBank:
         self._strobes: tuple[str, ...] = (TICK, UPDATE, INDEX)
         self._swallowed = decoded(registers.spec, trace).swallowed
         self._happened = {"updated": self._tables[UPDATE].clock, "indexed": self._tables[INDEX].clock}
+        self._happened[WIDE] = self._tables[WIDE].clock
         self._follow(self._tables[TICK].overflow)
         self._stalls = rises(self._tables[TICK].clock, self._tables[TICK].stalled)
 

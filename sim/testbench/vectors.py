@@ -127,6 +127,7 @@ def usual_motion(spec: TachometerSpec, seed: int = 1, most: int = _MOVING) -> Re
         start_angle_rad=-3.5 * np.pi / (2 * spec.encoder.pulses_per_rev),
         seed=seed,
         index=spec.index,
+        index_state=spec.index_place,
     )
     return encoder.record(parse_motion(_usual_form(spec, most, backward=seed % 2 == 0))).recording
 

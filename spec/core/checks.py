@@ -40,6 +40,7 @@ def check(spec: TachometerSpec) -> None:
         raise ParameterError("filter_clocks", f"must be from 0 to {most} clocks, {longest}, not {spec.filter_clocks}")
     if spec.index_reset and not spec.index:
         raise ParameterError("index_reset", "must be given together with an index")
+    _check_index_state(spec)
     _check_health(spec)
     if spec.compare is not None:
         spec.compare.check(spec.timing.clock_hz, spec.position_width)
@@ -50,6 +51,23 @@ def check(spec: TachometerSpec) -> None:
         _check_edge_error(spec)
     if spec.lowpass is not None:
         _check_lowpass(spec, spec.lowpass)
+
+
+def _check_index_state(spec: TachometerSpec) -> None:
+    if (state := spec.index_state) is None:
+        return
+    kind = spec.encoder.kind
+    if not spec.index:
+        raise ParameterError("index_at", "must be given together with an index")
+    if not kind.cycle:
+        raise ParameterError("index_at", f"must be edge for {kind.name}, whose levels are no place")
+    named = [word[0].lower() for word in spec.index_at.split(",")]
+    if named != [*kind.lines] or state not in kind.cycle:
+        states = " or ".join(
+            ",".join(f"{line.upper()}={level}" for line, level in zip(kind.lines, levels, strict=True))
+            for levels in sorted(kind.cycle)
+        )
+        raise ParameterError("index_at", f"must be edge, {states} for {kind.name}, not {spec.index_at}")
 
 
 def _check_health(spec: TachometerSpec) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from tachometry.spec.core.compare import COUNT_WIDTH
 from tachometry.spec.core.health import FAULT_TEXTS, FAULT_WIDTH, FAULTS_WIDTH
-from tachometry.spec.language.port import COMPARE, INDEX, TICK, UPDATE, Port, held, pin, strobe
+from tachometry.spec.language.port import COMPARE, INDEX, TICK, UPDATE, WIDE, Port, held, pin, strobe
 
 if TYPE_CHECKING:
     from tachometry.spec.core.tachometer import TachometerSpec
@@ -83,7 +83,18 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
             ),
         ),
         *own,
-        *_if(spec.index, strobe(INDEX, "One clock for every rising edge of z.")),
+        *_if(
+            spec.index,
+            strobe(INDEX, "One clock for every rising edge of z; with --index-at, for every rise of z in its state."),
+        ),
+        *_if(
+            spec.index_state,
+            strobe(
+                WIDE,
+                "One clock: z stayed high from the state of --index-at to the same state a period further, so the "
+                "index is at two places.",
+            ),
+        ),
         *_if(
             spec.index,
             held(

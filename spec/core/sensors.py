@@ -1,9 +1,13 @@
 """Facts of the sensors: the lines of each, the order of their levels, and what a change of them counts."""
 
+import re
 from dataclasses import dataclass
 from functools import cache
 
+from tachometry.spec.language.option import ParameterError
+
 Levels = tuple[int, ...]  # of the lines, 0 or 1
+EDGE = "edge"  # where an index is taken that is not taken in a state of the lines
 
 
 def packed_levels(levels: Levels) -> int:
@@ -36,6 +40,10 @@ class Sensor:
     cycle: tuple[Levels, ...]
     pins: tuple[str, ...]
     wrong: str
+
+    def after(self, levels: Levels) -> Levels:
+        """Return the levels that follow these forward."""
+        return self.cycle[(self.cycle.index(levels) + 1) % len(self.cycle)]
 
     @property
     def legal(self) -> tuple[Levels, ...]:
@@ -111,6 +119,16 @@ _SENSORS = (
     ),
 )
 SENSORS = {sensor.name: sensor for sensor in _SENSORS}
+
+
+def parse_state(what: str, text: str) -> str:
+    """Return levels of lines in which an index is taken, `A=1,B=1`, or `edge`."""
+    words = [word.strip().upper() for word in text.split(",")]
+    if words == [EDGE.upper()]:
+        return EDGE
+    if not all(re.fullmatch("[ABC] *= *[01]", word, re.ASCII) for word in words):
+        raise ParameterError(what, f"must be {EDGE}, or levels such as A=1,B=1, not {text!r}")
+    return ",".join(sorted(f"{word[0]}={word[-1]}" for word in words))
 
 
 @cache

@@ -16,6 +16,7 @@ from tachometry.spec.core.latency import Latency
 from tachometry.spec.core.ports import bound_ports, ports_of
 from tachometry.spec.core.recovery import Recovery
 from tachometry.spec.core.scale import Scale
+from tachometry.spec.core.sensors import EDGE, Levels, parse_state
 from tachometry.spec.core.times import Times
 from tachometry.spec.core.timing import Timing, parse_clocks, parse_filter
 from tachometry.spec.core.widths import Widths
@@ -58,7 +59,9 @@ class TachometerSpec:
     index : bool
         A rising index line Z captures the position.
     index_reset : bool
-        The rising index line also sets the position to 0.
+        The index also sets the position to 0.
+    index_at : str
+        Where the index is taken: `edge`, where Z rises, or a state of the lines, `A=1,B=1`, while Z is high.
     external_tick : bool
         Ticks come from outside; the tick of `timing` is their nominal period.
     max_tick_cycles : int or None
@@ -150,6 +153,17 @@ class TachometerSpec:
     )
     index: bool = option(False, "Index line z: its rising edge captures the position in index_position.")
     index_reset: bool = option(False, "The rising edge of z also sets the position to 0 (with --index).", needs="index")
+    index_at: str = option(
+        EDGE,
+        "Where the index is taken (with --index): edge, where z rises, which is another place backward than forward, "
+        "or a state of the lines, such as A=1,B=1, while z is high: one place in both directions. Output index_wide "
+        "tells if z meets it twice.",
+        metavar="[edge|A=1,B=1]",
+        parse=parse_state,
+        needs="index",
+        tests=("A=1,B=1", "A=0,B=1"),
+        tacit=True,
+    )
     external_tick: bool = option(
         False,
         "A rise of tick_in ends a sampling period, as of a PWM carrier; --tick is its nominal length.",
@@ -258,6 +272,16 @@ class TachometerSpec:
     def lines(self) -> tuple[str, ...]:
         """Lines of the sensor, the index included."""
         return (*self.encoder.kind.lines, "z") if self.index else self.encoder.kind.lines
+
+    @property
+    def index_state(self) -> Levels | None:
+        """Levels of the lines in which the index is taken; None: it is where Z rises."""
+        return None if self.index_at == EDGE else tuple(int(word[-1]) for word in self.index_at.split(","))
+
+    @property
+    def index_place(self) -> int:
+        """Place in the cycle of the lines where the index is expected; 0 if it is where Z rises."""
+        return 0 if self.index_state is None else self.encoder.kind.cycle.index(self.index_state)
 
     @property
     def tachometer(self) -> "TachometerSpec":

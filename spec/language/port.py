@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 TICK, UPDATE, INDEX, COMPARE = "tick", "velocity_valid", "index_valid", "compare_valid"
+WIDE = "index_wide"
 
 
 @dataclass(frozen=True)

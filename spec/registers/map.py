@@ -21,7 +21,7 @@ from typing import Any
 
 from tachometry.spec.control import AnySpec
 from tachometry.spec.core.tachometer import TachometerSpec
-from tachometry.spec.language.port import INDEX, TICK, UPDATE, Port
+from tachometry.spec.language.port import INDEX, TICK, UPDATE, WIDE, Port
 from tachometry.spec.registers.manifest import manifest
 
 WORD = 32  # bits
@@ -221,7 +221,8 @@ class RegisterMap:
     @cached_property
     def events(self) -> dict[str, str]:
         """Flags that say that something has happened since the capture before, each with the input that says it."""
-        return {"updated": UPDATE, "indexed": INDEX} if self.spec.index else {"updated": UPDATE}
+        found = {"updated": UPDATE} | ({"indexed": INDEX} if self.spec.index else {})
+        return found | ({WIDE: WIDE} if self.spec.index_state else {})
 
     @cached_property
     def status(self) -> tuple[Register, ...]:
@@ -370,6 +371,7 @@ class RegisterMap:
     def _flags(self, ports: Iterable[Port], suffix: str) -> Iterable[Field]:
         events = {f"updated{suffix}": "There was an update of the velocity since the capture before."}
         events[f"indexed{suffix}"] = "There was an index since the capture before."
+        events[WIDE] = "z was wider than a period since the capture before, so the index is at two places."
         flags = [(name, help) for name, help in events.items() if name in self.events]
         flags += [(port.name, port.help) for port in ports if port.width == 1]
         for place, (name, help) in enumerate(flags):

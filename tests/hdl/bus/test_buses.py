@@ -38,6 +38,7 @@ SPEC = STachometer(
     timing=Timing(1_000_000, 8, 20),
     position_width=48,
     index=True,
+    index_at="A=0,B=0",
     age=True,
     filter_clocks=2,
     external_tick=True,

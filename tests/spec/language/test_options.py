@@ -75,8 +75,9 @@ def test_defaults_are_those_of_python(method: str) -> None:
 def test_every_option_does_what_it_says() -> None:
     texts = """ppr=24 decoding=2 clock=1MHz tick=100us max-time=5ms external-tick=yes max-tick-period=150us unit=rpm
         lsb=2^-3 velocity-width=20 max-speed=900rpm position-width=20 filter=3 index=yes index-reset=on age=1
-        bounds=true edge-error=0.25 lowpass=50rad/s cancel=no reciprocal=table sensor=Pulses reverse=yes invert=Z,a"""
-    spec = of_texts("s", dict(word.split("=") for word in texts.split()))
+        bounds=true edge-error=0.25 lowpass=50rad/s cancel=no reciprocal=table sensor=Pulses reverse=yes invert=Z,a
+        index-at=a=1"""
+    spec = of_texts("s", dict(word.split("=", 1) for word in texts.split()))
     assert spec == STachometer(
         encoder=Encoder(24, 2, "pulses", reverse=True, invert="a,z"),
         timing=Timing(1_000_000, 100, 50),
@@ -90,6 +91,7 @@ def test_every_option_does_what_it_says() -> None:
         filter_clocks=3,
         index=True,
         index_reset=True,
+        index_at="A=1",
         age=True,
         bounds=True,
         edge_error=Fraction(1, 4),
@@ -107,6 +109,8 @@ def test_every_option_does_what_it_says() -> None:
         "health",
         "health-edges",
         "health-errors",
+        "over-speed",
+        "compare",
     } == {word.split("=")[0] for word in texts.split()}
 
 
