@@ -1,7 +1,8 @@
 """A testbench stands on its own: its data say what to put on the pins, and what the outputs must show."""
 
+import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import singledispatch
 from importlib.resources import files
 from typing import Any
@@ -70,14 +71,20 @@ def _vectors(core: AnySpec, traces: Sequence[PinTrace]) -> dict[str, Any]:
     pins, changes, run = _put(core, traces)
     if not len(run.ticks.clock):
         raise ParameterError("motion", f"must last for a tick, not for {run.n_clocks} clocks")
+    inputs = {"clocks": run.n_clocks, "pins": pins, "changes": _rows(*changes)}
     return {
         "generator": generator(),
         "license": LICENSE,
-        "clocks": run.n_clocks,
-        "pins": pins,
-        "changes": _rows(*changes),
+        "inputs": digest_of(inputs),
+        **inputs,
         "strobes": strobe_rows(run, holds=core.axes is None),
     }
+
+
+def digest_of(vectors: Mapping[str, Any]) -> str:
+    """Return a hash of what the inputs are given, by which `check` finds a change of a motion that is no other's."""
+    inputs = [vectors[entry] for entry in ("clocks", "pins", "changes")]
+    return hashlib.sha256(json.dumps(inputs).encode()).hexdigest()
 
 
 @singledispatch

@@ -6,6 +6,8 @@ from tachometry.hdl.export.render import render_files
 from tachometry.spec.control import AnySpec
 from tachometry.spec.registers.buses import Bus, registers_on
 
+FILES = ("NAME_litex.py",)
+
 
 def litex(spec: AnySpec, name: str, bus: Bus, made: Mapping[str, str]) -> dict[str, str]:
     """Return the text of `NAME_litex.py` by its name.
@@ -20,4 +22,4 @@ def litex(spec: AnySpec, name: str, bus: Bus, made: Mapping[str, str]) -> dict[s
     made : mapping of str to str
         The core, which the module reads from the file beside it.
     """
-    return render_files(["NAME_litex.py"], name, spec=spec.tachometer, registers=registers_on(spec, bus))
+    return render_files(FILES, name, spec=spec.tachometer, registers=registers_on(spec, bus))

@@ -18,7 +18,8 @@ from tachometry.spec.registers.map import RegisterMap
 
 WORD = 32  # bits of the widest number that RIO's component takes as it is
 EVENT_BITS = 8  # of a counter that wraps in the gateware and counts on at the host
-_FILES = ("NAME_rio/plugin.py", "NAME_rio/NAME_rio.v")
+_MADE = ("NAME_rio/plugin.py", "NAME_rio/NAME_rio.v")
+FILES = (*_MADE, "NAME_rio/NAME.v")
 # What RIO's users know by another name, and what tells a controller of machines nothing.
 _NO_PIN = ("velocity", "position", "interval", "forced", "pulse_count", "overflow")
 # When what `RegisterMap.counted` names happens, in Verilog. RIO reads what is latest, so no update is lost.
@@ -66,7 +67,7 @@ def rio(spec: TachometerSpec, name: str, bus: Bus | None, made: Mapping[str, str
     counted = {event: _EVENTS[event] for event in events} | ({"indexes": INDEX} if spec.index else {})
     sent = {_sent_as(port): WORD if port.width > 1 else 1 for port in values}
     files = render_files(
-        _FILES,
+        _MADE,
         name,
         spec=spec,
         hal=hal_pins(spec),

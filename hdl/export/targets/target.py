@@ -5,7 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from tachometry.hdl.export.targets import linux, vivado
+from tachometry.hdl.export.targets.litex import FILES as LITEX
 from tachometry.hdl.export.targets.litex import litex
+from tachometry.hdl.export.targets.rio import FILES as RIO
 from tachometry.hdl.export.targets.rio import rio
 from tachometry.spec.control import AnySpec
 from tachometry.spec.language.option import ParameterError
@@ -22,6 +24,8 @@ class Target:
         What is made for it, for --help.
     buses : tuple of str
         The buses that the core can have for it, first that which it has if none is asked for.
+    names : tuple of str
+        The files, in which NAME stands for that of the module.
     files : callable
         Texts by file name, of the spec, the name and the bus of the core, and of its files without a target.
     axes, loops : bool
@@ -30,17 +34,19 @@ class Target:
 
     help: str
     buses: tuple[str, ...]
+    names: tuple[str, ...]
     files: Callable[[Any, str, Any, Mapping[str, str]], dict[str, str]]
     axes: bool = True
     loops: bool = False
 
 
 TARGETS = {
-    "rio": Target("plugin for RIO, with pins for LinuxCNC, in DIR/NAME_rio", ("none",), rio, axes=False),
-    "litex": Target("module for LiteX in DIR/NAME_litex.py, with --bus wishbone", ("wishbone",), litex),
+    "rio": Target("plugin for RIO, with pins for LinuxCNC, in DIR/NAME_rio", ("none",), RIO, rio, axes=False),
+    "litex": Target("module for LiteX in DIR/NAME_litex.py, with --bus wishbone", ("wishbone",), LITEX, litex),
     "vivado": Target(
         "IP for Vivado (IP-XACT) in DIR/NAME_ip, with --bus axi-lite, apb or none",
         vivado.BUSES,
+        vivado.FILES,
         vivado.vivado,
         loops=True,
     ),
@@ -48,6 +54,7 @@ TARGETS = {
         "programs in C and Python and a device-tree overlay in DIR/NAME_uio.c, DIR/NAME_uio.py and DIR/NAME.dtso, with "
         "--bus axi-lite, apb or wishbone",
         linux.BUSES,
+        linux.FILES,
         linux.linux,
         loops=True,
     ),
@@ -80,16 +87,13 @@ def check_core(target: str, spec: AnySpec) -> None:
         raise ParameterError("target", f"must be another than {target} with axes: its plugin is for one encoder each")
 
 
-def targets_for(spec: AnySpec, bus: str) -> list[str]:
-    """Return targets that a core on this bus can go into."""
-    found = []
-    for name, target in TARGETS.items():
-        try:
-            check_core(name, spec)
-        except ParameterError:
-            continue
-        found += [name] if bus in target.buses else []
-    return found
+def targets_for(name: str, bus: str) -> dict[str, list[str]]:
+    """Return targets that a core of this name, on this bus, can go into, with the names of their files."""
+    return {
+        target: [file.replace("NAME", name) for file in about.names]
+        for target, about in TARGETS.items()
+        if bus in about.buses
+    }
 
 
 def target_files(target: str, spec: AnySpec, name: str, bus: Bus | None, made: Mapping[str, str]) -> dict[str, str]:

