@@ -169,6 +169,7 @@ def test_sweep(scheduler: list[str], tmp_path: Path, capsys: pytest.CaptureFixtu
 
 def test_verify(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tachometry.sim.studies.verify.configurations", lambda method: configurations(method)[:1])
+    monkeypatch.setattr("tachometry.sim.studies.verify._SLOW_LEAST", 2000)  # clocks
     options = ["--methods", "x", "--engines", "pysim", "--jobs", "1", "-o", tmp_path]
     assert run("verify", *options) == 0
     assert "PASS: pysim and golden models agree" in told(capsys)
