@@ -210,6 +210,7 @@ class TachometerSpec:
         False,
         "Watch the encoder: outputs health (the first fault), faults (how many) and fault (there is one), and with "
         "--index index_error. A reset clears them, and CONTROL.clear.",
+        tacit=True,
     )
     health_edges: int = option(
         256,
@@ -219,6 +220,7 @@ class TachometerSpec:
         needs="health",
         parse=parse_whole,
         tests=("5",),
+        tacit=True,
     )
     health_errors: int = option(
         10,
@@ -227,6 +229,7 @@ class TachometerSpec:
         needs="health",
         parse=parse_whole,
         tests=("0",),
+        tacit=True,
     )
     over_speed: Speed | None = option(  # noqa: RUF009
         None,
@@ -235,6 +238,7 @@ class TachometerSpec:
         metavar="SPEED",
         parse=parse_speed,
         tests=("", "30rad/s"),
+        tacit=True,
     )
     compare: Compare | None = option(  # noqa: RUF009
         None,
@@ -243,6 +247,7 @@ class TachometerSpec:
         metavar="START:STEP:COUNT:WIDTH",
         parse=Compare.parse,
         tests=("", "2:3:0:7clk", "-2:3:40:1clk:backward"),
+        tacit=True,
     )
     chosen: str = field(default="", compare=False, repr=False)
 

@@ -99,11 +99,6 @@ def test_defaults(tmp_path: Path) -> None:
         "bounds": False,
         "edge_error": 0.0,
         "lowpass": None,
-        "health": False,
-        "health_edges": 256,
-        "health_errors": 10,
-        "over_speed": None,
-        "compare": None,
         "cancel": True,
         "reciprocal_source": "serial",
     }

@@ -183,11 +183,6 @@ def test_manifest_names_every_option_and_survives_json() -> None:
         "bounds": False,
         "edge_error": 0.0,
         "lowpass": None,
-        "health": False,
-        "health_edges": 256,
-        "health_errors": 10,
-        "over_speed": None,
-        "compare": None,
         "cancel": False,
         "reciprocal_source": "serial",
     }
