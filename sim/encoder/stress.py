@@ -54,6 +54,8 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
         if sensor.name == "hall":
             level[rng.random(len(level)) < 0.01] = 7
     z = (rng.random(len(clock)) < 0.05).astype(np.uint8)
+    if spec.index_state is not None:  # at times wider than a period
+        z |= np.repeat(rng.random(len(clock) // 12 + 1) < 0.1, 12)[: len(clock)].astype(np.uint8)
     n_clocks = int(clock[-1]) + spec.facts.rest_tenths * longest // 10 + 40 * cycles + 300
     a, b, c = (level >> np.uint8(line) & np.uint8(1) for line in range(3))
     trace = PinTrace(clock, a, b, n_clocks, z, c=c if "c" in sensor.lines else None)
