@@ -186,7 +186,7 @@ class Tracking:
             "most_since": self.most_since, "most_memory": int(self.memory_seconds * self.clock_hz) << t,
             "max_time": self.max_time << t, "forget": forget << t,
             "most_quality": (1 << self.quality_bits) - 1,
-            "most": most, "least": -most, "most_shown": shown, "least_shown": -shown,
+            "most": most, "most_shown": shown, "least_shown": -shown,
             "noises_one": noises, "noises_first": 8 * noises, "noises_least": 16 * noises,
             "noises_offset": 256 * noises, "noises_most": 512 * noises,
         }  # fmt: skip

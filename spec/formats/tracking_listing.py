@@ -181,16 +181,17 @@ placed:
     p = P - moved s+ ~
 place:                                  # and the place at the end of the tick
     since by
+    v keep
     times as half_velocity
-    noises = noises min noises_most
+    t = zero s+ v min most
     vs + ~ product place
-    v = v min most
+    v = zero s+ t
     p + ~ out position_fine
 shown:
     tick by
     w = doubt + log_X                   # D·√X, more if errors keep a sign
     times velocity shown
-    v = v max least
+    noises = noises min noises_most
     t = ~
     w over 1
     quality - log_T + ~ exp
@@ -215,11 +216,12 @@ short:
     noises max noises_first min noises_offset by
     w = D + D + D
     zero s+ change - D min w over by
-    a = a min most
+    a keep
+    t = zero s+ a min most
     D = D + ~ max least_noise
+    a = zero s+ t
     e - lag keep log
     log_X + log_3_2 + ~ exp
-    a = a max least
     lag = lag s+ ~
     if several goto ready
     log_X + past_4
