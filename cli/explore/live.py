@@ -49,6 +49,8 @@ class Live:
     def __init__(self, port: str | None, manifest: Path | None) -> None:
         if port is None and manifest is not None:
             raise ValueError("--manifest must be given together with the PORT of a board")
+        if port is not None and port.startswith(SIMULATED):
+            raise ValueError(f"PORT must be a serial port, not {port!r}: a simulated board is chosen in the page")
         self._attached = None if port is None else target_of(port, CoreTexts("auto", {}, False), manifest)
         self._watched: _Watched | None = None
         self._changing = threading.Lock()

@@ -138,7 +138,7 @@ const cells = (kind, texts, right = []) => made("tr", {}, ...texts.map((text, n)
   made(kind, { class: right.includes(n) && "n", scope: kind === "th" && "col" }, text)));
 
 function show(found) {
-  $("command").textContent = found.command;
+  $("command").replaceChildren(...found.command.split(/ (?=-)/).flatMap((words, n) => [n ? " " : "", made("span", {}, words)]));
   $("symbol").replaceChildren(symbol(found));
   $("facts").replaceChildren(...listed(found.rows.filter(([name]) => found.facts.includes(name))));
   $("rows").replaceChildren(...listed(found.rows));

@@ -5,13 +5,14 @@ import signal
 import subprocess
 import tempfile
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from tachometry.sim.signals.scratch import STOPS, held_back, run_tool, scratch
+from tachometry.sim.signals.scratch import STOPS, end_tools, held_back, run_tool, scratch
 
 
 class Stopped(Exception):
@@ -107,6 +108,18 @@ def test_a_tool_ends_with_all_that_it_has_started(stop: signal.Signals, tmp_path
 def test_a_tool_that_takes_too_long_is_ended() -> None:
     with pytest.raises(subprocess.TimeoutExpired):
         run_tool(["sleep", "1000"], seconds=0.01)
+
+
+def test_tools_of_other_threads_are_ended() -> None:
+    """They have begun when the first word has come through a pipe."""
+    read, write = os.pipe()
+    with ThreadPoolExecutor() as pool:
+        running = pool.submit(run_tool, ["sh", "-c", f"echo > /proc/{os.getpid()}/fd/{write}; sleep 1000"])
+        os.read(read, 1)
+        end_tools()
+        assert running.result().returncode == -signal.SIGKILL
+    os.close(read)
+    os.close(write)
 
 
 def test_a_tool_is_given_a_text_and_says_something() -> None:
