@@ -216,7 +216,7 @@ class _Frequency:
     """
 
     def __call__(self, what: str, text: str | int) -> int:
-        plain = re.fullmatch(r"\s*\d{1,30}\s*", str(text), re.ASCII) and not 0 < int(text) < PLAIN_HERTZ
+        plain = re.fullmatch(r"\s*-?\d{1,30}\s*", str(text), re.ASCII) and not 0 < int(text) < PLAIN_HERTZ
         hertz = read_exactly(what, str(text), FREQUENCY, "Hz" if plain else "")
         if hertz.denominator != 1 or hertz <= 0:
             raise ParameterError(what, f"must be a positive whole number of Hz, not {text!r}")

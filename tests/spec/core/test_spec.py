@@ -52,7 +52,7 @@ ERRORS = [
     (lambda: Timing(1, 2, 1048577), "max_ticks must be from 2 to 1048576, not 1048577"),
     (
         lambda: Timing.parse("48 m", "20us", "10ms"),
-        "clock must be a number in Hz, kHz, MHz, GHz (default Hz), not '48 m'",
+        "clock must be a number with one of the units Hz, kHz, MHz, GHz, not '48 m'",
     ),
     (lambda: Timing.parse("0.5Hz", "20us", "10ms"), "clock must be a positive whole number of Hz, not '0.5Hz'"),
     (
@@ -74,7 +74,11 @@ ERRORS = [
     ),
     (lambda: Timing.parse("48MHz", "0us", "10ms"), "tick must be longer than 0, not 0us"),
     (lambda: Timing.parse("48MHz", "-20us", "10ms"), "tick must be longer than 0, not -20us"),
-    (lambda: Speed.parse("400"), "max_speed must be a number with one of the units rad/s, rev/s, rpm, not '400'"),
+    (
+        lambda: Speed.parse("400"),
+        "max_speed must be a number with one of the units rad/s, rev/s, rpm: type 400rad/s, 400rev/s or 400rpm, "
+        "not '400'",
+    ),
     (lambda: Speed.parse("0rpm"), "max_speed must be greater than 0, not 0rpm"),
     (lambda: Speed(Fraction(1), "m/s"), "unit of a speed must be one of rad/s, rev/s, rpm, not 'm/s'"),
     (lambda: STachometer(encoder=Encoder(500), timing=TIMING, frac_bits=3), "frac_bits must be from 4 to 24, not 3"),
