@@ -5,7 +5,7 @@ The truth is computed from the shaft's angle, never from the lines, so that it c
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,6 @@ MAX_PULSES_PER_REV = 1 << 26
 MAX_UNEVEN_PULSES = 1 << 20  # of a disc whose edges are all displaced: each takes memory
 # Edges in a period of the disc, where these are not those of quadrature; and sensors that may have a fault.
 _EDGES = {"step-dir": 1, "up-down": 1, "hall": 6}
-_HALLS = packed([np.array(line, dtype=np.uint8) for line in zip(*SENSORS["hall"].cycle, strict=True)])
 _FAULTS_OF = {
     "phase_error_deg": ("quadrature",),
     "illegal": ("quadrature",),
@@ -35,6 +34,15 @@ _FAULTS_OF = {
     "bounce": ("quadrature", "pulses", "hall"),
     "lost": ("quadrature", "pulses"),
 }
+
+
+@cache
+def _halls() -> NDArray[np.uint8]:
+    """Return the levels of hall sensors in a cycle; the page without NumPy imports this, and never asks."""
+    halls: NDArray[np.uint8] = packed(
+        [np.array(line, dtype=np.uint8) for line in zip(*SENSORS["hall"].cycle, strict=True)]
+    )
+    return halls
 
 
 @dataclass(frozen=True)
@@ -186,7 +194,7 @@ class VirtualEncoder(EncoderOptions):
         if self.sensor in ("step-dir", "up-down"):
             times, level = imperfections.pulsed(time, np.diff(turned), duration, directed=self.sensor == "step-dir")
             return self._indexed(times, level, time, turned, duration), 0, 0
-        level = _HALLS[turned % 6] if self.sensor == "hall" else quadrature(turned)
+        level = _halls()[turned % 6] if self.sensor == "hall" else quadrature(turned)
         if self.sensor == "pulses":
             level &= np.uint8(1)
         if self.lost:
