@@ -101,7 +101,9 @@ class EncoderWatch(wiring.Component):
 
     def _standing(self, m: Module) -> tuple[Value, Value]:
         """Tell that a line has had so many edges without one of the other: A stands, B stands."""
-        past_a, past_b, of_b = Signal(), Signal(), Signal()
+        past_a = Signal()
+        past_b = Signal()
+        of_b = Signal()
         alone = Signal(range(self._edges))  # edges of a line since one of the other
         m.d.sync += [past_a.eq(self.level_a), past_b.eq(self.level_b)]
         change_a = self.ready & (self.level_a ^ past_a)

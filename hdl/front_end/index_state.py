@@ -44,8 +44,13 @@ class IndexState(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        here, beyond = Signal(), Signal()  # in the state, and on its far side
-        was_here, was_beyond, left_beyond, through, wide = Signal(), Signal(), Signal(), Signal(), Signal()
+        here = Signal()  # in the state
+        beyond = Signal()  # on its far side
+        was_here = Signal()
+        was_beyond = Signal()
+        left_beyond = Signal()
+        through = Signal()
+        wide = Signal()
         m.d.comb += [
             here.eq(self.level == self._state),
             beyond.eq(0 if self._alone else self.level == self._after),

@@ -9,7 +9,7 @@ from tachometry.sim import golden
 from tachometry.sim.golden import compare, health
 from tachometry.sim.golden.front_end import decoded
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.spec.language.port import INDEX, TICK, UPDATE, WIDE
+from tachometry.spec.language.port import COMPARE, INDEX, TICK, UPDATE, WIDE
 from tachometry.spec.registers.map import COUNTER_WIDTH, WORD, Field, Register, RegisterMap
 
 
@@ -76,7 +76,7 @@ class GoldenBank:
             port.name for port in registers.ports if port.held_by == UPDATE and port.unit and port.name != "velocity"
         }
         self._tables = golden.tables(registers.spec, trace)
-        self._strobes: tuple[str, ...] = (TICK, UPDATE, INDEX)
+        self._strobes: tuple[str, ...] = (TICK, UPDATE, INDEX) + (COMPARE,) * (registers.spec.compare is not None)
         self._swallowed = decoded(registers.spec, trace).swallowed
         self._happened = {"updated": self._tables[UPDATE].clock, "indexed": self._tables[INDEX].clock}
         self._happened[WIDE] = self._tables[WIDE].clock
@@ -198,7 +198,7 @@ class GoldenBank:
         }
 
     def _pulses(self, clock: int) -> dict[str, int]:
-        found = compare.shown(self._map.spec, self._tables["compare_valid"], np.array([clock]))
+        found = compare.shown(self._map.spec, self._tables[COMPARE], np.array([clock]))
         return {name: int(column[0]) for name, column in found.items()}
 
     def _faults(self, clock: int) -> dict[str, int]:

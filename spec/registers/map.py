@@ -21,7 +21,7 @@ from typing import Any
 
 from tachometry.spec.control import AnySpec
 from tachometry.spec.core.tachometer import TachometerSpec
-from tachometry.spec.language.port import INDEX, TICK, UPDATE, WIDE, Port
+from tachometry.spec.language.port import COMPARE, INDEX, TICK, UPDATE, WIDE, Port
 from tachometry.spec.registers.manifest import manifest
 
 WORD = 32  # bits
@@ -31,7 +31,7 @@ COUNTER_WIDTH = 8  # bits of each counter of COUNTERS
 # What a core has with an interrupt, besides the registers.
 IRQ = Port("irq", "output", help="Interrupt, high while an event waits that INTERRUPT_ENABLE lets through.")
 
-_LIVE = (TICK, UPDATE, INDEX)  # what is captured is new with these strobes
+_LIVE = (TICK, UPDATE, INDEX, COMPARE)  # what is captured is new with these strobes
 _DESCRIBED = ("name", "low", "width", "access", "reset", "signed", "unit", "port", "shift")  # in the manifest
 
 

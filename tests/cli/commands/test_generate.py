@@ -156,7 +156,7 @@ def test_baud_reaches_the_bus(words: str, baud: int, cycles: int, tmp_path: Path
         ("--ppr 9 --decoding 3", "--decoding must be 1, 2 or 4, or x1, x2 or x4, not '3'"),
         ("--ppr 9 --method x", "--method must be one of auto, s, m, t, mt, rairan, track, not 'x'"),
         ("--ppr 9 --clock 48Hz", "--tick must be a whole number of clocks, not 20us"),
-        ("--ppr 9 --clock 48mxz", "--clock must be a number in Hz, kHz, MHz, GHz (default Hz), not '48mxz'"),
+        ("--ppr 9 --clock 48mxz", "--clock must be a number with one of the units Hz, kHz, MHz, GHz, not '48mxz'"),
         ("--ppr 9 --clock 0Hz", "--clock must be a positive whole number of Hz, not '0Hz'"),
         ("--ppr 9 --tick 20clk --max-time 1s", "--max-time, in ticks, must be from 2 to 1048576, not 2400000"),
         ("--ppr 9 --tick 1s --max-time 2s", "--tick, in clocks, must be from 1 to 1048576, not 48000000"),
@@ -164,7 +164,11 @@ def test_baud_reaches_the_bus(words: str, baud: int, cycles: int, tmp_path: Path
         ("--ppr 9 --max-time 11us", "--max-time must be a whole number of ticks, not 11us (0.55); nearest: 2 ticks"),
         ("--ppr 9 --clock 1e999GHz", "error: "),
         ("--ppr 9 --frac-bits 30", "--frac-bits must be from 4 to 24, not 30"),
-        ("--ppr 9 --max-speed 5", "--max-speed must be a number with one of the units rad/s, rev/s, rpm, not '5'"),
+        (
+            "--ppr 9 --max-speed 5",
+            "--max-speed must be a number with one of the units rad/s, rev/s, rpm: type 5rad/s, 5rev/s or 5rpm, "
+            "not '5'",
+        ),
         ("--ppr 9 --max-speed 0rpm", "--max-speed must be greater than 0, not 0rpm"),
         ("--ppr 9 --clock 1e29GHz", "--clock must be from 1 Hz to 100 GHz, not 1e+38 Hz"),
         ("--ppr 9 --name tick", "--name must not be that of a port, which 'tick' is"),

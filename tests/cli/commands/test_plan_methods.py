@@ -41,7 +41,7 @@ def test_mean_of_ticks(capsys: pytest.CaptureFixture[str]) -> None:
 def test_methods_beside_each_other(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     names = "s,m,m:average=8,s:cancel=no"
     files = ["--csv", tmp_path / "p.csv", "--plot", tmp_path / "p.png"]
-    assert run("--methods", names, "--speeds", "1:300", *files) == 0
+    assert run("--methods", names, "--speeds", "1:300rad/s", *files) == 0
     blocks = capsys.readouterr().out.split("\n\n")[3:]
     assert [block.splitlines()[0] for block in blocks] == ["Q_V (rad/s)", "Q_V/V (%)", "T_m", "Q_V T_m (rad)"]
     for block in blocks:
