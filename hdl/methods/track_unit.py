@@ -300,6 +300,8 @@ class SmallUnit(Unit):
         ]
         addend = Signal(signed(WIDTH + 2))
         with m.Switch(code):
+            with m.Case(0):
+                pass
             with m.Case(1):
                 m.d.comb += addend.eq(operand)
             with m.Case(2):

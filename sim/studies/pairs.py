@@ -47,7 +47,7 @@ def factors(method: str) -> dict[str, tuple[str, ...]]:
             more = [f"yes {name}"] if known[name].flag else [f"yes {name} {value}" for value in values]
             # Where there are to be few values, the flag comes with the other option only.
             flag = known[name].needs
-            found[flag] = (*(found[flag] if every else found[flag][:1]), *more)
+            found[flag] = (*(value for value in found[flag] if every or value != "yes"), *more)
     possible = {
         name: tuple(value for value in values if _possible(method, {name: value})) for name, values in found.items()
     }

@@ -13,6 +13,7 @@ from tachometry.spec.control.generator import GeneratorForm, generator_clocks, g
 from tachometry.spec.control.law import Law
 from tachometry.spec.control.ports import loop_entries, loop_ports
 from tachometry.spec.control.units import Units
+from tachometry.spec.core.scale import Scale
 from tachometry.spec.core.tachometer import written
 from tachometry.spec.language.option import ParameterError, option, options_of
 from tachometry.spec.language.port import Port, Ports
@@ -82,8 +83,12 @@ class LoopSpec(Law):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.tachometer.encoder.plain:
-            raise ParameterError("sensor", "must be quadrature with a control loop, its lines as they come")
+        encoder = self.tachometer.encoder
+        if not encoder.plain:
+            named = "reverse" if encoder.reverse else "invert" if encoder.invert else "sensor"
+            raise ParameterError(
+                named, "must not be given together with a control loop, which takes A and B as they come"
+            )
         if not 8 <= self.current_width <= 24:
             raise ParameterError("current_width", f"must be from 8 to 24, not {self.current_width}")
         if self.multiplier not in MULTIPLIERS:
@@ -137,6 +142,11 @@ class LoopSpec(Law):
     def method(self) -> str:
         """Name of the tachometer's method."""
         return self.tachometer.method
+
+    @property
+    def scale(self) -> Scale[Any]:
+        """Unit and LSB of the velocity."""
+        return self.tachometer.scale
 
     @cached_property
     def units(self) -> Units:

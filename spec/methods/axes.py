@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
+from tachometry.spec.core.scale import Scale
 from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.core.times import Times
 from tachometry.spec.core.timing import Timing
@@ -233,6 +234,11 @@ class AxesSpec:
     def timing(self) -> Timing:
         """Clock, tick and maximum time of the core."""
         return self.tachometer.timing
+
+    @property
+    def scale(self) -> Scale[TachometerSpec]:
+        """Unit and LSB of the velocity of every axis."""
+        return self.tachometer.scale
 
     @cached_property
     def slots(self) -> int:
