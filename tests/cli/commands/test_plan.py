@@ -257,3 +257,9 @@ def test_nothing_is_left_when_the_figure_fails(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setattr("tachometry.sim.plots.plan.save_plan_plot", interrupted)
     assert run("plan", *OPTIONS, "--csv", tmp_path / "new" / "p.csv", "--plot", tmp_path / "p.png") == 130
     assert not list(tmp_path.iterdir())
+
+
+def test_the_range_ends_where_a_filter_swallows_the_lines(capsys: pytest.CaptureFixture[str]) -> None:
+    """A level lasts two of 2000 counts: at π rad/s that is 2 ms."""
+    assert run("plan", "--ppr", "500", "--filter", "2ms") == 0
+    assert "to 3.14159 rad/s" in capsys.readouterr().out
