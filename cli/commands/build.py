@@ -12,13 +12,13 @@ import click
 from tachometry.boards.fpga.board import Board
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.board import board_argument, boards_help, default_folder
-from tachometry.cli.options.core import board_core_options
+from tachometry.cli.options.core import BAUD, board_core_options
 from tachometry.cli.options.loop import LOOP
 from tachometry.cli.options.option import FilePath, GroupedCommand, option
 from tachometry.cli.reports.build import print_build
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control import LoopSpec
-from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD, bus_of
+from tachometry.spec.registers.buses import BUSES, bus_of
 from tachometry.spec.registers.demo import demo_map
 from tachometry.spec.registers.manifest import check_module_name
 
@@ -62,14 +62,7 @@ Examples:
     + "; ".join(f"{name}: {BUSES[name].help}" for name in _SERIAL)
     + ". A UART is on the USB of the board, where the board has one.",
 )
-@option(
-    "Files",
-    "--baud",
-    type=click.IntRange(min=1),
-    metavar="BITS",
-    help="Bits a second of --bus uart, which the clock must make within 2 %, with at least 8 clocks a bit; "
-    f"{DEFAULT_BAUD}, if it is not given.",
-)
+@BAUD
 def build(
     board: Board,
     spec: TachometerSpec | LoopSpec,

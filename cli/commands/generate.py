@@ -12,7 +12,7 @@ import click
 
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.axes import AXES
-from tachometry.cli.options.core import core_options
+from tachometry.cli.options.core import BAUD, core_options
 from tachometry.cli.options.loop import LOOP
 from tachometry.cli.options.motion import FORMS, OPTIONAL_MOTION_OPTIONS
 from tachometry.cli.options.option import FilePath, Group, GroupedCommand, option
@@ -29,7 +29,7 @@ from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.testbench.vectors import cocotb_bench
 from tachometry.spec import AxesSpec
 from tachometry.spec.control import AnySpec, LoopSpec
-from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD, Bus, bus_of
+from tachometry.spec.registers.buses import BUSES, Bus, bus_of
 from tachometry.spec.registers.manifest import check_module_name
 
 
@@ -145,14 +145,7 @@ ASKED = Group(
             + "; ".join(f"{bus.name}: {bus.help}" for bus in BUSES.values())
             + ". Files that describe and read the registers are written, too. Without it: none, or what --for needs.",
         ),
-        option(
-            "Files",
-            "--baud",
-            type=click.IntRange(min=1),
-            metavar="BITS",
-            help="Bits a second of --bus uart, which the clock must make within 2 %, with at least 8 clocks a bit; "
-            f"{DEFAULT_BAUD}, if it is not given.",
-        ),
+        BAUD,
         option(
             "Files",
             "--irq",

@@ -23,6 +23,7 @@ from tachometry.spec import (
 from tachometry.spec.language import option as declaration
 from tachometry.spec.language.option import options_of
 from tachometry.spec.language.units import parse_frequency
+from tachometry.spec.registers.buses import DEFAULT_BAUD
 
 _PREFIX = "core_"
 _CLOCK = "clock"
@@ -263,3 +264,13 @@ OPTIONAL_CORE_OPTIONS = Group([later("core-options", _common_optional), _METHOD,
 def core_click_options() -> dict[str, click.Option]:
     """Return all options of cores and methods by their names."""
     return {option.opts[0].removeprefix("--"): option for option in (*_common(), *own_click_options())}
+
+
+BAUD = option(
+    "Files",
+    "--baud",
+    type=click.IntRange(min=1),
+    metavar="BITS",
+    help="Bits a second of --bus uart, which the clock must make within 2 %, with at least 8 clocks a bit; "
+    f"{DEFAULT_BAUD}, if it is not given.",
+)

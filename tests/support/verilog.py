@@ -1,6 +1,7 @@
 """The exported Verilog in simulators that share nothing with Amaranth's: Verilator and Icarus."""
 
 import subprocess
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, observed
 from tachometry.spec import Port, TachometerSpec
 from tachometry.spec.control import AnySpec
+from tachometry.spec.registers.buses import bus_of, ports_on
 
 # The bench reads a line (clock, level of each pin) for every change, and writes a row (clock, value of each output) for
 # every clock with a strobe.
@@ -91,6 +93,25 @@ def play_in_icarus(spec: AnySpec, folder: Path, changes: np.ndarray, n_clocks: i
     """Return the same with levels of all inputs: a row for each clock in which one changes, with the clock first."""
     rows = play(export(spec)["tachometer.v"], *_ports(spec), folder, changes, n_clocks)
     return observed(spec, n_clocks, rows)
+
+
+def play_native(
+    spec: AnySpec, folder: Path, rows: Sequence[Mapping[str, int]], shown: Sequence[str], *, irq: bool = False
+) -> list[list[int]]:
+    """Return these outputs of a core on the native bus in every clock; rows have the inputs that change in each."""
+    bus = bus_of("native", irq=irq)
+    ports = [port for port in ports_on(spec, bus) if port.name not in ("clk", "rst")]
+    pins, outputs = ([port for port in ports if port.direction == one] for one in ("input", "output"))
+    now = dict.fromkeys((port.name.removeprefix("reg_") for port in pins), 0)
+    changes = []
+    for clock, row in enumerate(rows):
+        now |= row
+        changes.append([clock, *now.values()])
+    text = export(spec, bus="native", irq=irq)["tachometer.v"]
+    found = play(text, pins, outputs, ["1"], folder, np.array(changes), len(rows))
+    names = [port.name for port in outputs]
+    columns: list[list[int]] = found[:, [1 + names.index(name) for name in shown]].tolist()
+    return columns
 
 
 def play(

@@ -11,7 +11,7 @@ from support.axes import motions, small
 from support.control import SMALL
 from support.nightly import nightly, only
 from support.simulate import clock_by_clock
-from support.verilog import play
+from support.verilog import play_native
 
 from tachometry.hdl.bus import interrupts
 from tachometry.hdl.core.axes_registers import AxesRegisterCore
@@ -133,19 +133,8 @@ def test_interrupts_are_those_of_the_golden_model(core: str) -> None:
 @pytest.mark.parametrize("core", only(["external ticks"], CORES))
 def test_exported_verilog_in_icarus(core: str, tmp_path: Path) -> None:
     spec, (_, _, _, rows) = CORES[core], case(core)
-    bus = bus_of("native", irq=True)
-    pins = [port for port in ports_on(spec, bus) if port.direction == "input" and port.name not in ("clk", "rst")]
-    outputs = [port for port in ports_on(spec, bus) if port.direction == "output"]
-    now = dict.fromkeys((port.name.removeprefix("reg_") for port in pins), 0)
-    changes = []
-    for clock, row in enumerate(rows):
-        now |= row
-        changes.append([clock, *now.values()])
-    text = export(spec, bus="native", irq=True)["tachometer.v"]
-    found = play(text, pins, outputs, ["1"], tmp_path, np.array(changes), len(rows))
-    names = [port.name for port in outputs]
-    columns = [1 + names.index(name) for name in ("reg_read_data", "reg_error", "irq")]
-    compare(core, [(int(data), int(error), int(irq)) for data, error, irq in found[:, columns].tolist()])
+    found = play_native(spec, tmp_path, rows, ["reg_read_data", "reg_error", "irq"], irq=True)
+    compare(core, [(data, error, irq) for data, error, irq in found])
 
 
 # What breaks it on purpose.

@@ -8,17 +8,15 @@ import pytest
 from support.control import SMALL
 from support.nightly import nightly
 from support.simulate import clock_by_clock
-from support.verilog import play
+from support.verilog import play_native
 
 from tachometry.hdl.core import register_core
-from tachometry.hdl.export import export
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.golden.loop_registers import GoldenLoopBank
 from tachometry.sim.golden.registers import Access
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import Timing
 from tachometry.spec.control import LoopSpec
-from tachometry.spec.registers.buses import bus_of, ports_on
 from tachometry.spec.registers.loop import LoopMap
 
 CORE = replace(SMALL, tachometer=replace(SMALL.tachometer, timing=Timing(1_000_000, 100, 3)), gains="inputs")
@@ -118,18 +116,7 @@ def test_exported_verilog_in_icarus(tmp_path: Path) -> None:
     tachometer = replace(CORE.tachometer, unit="rad/s", max_speed=None, frac_bits=12)
     spec = replace(SPECS["generator"], tachometer=tachometer, multiplier="serial", control_period=300)
     registers, trace, accesses, captures, rows = case(spec, 2, 9000)
-    bus = bus_of("native")
-    pins = [port for port in ports_on(spec, bus) if port.direction == "input" and port.name not in ("clk", "rst")]
-    outputs = [port for port in ports_on(spec, bus) if port.direction == "output"]
-    now = dict.fromkeys((port.name.removeprefix("reg_") for port in pins), 0)
-    changes = []
-    for clock, row in enumerate(rows):
-        now |= row
-        changes.append([clock, *now.values()])
-    text = export(spec, bus="native")["tachometer.v"]
-    found = play(text, pins, outputs, ["1"], tmp_path, np.array(changes), len(rows))
-    names = [port.name for port in outputs]
-    answers = found[:, [1 + names.index("reg_read_data"), 1 + names.index("reg_error")]].tolist()
+    answers = play_native(spec, tmp_path, rows, ["reg_read_data", "reg_error"])
     compare(registers, trace, accesses, captures, [(data, bool(error)) for data, error in answers])
 
 
