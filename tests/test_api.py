@@ -68,6 +68,7 @@ def test_a_capture_is_replayed(tmp_path: Path) -> None:
 
 def test_axes_have_their_own_runs() -> None:
     spec = tachometry.Tachometer(**CORE, method="s", axes=2)
+    assert spec.scale == spec.tachometer.scale
     run = tachometry.simulate(spec, ["constant:300rpm:30ms", "constant:-600rpm:30ms"])
     other = tachometry.Run(run.simulation, 1)
     for one, rpm in ((run, 300), (other, -600)):
