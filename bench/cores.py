@@ -43,7 +43,6 @@ class Configuration:
         Limits by target and figure: Fmax must reach its bar, everything else must not exceed it.
     is_option : bool
         Whether the difference from the first configuration is what one option costs.
-    targets : tuple of str
     bus : str
         On which its registers are, or `none`.
     demo : bool

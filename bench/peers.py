@@ -65,13 +65,7 @@ def verilog_of(files: Sequence[Path], top: str) -> str:
 
 
 def ports_of(verilog: str, top: str, prepare: str) -> list[Port]:
-    """Return the ports of a module.
-
-    Raises
-    ------
-    RuntimeError
-        If Yosys refuses it, or a port is an inout.
-    """
+    """Return the ports of a module; RuntimeError if Yosys refuses it, or a port is an inout."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "core.v").write_text(verilog, encoding="utf-8")

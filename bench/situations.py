@@ -55,7 +55,6 @@ class Cell:
 
     Parameters
     ----------
-    name : str
     mean : float, rad/s
         Of the RMS errors with all seeds.
     spread : float or None, rad/s
@@ -128,12 +127,10 @@ def measured(
 
     Parameters
     ----------
-    situations : iterable of Situation
     n_seeds : int
         Number of seeds, from `FIRST_SEED` on, where something is random.
     jobs : int
         Number of processes.
-    columns : iterable of str
     """
     names = [name for column in columns for name in tried(column)]
     tasks = [

@@ -344,13 +344,7 @@ def page(measured: Sequence[Table], tools: Mapping[str, str]) -> str:
 
 
 def kept(text: str, tools: Mapping[str, str]) -> dict[tuple[str, str], Measurement]:
-    """Return what stands on the page.
-
-    Raises
-    ------
-    RuntimeError
-        If it was measured with other tools.
-    """
+    """Return what stands on the page; RuntimeError if it was measured with other tools."""
     if used(tools) not in text:
         raise RuntimeError(f"{PAGE.name} was not written with {used(tools)}: make size")
     results = {}

@@ -55,13 +55,7 @@ def find_compiler() -> tuple[str, ...] | None:
 
 
 def compiler() -> tuple[str, ...]:
-    """Return the compiler that `find_compiler` finds.
-
-    Raises
-    ------
-    NoCompiler
-        If there is none.
-    """
+    """Return the compiler that `find_compiler` finds; NoCompiler if there is none."""
     found = find_compiler()
     if found is None:
         raise NoCompiler(

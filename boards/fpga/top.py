@@ -47,11 +47,6 @@ class BoardTop(Elaboratable):
     """Connects the ports of a component to the pins that the board has for them.
 
     Inputs have pull-ups. Outputs without a pin are left open, and inputs without one are 0. LEDs are lit by ones.
-
-    Parameters
-    ----------
-    core : wiring.Component
-    board : Board
     """
 
     def __init__(self, core: wiring.Component, board: Board) -> None:

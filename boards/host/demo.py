@@ -18,7 +18,6 @@ class DemoBoard:
 
     Parameters
     ----------
-    port : Port
     manifest : mapping
         What `NAME.json` of the demo says.
     timeout : float

@@ -27,7 +27,6 @@ class NoAnswer(TimeoutError):
 
     Parameters
     ----------
-    text : str
     foreign : int
         Bytes that came instead and belong to no frame.
     """
@@ -65,7 +64,6 @@ class Receiver:
 
     Parameters
     ----------
-    registers : HostRegisters
     request : bytes
         What is to be answered; empty: nothing is.
     frame_clocks : int
@@ -162,8 +160,6 @@ class Link:
 
     Parameters
     ----------
-    port : Port
-    registers : HostRegisters
     timeout : float
         Seconds in which an answer must come.
     tries : int

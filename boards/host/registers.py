@@ -53,13 +53,7 @@ class HostRegisters:
         }
 
     def with_fields(self, name: str, word: int, values: Mapping[str, int]) -> int:
-        """Return a word of a register with other values in some of its fields.
-
-        Raises
-        ------
-        ValueError
-            If a value does not fit.
-        """
+        """Return a word of a register with other values in some of its fields; ValueError if a value does not fit."""
         for field, value in values.items():
             found = self._field(name, field)
             width, least = found["width"], -(1 << found["width"] - 1) if found["signed"] else 0

@@ -13,7 +13,6 @@ class Snapshot(Mapping[str, int]):
 
     Parameters
     ----------
-    values : mapping of str to int
     flags : iterable of str
         Names of those that are flags.
     rad_per_s_per_lsb : float

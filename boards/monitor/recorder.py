@@ -26,7 +26,6 @@ class Recorder:
         Where it is written.
     suffix : str
         One of `SUFFIXES`.
-    columns : sequence of Column
 
     Raises
     ------

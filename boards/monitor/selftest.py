@@ -26,7 +26,6 @@ class Step:
 
     Parameters
     ----------
-    name : str
     first : EmulatorSettings
         What holds from the restart on.
     then : sequence of (float, dict)
@@ -47,7 +46,6 @@ class Result:
 
     Parameters
     ----------
-    name : str
     frames : int
         Frames of telemetry that were compared.
     values : int
@@ -106,7 +104,6 @@ def selftest(
 
     Parameters
     ----------
-    board : DemoBoard
     registers : DemoMap
         Of the core on the board.
     period : int

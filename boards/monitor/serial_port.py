@@ -20,7 +20,6 @@ class Unplugged(OSError):
     ----------
     name : str
         Of the port.
-    why : str
     """
 
     def __init__(self, name: str, why: str) -> None:

@@ -37,7 +37,6 @@ class Frame:
     ----------
     time : float
         Seconds of the board since the first frame. Over a reconnection they go on by the clock of the host.
-    snapshot : Snapshot
     """
 
     time: float

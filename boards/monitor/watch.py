@@ -26,8 +26,6 @@ class State:
 
     Parameters
     ----------
-    title : str
-    spec : TachometerSpec
     columns : sequence of Column
     waits_for : str
         Why there is no telemetry; empty: there is.

@@ -37,7 +37,6 @@ class SimulatedBoard:
     ----------
     simulation : Simulation
         Only this object may use it until it is closed.
-    clock_hz : int
 
     Members
     -------

@@ -61,7 +61,6 @@ class Asked:
 
     Parameters
     ----------
-    spec : AnySpec
     name, bus, baud, target, irq
         See `hdl.export.export`.
     testbench, ci : str or None

@@ -198,7 +198,6 @@ class CoreTexts:
 
     Parameters
     ----------
-    method : str
     texts : mapping of str to str
         By the names of the options without dashes.
     given : bool
@@ -210,13 +209,7 @@ class CoreTexts:
     given: bool
 
     def at(self, clock_hz: int) -> TachometerSpec:
-        """Return the core, at the clock of a board.
-
-        Raises
-        ------
-        ParameterError
-            If an option is wrong, or missing.
-        """
+        """Return the core, at the clock of a board; ParameterError if an option is wrong, or missing."""
         return of_texts(self.method, _at(self.texts, clock_hz))
 
 

@@ -74,7 +74,6 @@ def write_outputs(simulation: Simulation, place: Callable[[str], Path | None]) -
 
     Parameters
     ----------
-    simulation : Simulation
     place : callable
         Tells where the file of an option goes; None: it is not wanted.
     """

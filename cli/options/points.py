@@ -41,7 +41,6 @@ def points_of(settings: Settings, methods: str, earliest: float, engine: str | N
     methods : str
         See `listed_methods`, or `all`: then those that cannot be are left out.
     earliest : float, seconds
-    engine : str or None
 
     Raises
     ------
@@ -150,7 +149,6 @@ def loops_of(settings: Settings, methods: str, n_seeds: int) -> Loops:
         Options of core and loop, and axes.
     methods : str
         See `listed_methods`, or `all`: then those that cannot be are left out.
-    n_seeds : int
 
     Raises
     ------

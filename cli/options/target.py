@@ -29,12 +29,8 @@ class Target:
 
     Parameters
     ----------
-    port : str
     title : str
         What the view is headed with.
-    registers : DemoMap
-    bus : Bus
-    module : str
     """
 
     port: str

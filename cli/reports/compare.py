@@ -28,7 +28,6 @@ def print_comparison(comparison: Comparison, sizes: Mapping[str, Measurement], l
 
     Parameters
     ----------
-    comparison : Comparison
     sizes : mapping of str to Measurement
         Of cores, by name; empty if they were not measured.
     left_out : mapping of str to str

@@ -59,13 +59,7 @@ class PlainLines:
 
 
 class LiveView:
-    """A view of the whole terminal, drawn anew ten times a second.
-
-    Raises
-    ------
-    OSError
-        If plotext is not installed.
-    """
+    """A view of the whole terminal, drawn anew ten times a second; OSError if plotext is not installed."""
 
     def __init__(self) -> None:
         plotext()  # missing: it is said before anything is opened
@@ -161,13 +155,7 @@ def plot(state: State, width: int, height: int) -> Text:
 
 
 def plotext() -> Any:
-    """Return the module that draws in text.
-
-    Raises
-    ------
-    OSError
-        If it is not installed.
-    """
+    """Return the module that draws in text; OSError if it is not installed."""
     try:
         import plotext as module
     except ImportError as error:

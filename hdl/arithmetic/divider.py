@@ -21,7 +21,6 @@ class Divider(wiring.Component):
 
     Parameters
     ----------
-    divisor_width : int
     integer_bits : int
         Of the quotient, without its sign: the quotient has as many, and s and the sign.
     scale_bits : int

@@ -28,12 +28,7 @@ class Idle:
 
 @dataclass(frozen=True)
 class IdleRegister(Idle):
-    """A single register.
-
-    Parameters
-    ----------
-    path : str
-    """
+    """A single register."""
 
     path: str
 

@@ -54,7 +54,6 @@ class Quotient(wiring.Component):
     serial : bool
         Step by step: `start` may come again as soon as the result has, and m, which moves then, and `tag` must stay as
         they are until then. Otherwise it may come in every clock.
-    margin : int
     constant : int or None
         m, if it is always the same.
 

@@ -34,7 +34,6 @@ class RemainderScaler(wiring.Component):
 
     Parameters
     ----------
-    reciprocal : spec.carried_reciprocal.CarriedReciprocal
     base_width, numerator_width : int
         Bits of `base` and `numerator`, both signed.
     tag : data.StructLayout

@@ -20,7 +20,6 @@ class _Scaler(wiring.Component):
 
     Parameters
     ----------
-    reciprocal : spec.reciprocal.Reciprocal
     base_width, numerator_width : int
         Bits of `base` and `numerator`, both signed.
     tag : data.StructLayout

@@ -42,10 +42,6 @@ class AxesDatapath(wiring.Component):
     Latency: the outputs of an axis are new `spec.turn_cycles` and `READ` clocks after its turn has begun, in the turn
     of the next.
 
-    Parameters
-    ----------
-    spec : AxesSpec
-
     Members
     -------
     complete : In(1)

@@ -21,10 +21,8 @@ class AxisCounters(wiring.Component):
 
     Parameters
     ----------
-    slots : int
     rounds : int
         Rounds of a tick: most steps of an axis in it.
-    decoding : int
     reverse : bool
         Forward is B before A.
         Counts per period: 1, 2 or 4.

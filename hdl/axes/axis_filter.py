@@ -17,7 +17,6 @@ class AxisFilter(wiring.Component):
 
     Parameters
     ----------
-    slots, looks : int
     lines : sequence of str
         Names of the lines.
 

@@ -17,7 +17,6 @@ class AxisIndex(wiring.Component):
 
     Parameters
     ----------
-    slots : int
     width : int
         Bits of a position.
     resets : bool

@@ -37,10 +37,8 @@ class AxisTickCounts(AxisCounters):
 
     Parameters
     ----------
-    slots : int
     form : Tracking
         That of an axis.
-    decoding : int
     reverse : bool
         Forward is B before A.
         Counts per period: 1, 2 or 4.

@@ -14,7 +14,6 @@ class HeldOutputs(wiring.Component):
 
     Parameters
     ----------
-    axes : int
     values : mapping of str to Shape
         What comes with the strobe.
 

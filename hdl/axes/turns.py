@@ -12,7 +12,6 @@ class Turns(wiring.Component):
 
     Parameters
     ----------
-    axes : int
     cycles : int
         Clocks of a turn.
 

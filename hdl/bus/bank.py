@@ -19,10 +19,6 @@ class RegisterBank(wiring.Component):
     A capture takes in one clock all that the core shows in it. It is made by `capture`, and by reading the first
     captured register, whose answer, a clock later, is what has just been captured.
 
-    Parameters
-    ----------
-    registers : RegisterMap
-
     Members
     -------
     bus : In(native_port)

@@ -15,7 +15,6 @@ class Bridge(wiring.Component):
 
     Parameters
     ----------
-    registers : RegisterMap
     more : flows
         Members beyond those of the bus.
 

@@ -17,7 +17,6 @@ class Interrupts(wiring.Component):
     ----------
     registers : RegisterMap
         Those of a core with an interrupt.
-    axes : int
 
     Members
     -------

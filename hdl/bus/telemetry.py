@@ -46,7 +46,6 @@ class TelemetrySender(wiring.Component):
 
     Parameters
     ----------
-    registers : RegisterMap
     bit_cycles : int
         Clocks of a bit.
 

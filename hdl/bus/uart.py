@@ -79,7 +79,6 @@ class UartBridge(Bridge):
 
     Parameters
     ----------
-    registers : RegisterMap
     bit_cycles : int
         Clocks of a bit, at least 8.
 

@@ -53,7 +53,6 @@ class CommandGenerator(wiring.Component):
 
     Parameters
     ----------
-    form : GeneratorForm
     multiplier : str
         `serial` or `parallel`.
 

@@ -12,8 +12,6 @@ class ControlClock(wiring.Component):
 
     Parameters
     ----------
-    first : int
-    period : int
     tells : bool
         It also tells of a tick in the clock before.
 

@@ -65,7 +65,6 @@ class Controller(wiring.Component):
 
     Parameters
     ----------
-    form : ControlForm
     multiplier : str
         `serial` or `parallel`.
 

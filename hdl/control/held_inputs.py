@@ -13,10 +13,6 @@ from tachometry.spec.language.port import Port
 class HeldInputs(wiring.Component):
     """Takes all inputs together in the clock before a control tick, unless they are frozen.
 
-    Parameters
-    ----------
-    ports : iterable of Port
-
     Members
     -------
     coming : In(1)

@@ -10,7 +10,6 @@ class _Product(wiring.Component):
 
     Parameters
     ----------
-    word_width : int
     factor_bits : int
         p.
 

@@ -11,10 +11,6 @@ class SigmaDelta(wiring.Component):
     A pulse-width modulator would have a period that delays what it shows; this has none, its ripple is at higher
     frequencies, and it is one adder. Latency: a clock.
 
-    Parameters
-    ----------
-    width : int
-
     Members
     -------
     value : In(signed(width))

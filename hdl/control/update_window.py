@@ -15,10 +15,6 @@ class UpdateWindow(wiring.Component):
     taken once more. A conventional observer takes the velocity that is held at every control tick, with the current of
     the one before.
 
-    Parameters
-    ----------
-    form : ControlForm
-
     Members
     -------
     update : In(1)

@@ -15,10 +15,6 @@ from tachometry.spec.registers.axes import AxesMap
 class AxesRegisterCore(wiring.Component):
     """A core of many axes, with its registers; see `RegisterCore`.
 
-    Parameters
-    ----------
-    registers : AxesMap
-
     Members
     -------
     `core_ports` of the registers, less `clk` and `rst`, and

@@ -28,10 +28,6 @@ from tachometry.spec.methods.track_axis import TrackAxis
 class AxesTachometer(wiring.Component):
     """Pins of many encoders in, their positions and velocities out.
 
-    Parameters
-    ----------
-    spec : AxesSpec
-
     Members
     -------
     The ports of the spec, less `clk` and `rst`, which are those of the `sync` domain.

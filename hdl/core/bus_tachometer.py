@@ -23,24 +23,13 @@ BRIDGES: dict[str, type[Bridge]] = {
 
 
 def bridge_on(registers: RegisterMap, bus: Bus) -> Bridge:
-    """Return the bridge from a bus to these registers.
-
-    Raises
-    ------
-    ParameterError
-        If the clock cannot make the bits of the bus.
-    """
+    """Return the bridge from a bus to these registers; ParameterError if the clock cannot make the bits of the bus."""
     cycles = (bus.bit_cycles(registers.spec.timing.clock_hz),) if bus.baud else ()
     return BRIDGES[bus.name](registers, *cycles)
 
 
 class BusTachometer(wiring.Component):
     """A tachometer, maybe with a control loop, with its registers on a bus.
-
-    Parameters
-    ----------
-    registers : RegisterMap
-    bus : Bus
 
     Members
     -------

@@ -22,11 +22,6 @@ class Demo(wiring.Component):
 
     The settings survive a restart, which resets tachometer, loop, emulator and time.
 
-    Parameters
-    ----------
-    registers : DemoMap
-    bus : Bus
-
     Members
     -------
     `demo_ports` of the spec, less `clk` and `rst`.

@@ -22,10 +22,6 @@ _DEMANDS = ("mode", "velocity", "acceleration", "amplitude", "rate")
 class LoopCore(wiring.Component):
     """Encoder pins and commands in, current out, and all that the tachometer shows.
 
-    Parameters
-    ----------
-    spec : LoopSpec
-
     Members
     -------
     The ports of the spec, less `clk` and `rst`, which are those of the `sync` domain.

@@ -18,10 +18,6 @@ from tachometry.spec.registers.map import RegisterMap
 class RegisterCore(wiring.Component):
     """A tachometer, maybe with a control loop, with its registers.
 
-    Parameters
-    ----------
-    registers : RegisterMap
-
     Members
     -------
     `core_ports` of the registers, less `clk` and `rst`, and

@@ -90,10 +90,6 @@ class SensorDecoder(wiring.Component):
     It looks up what a change of the lines counts, see `Sensor.change`. Levels that no sensor has, as of halls that are
     all equal, are reported when they come, and the levels before them are remembered.
 
-    Parameters
-    ----------
-    encoder : Encoder
-
     Members
     -------
     level_a … : In(1)

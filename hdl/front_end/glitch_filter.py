@@ -14,10 +14,6 @@ class GlitchFilter(wiring.Component):
 
     Latency: a level that holds from clock c on is at the output in clock c + `clocks`.
 
-    Parameters
-    ----------
-    clocks : int
-
     Members
     -------
     level : In(1)

@@ -22,7 +22,6 @@ class IndexState(wiring.Component):
     ----------
     state, after : tuple of int
         The levels of the lines, and those that follow them forward.
-    latency : int
 
     Members
     -------

@@ -17,7 +17,6 @@ class PositionCounter(wiring.Component):
     ----------
     width : int
         Bits of the position.
-    latency : int
 
     Members
     -------

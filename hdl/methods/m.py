@@ -95,10 +95,6 @@ class MMethod(wiring.Component):
 
     Latency: an update comes `spec.latency.datapath` clocks after `tick`.
 
-    Parameters
-    ----------
-    spec : MTachometer
-
     Members
     -------
     tick : In(1)

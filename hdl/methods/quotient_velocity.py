@@ -21,10 +21,6 @@ class QuotientVelocity(wiring.Component):
 
     Latency: an update comes `spec.latency.datapath` clocks after `measure` or `decay`.
 
-    Parameters
-    ----------
-    spec : TimedTachometer
-
     Members
     -------
     measure : In(1)

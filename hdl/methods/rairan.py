@@ -20,10 +20,6 @@ class RairanMethod(wiring.Component):
     `spec.latency.datapath` clocks after `tick` if it comes with one. There may be an update in every clock. The
     velocity is correctly rounded: within half an LSB of the exact quotient, ties towards +∞.
 
-    Parameters
-    ----------
-    spec : RairanTachometer
-
     Members
     -------
     step_now : In(signed(2))

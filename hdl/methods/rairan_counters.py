@@ -15,10 +15,6 @@ class RairanCounters(wiring.Component):
 
     Latency: `update` is high in the clock after the count, or the end of dt, that causes it.
 
-    Parameters
-    ----------
-    spec : RairanTachometer
-
     Members
     -------
     step : In(signed(2))

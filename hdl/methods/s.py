@@ -19,10 +19,6 @@ class SMethod(wiring.Component):
     Latency: an update comes `spec.latency.datapath` clocks after `tick`. The velocity is correctly rounded: within half
     an LSB of the exact quotient, ties towards +∞.
 
-    Parameters
-    ----------
-    spec : STachometer
-
     Members
     -------
     tick : In(1)

@@ -11,11 +11,6 @@ from tachometry.spec.formats.tracking import Tracking
 class TickCounts(wiring.Component):
     """Adds up times and places of the counts of each tick; the outputs are valid two clocks after it, until the next.
 
-    Parameters
-    ----------
-    form : Tracking
-    max_ticks : int
-
     Members
     -------
     tick : In(1)

@@ -17,10 +17,6 @@ class TimedDatapath(wiring.Component):
 
     Latency: an update comes `spec.latency.datapath` clocks after the `step`, or the `tick`, that causes it.
 
-    Parameters
-    ----------
-    spec : TimedTachometer
-
     Members
     -------
     tick : In(1)

@@ -18,7 +18,6 @@ class CompareOutput(wiring.Component):
 
     Parameters
     ----------
-    compare : Compare
     clocks : int
         Of a pulse.
     width : int

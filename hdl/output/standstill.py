@@ -12,7 +12,6 @@ class Standstill(wiring.Component):
 
     Parameters
     ----------
-    max_ticks : int
     count_width : int
         Bits of m_e, whose least number, without an opposite, never comes.
     max_shift : int

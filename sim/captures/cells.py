@@ -21,7 +21,6 @@ class Threshold(NamedTuple):
 
     Parameters
     ----------
-    volts : float
     hysteresis : float, volts
         By so much a line must fall below where it rose.
     """

@@ -68,7 +68,6 @@ def read_count_log(path: Path, count: Channel, text: TextOptions = PLAIN, wrap: 
 
     Parameters
     ----------
-    path : Path
     count : str or int
         Name of the column, else its number among all columns, from 0.
     text : TextOptions

@@ -48,7 +48,6 @@ class Header:
 
     Parameters
     ----------
-    table : Table
     names : tuple of str
         Of all columns; the first may have none.
     time : int or None
@@ -125,7 +124,6 @@ def read_header(path: Path, lines: Sequence[str], options: TextOptions, samplera
         File that messages name.
     lines : sequence of str
         The first of it.
-    options : TextOptions
     samplerate_hz : float or None
         For a file that has no times.
 

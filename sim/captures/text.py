@@ -195,7 +195,6 @@ def write_csv(path: str | os.PathLike[str], recording: Recording) -> None:
     ----------
     path : path
         Takes its new content only when all is written.
-    recording : Recording
 
     Raises
     ------

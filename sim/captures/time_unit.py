@@ -21,13 +21,7 @@ _NAMES = ("time", "timestamp", "timestamps", "t", "x-axis", "")
 
 
 class TimeUnit(NamedTuple):
-    """Holds a unit of time, or the rate of what counts.
-
-    Parameters
-    ----------
-    name : str
-    per_second : float
-    """
+    """Holds a unit of time, or the rate of what counts."""
 
     name: str
     per_second: float

@@ -55,7 +55,6 @@ class Changes:
     ----------
     path : Path
         File that messages name.
-    variables : sequence of Variable
     a, b, others
         As of `choose_channels`; numbers count the variables of one bit. When not given: the variables whose names
         without scopes are a and b, if there is one of each, else the first two.

@@ -18,8 +18,6 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
 
     Parameters
     ----------
-    spec : TachometerSpec
-    seed : int
     n_edges : int
         At each of six speeds.
     """

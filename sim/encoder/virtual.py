@@ -240,8 +240,6 @@ class Encoding:
 
     Parameters
     ----------
-    encoder : VirtualEncoder
-    motion : Motion
     recording : Recording
         The lines, in seconds.
     n_illegal : int

@@ -67,7 +67,6 @@ class BoardSimulation:
 
     Parameters
     ----------
-    registers : DemoMap
     bus : Bus
         The UART.
 

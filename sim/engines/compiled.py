@@ -42,7 +42,6 @@ class Design:
 
     Parameters
     ----------
-    spec : AnySpec
     pins : list of Port
         Inputs, in the order of their levels.
     watched : Watched or None

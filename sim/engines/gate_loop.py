@@ -58,10 +58,6 @@ class Through:
 class GateLoop:
     """Runs a core with a control loop in gates about a motor; it is compiled once.
 
-    Parameters
-    ----------
-    spec : LoopSpec
-
     Raises
     ------
     NoCompiler

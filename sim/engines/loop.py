@@ -74,7 +74,6 @@ class Gains:
         G_dis, and G_v; with an infinite G_v there is no low-pass filter of the velocity.
     seconds : float
         Distance of control ticks.
-    way : Observer
     delay : float, s
         From a control tick until its current is commanded, at most `seconds`.
     on_filtered : bool
@@ -140,7 +139,6 @@ class Course:
 
     Parameters
     ----------
-    seconds : float
     speed, angle : float64 array, shape (n,), rad/s and rad
         Commanded; between two times the speed is a line.
     load : float64 array, shape (n,), Nm
@@ -219,7 +217,6 @@ class LoopSimulation:
 
     Parameters
     ----------
-    spec : TachometerSpec
     design : LoopDesign or None
         What is compiled; None: the core of the spec alone.
 

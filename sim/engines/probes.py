@@ -34,10 +34,6 @@ def shown(core: AnyTachometer) -> dict[str, Value]:
 class Watched(wiring.Component):
     """Wraps a core, so that the signals to be shown are outputs.
 
-    Parameters
-    ----------
-    spec : CoreSpec
-
     Members
     -------
     The ports of the core, and `shown_0`, `shown_1` … of 32 bits, out: the shown signals, the first in the lowest bits.

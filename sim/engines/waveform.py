@@ -26,7 +26,6 @@ class Waveform:
 
     Parameters
     ----------
-    path : Path
     clock_hz : int
         Frequency of the clock in Hz.
     widths : dict of str to (int, bool)
@@ -94,7 +93,6 @@ def add_curves(path: Path, clock_hz: int, window: tuple[int, int], curves: Mappi
     ----------
     path : Path
         Of a file that a `Waveform` has written.
-    clock_hz : int
     window : int, int
         First clock, and the one behind the last.
     curves : mapping of str to (float64 array, float64 array)

@@ -36,8 +36,6 @@ class Panel:
 
     Parameters
     ----------
-    title, x_label, y_label : str
-    curves : tuple of Curve
     log : str
         Axes that are logarithmic: "", "x", "y" or "xy".
     levels : tuple of float
@@ -70,7 +68,6 @@ class Claim:
         The paper's statement.
     found : str
         What was computed, with its numbers.
-    agrees : bool
     """
 
     paper: str
@@ -92,7 +89,6 @@ class Result:
         What was simulated.
     panels : tuple of Panel
         One below the other.
-    claims : tuple of Claim
     """
 
     source: str
@@ -112,7 +108,6 @@ class Entry:
 
     Parameters
     ----------
-    name : str
     compute : callable
     seconds : float
         About what it takes.

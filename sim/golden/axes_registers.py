@@ -10,13 +10,7 @@ from tachometry.spec.registers.axes import AxesMap
 
 
 class GoldenAxesBank(GoldenBank):
-    """Answers for the bank of a core of many axes whose pins are driven so.
-
-    Parameters
-    ----------
-    registers : AxesMap
-    trace : AxesTrace
-    """
+    """Answers for the bank of a core of many axes whose pins are driven so."""
 
     def __init__(self, registers: AxesMap, trace: AxesTrace) -> None:
         self._map = registers

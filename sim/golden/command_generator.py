@@ -8,13 +8,7 @@ from tachometry.spec.control.generator import FACTOR_BITS, RAMP, SINE, Generator
 
 @dataclass(frozen=True)
 class Command:
-    """Holds the commands of a control tick, in LSB of the ports.
-
-    Parameters
-    ----------
-    position, velocity, acceleration : int
-    enable : bool
-    """
+    """Holds the commands of a control tick, in LSB of the ports."""
 
     position: int = 0
     velocity: int = 0
@@ -24,13 +18,7 @@ class Command:
 
 @dataclass(frozen=True)
 class Demand:
-    """Holds the inputs of the generator in a control tick, in LSB of the ports.
-
-    Parameters
-    ----------
-    mode, velocity, acceleration, amplitude, rate : int
-    enable : bool
-    """
+    """Holds the inputs of the generator in a control tick, in LSB of the ports."""
 
     mode: int = 0
     velocity: int = 0
@@ -42,12 +30,7 @@ class Demand:
 
 @dataclass(frozen=True)
 class Gains:
-    """Holds gains and limit of a control tick, in LSB of the ports.
-
-    Parameters
-    ----------
-    position, velocity, acceleration, disturbance, limit : int
-    """
+    """Holds gains and limit of a control tick, in LSB of the ports."""
 
     position: int
     velocity: int
@@ -66,10 +49,6 @@ def _held(value: int, most: int) -> int:
 
 class Generator:
     """Keeps the state of a generator between two control ticks.
-
-    Parameters
-    ----------
-    form : GeneratorForm
 
     Attributes
     ----------

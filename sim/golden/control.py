@@ -24,10 +24,6 @@ _COMMANDS = ("command_position", "command_velocity", "command_acceleration")
 class Control:
     """Keeps the state of a loop between two control ticks.
 
-    Parameters
-    ----------
-    form : ControlForm
-
     Attributes
     ----------
     y, w, z : int
@@ -125,7 +121,6 @@ def control(
 
     Parameters
     ----------
-    spec : LoopSpec
     clock : int64 array, shape (n,)
         Clocks of the control ticks.
     position : int64 array, shape (n,)

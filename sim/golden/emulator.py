@@ -124,7 +124,6 @@ class GoldenEmulator:
         ----------
         changes : sequence of Change
             In the order of their clocks.
-        n_clocks : int
         """
         held = [EmulatorSettings(), *(change.settings for change in changes)]
         ends = [*(min(change.clock + 1, n_clocks) for change in changes), n_clocks]

@@ -49,7 +49,6 @@ def looked_up(
 
     Parameters
     ----------
-    encoder : Encoder
     levels : sequence of uint8 arrays, shape (n,)
         Of each line of the sensor, each row different from the one before.
     brief : bool
@@ -97,7 +96,6 @@ def filter_line(
     ----------
     clock, level : arrays, shape (n,)
         Change list of one line.
-    clocks : int
 
     Returns
     -------
@@ -197,7 +195,6 @@ def in_state(spec: TachometerSpec, levels: Sequence[NDArray[np.uint8]]) -> tuple
 
     Parameters
     ----------
-    spec : TachometerSpec
     levels : sequence of uint8 arrays, shape (n,)
         Of the lines as they are on the pins, and of Z as it should be read, at each change.
 
@@ -265,8 +262,6 @@ def count(
 
     Parameters
     ----------
-    spec : TachometerSpec
-    steps : Steps
     last : int64 array
         Last clock of each window.
     beyond : bool array or None

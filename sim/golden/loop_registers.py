@@ -15,13 +15,7 @@ _DEMANDS = tuple(f"generator_{name}" for name in ("mode", "velocity", "accelerat
 
 
 class GoldenLoopBank(GoldenBank):
-    """Answers for the bank of a core with a control loop whose pins are driven so, with the input `enable` high.
-
-    Parameters
-    ----------
-    registers : LoopMap
-    trace : PinTrace
-    """
+    """Answers for the bank of a core with a control loop whose pins are driven so, with the input `enable` high."""
 
     def __init__(self, registers: LoopMap, trace: PinTrace) -> None:
         super().__init__(registers, trace)

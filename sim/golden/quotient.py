@@ -15,7 +15,6 @@ def round_quotient(
     Parameters
     ----------
     numerator, denominator : int64 arrays, shape (n,)
-    frac_bits : int
     towards : int
         ⌊x + ½⌋ (0), ⌊x⌋ (−1) or ⌈x⌉ (1).
     """

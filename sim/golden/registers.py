@@ -19,7 +19,6 @@ class Access:
 
     Parameters
     ----------
-    clock : int
     address : int
         Of the word.
     data : int or None
@@ -61,13 +60,7 @@ def rises(clock: np.ndarray, level: np.ndarray) -> np.ndarray:
 
 
 class GoldenBank:
-    """Answers for the bank of a core whose pins are driven so; of a demo, from a restart on, with all settings 0.
-
-    Parameters
-    ----------
-    registers : RegisterMap
-    trace : PinTrace
-    """
+    """Answers for the bank of a core whose pins are driven so; of a demo, from a restart on, with all settings 0."""
 
     def __init__(self, registers: RegisterMap, trace: PinTrace) -> None:
         self._map = registers

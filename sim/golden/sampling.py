@@ -32,7 +32,6 @@ def external_windows(
     ----------
     rises : int64 array
         Clocks in which a rise is seen.
-    n_clocks, min_cycles, max_cycles : int
 
     Returns
     -------

@@ -41,7 +41,6 @@ def save_loops(path: Path, loops: Sequence[tuple[str, Mapping[str, str], Mapping
 
     Parameters
     ----------
-    path : Path
     loops : sequence of (str, mapping, mapping)
         Method, place on the axes, and row of each.
     across : str

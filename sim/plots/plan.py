@@ -18,8 +18,6 @@ def save_plan_plot(path: Path, spec: TachometerSpec, plan: Plan, unit: str) -> N
 
     Parameters
     ----------
-    path : Path
-    spec : TachometerSpec
     plan : Plan
         At speeds that increase.
     unit : str

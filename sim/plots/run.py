@@ -41,9 +41,6 @@ def save_plot(path: Path, spec: TachometerSpec, run: Run, true_speed: TrueSpeed 
 
     Parameters
     ----------
-    path : Path
-    spec : TachometerSpec
-    run : Run
     true_speed : callable or None
         True speed in rad/s at times in seconds; without it there is no error panel.
     """

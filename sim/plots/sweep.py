@@ -38,7 +38,6 @@ def save_heat_maps(
 
     Parameters
     ----------
-    path : Path
     methods : sequence of str, length n
         Of each point.
     at : sequence of mapping, length n

@@ -17,7 +17,6 @@ def save_tradeoff(path: Path, spec: TachometerSpec, costs: Mapping[str, Sequence
 
     Parameters
     ----------
-    path : Path
     spec : TachometerSpec
         Whose configuration is the title, and whose unit speeds have.
     costs : mapping of str to sequence of Cost

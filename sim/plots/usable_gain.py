@@ -30,7 +30,6 @@ class Found:
     seconds : float
         The control tick.
     gain : float, 1/s
-    outcome : Outcome
     """
 
     disc: str

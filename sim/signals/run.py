@@ -65,7 +65,6 @@ class Run:
 
     Parameters
     ----------
-    n_clocks : int
     tables : dict of str to Table
         By the strobe, for each that the core has.
     """
@@ -116,8 +115,6 @@ def observed(spec: AnySpec, n_clocks: int, rows: Ints) -> Run:
 
     Parameters
     ----------
-    spec : AnySpec
-    n_clocks : int
     rows : int64 array, shape (n, 1 + number of outputs)
         The clock, and all outputs in the order of the ports, in every clock in which a strobe is high.
     """

@@ -49,9 +49,6 @@ def lockstep(
 
     Parameters
     ----------
-    spec : CoreSpec
-    trace : Trace
-    engine : Engine
     expected : Run or None
         What the golden model makes of the trace, if that is known already.
     vcd, window, progress

@@ -125,8 +125,6 @@ class Plans:
 
     Parameters
     ----------
-    spec : TachometerSpec
-    methods : mapping of str to TachometerSpec
     low, high : float, rad/s
     """
 
@@ -225,7 +223,6 @@ class Advice:
 
     Parameters
     ----------
-    method : str
     gain : float
         How many times less its greatest error is, with a real disc.
     cells : int

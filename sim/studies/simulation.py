@@ -35,14 +35,12 @@ class Axis:
         Of a core of this axis alone.
     run : Run
         Its rows.
-    recording : Recording
     truth : Encoding or None
         What the shaft truly did, if it is known; with it `counts_in` and `error`.
     n_merged : int
         Edges that came too soon after another to be told apart.
     counts_in, counts_out : int
         Of the shaft, up to the last tick, and of the core.
-    held : HeldVelocity
     error : VelocityError or None
         Of it; None also if there was no update.
     """
@@ -77,13 +75,10 @@ class Simulation:
 
     Parameters
     ----------
-    spec : CoreSpec
     engine : str
         What has run the hardware.
     wanted : int
         Clocks that it was to run; after Ctrl-C it has run fewer.
-    lockstep : Lockstep
-    axes : tuple of Axis
     """
 
     spec: CoreSpec
@@ -114,7 +109,6 @@ def simulate(
         What the shaft of each axis truly did.
     window : callable
         Gives the clocks that the waveform `vcd` shows.
-    bar : Bar
 
     Raises
     ------

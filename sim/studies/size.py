@@ -41,7 +41,6 @@ class Target:
 
     Parameters
     ----------
-    device : str
     synth : str
         Command of Yosys.
     route : tuple of str
@@ -132,13 +131,7 @@ endmodule
 
 
 def versions() -> dict[str, str]:
-    """Return versions of every tool that has a part in the figures.
-
-    Raises
-    ------
-    RuntimeError
-        If one is not installed.
-    """
+    """Return versions of every tool that has a part in the figures; RuntimeError if one is not installed."""
     try:
         return {package: importlib.metadata.version(package) for package in PACKAGES}
     except importlib.metadata.PackageNotFoundError as error:

@@ -43,7 +43,6 @@ class Failure:
 
     Parameters
     ----------
-    seed : int
     first : list of Mismatch
         In each signal that differs.
     trace : Trace
@@ -61,10 +60,8 @@ class Outcome:
 
     Parameters
     ----------
-    n_motions, n_clocks, n_ticks, n_updates, n_mismatches : int
     seconds : float
         That the engine took, its build included.
-    failure : Failure or None
     """
 
     n_motions: int = 0
@@ -119,13 +116,10 @@ def verification(
 
     Parameters
     ----------
-    methods, engines : sequence of str
     n_clocks : int
         That each engine is to run, spread over the configurations.
-    seed : int
     jobs : int or None
         None: one for each core of the computer.
-    bar : Bar
     save : callable
         Is given a configuration and an engine that has failed, as soon as it has.
     """
@@ -250,8 +244,6 @@ def verify(spec: CoreSpec, engines: Sequence[str], n_clocks: int, seed: int) -> 
 
     Parameters
     ----------
-    spec : CoreSpec
-    engines : sequence of str
     n_clocks : int
         Clocks that each engine is to run at least; pysim a thousandth of them, but no fewer than 10,000.
     seed : int

@@ -82,7 +82,6 @@ class Checked:
 
     Parameters
     ----------
-    manifest : Path
     files : dict of str to (str, str)
         What was found of each file, and where it differs first, or "".
     simulated : str or None
@@ -140,7 +139,6 @@ def check(
     ----------
     path : Path
         The manifest.
-    make : Make
     simulation : bool
         Whether the Verilog plays a motion that the golden model plays, too.
     netlists : sequence of Path

@@ -257,7 +257,6 @@ def disc_error(spec: TachometerSpec, speed: Floats, found: Performance) -> Float
 
     Parameters
     ----------
-    spec : TachometerSpec
     speed : float64 array, shape (n,), rad/s
     found : Performance
         Of the core at these speeds, with an ideal disc.

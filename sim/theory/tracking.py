@@ -72,7 +72,6 @@ def errors(
     speed : float64 array, shape (n,), rad/s, greater than 0
     edge_error : float64 array or float, counts
         Standard deviation of the independent errors of edges; for the second result the greatest error of any.
-    counts_per_rev : int
     tick_seconds, max_memory : float, seconds
 
     Returns

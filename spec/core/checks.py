@@ -19,13 +19,7 @@ _LONGEST_FILTER = Fraction(10, 1000)  # s; contacts bounce for 2 ms or so
 
 
 def check(spec: TachometerSpec) -> None:
-    """Check what is asked for.
-
-    Raises
-    ------
-    ParameterError
-        If a parameter is out of range.
-    """
+    """Check what is asked for; ParameterError if a parameter is out of range."""
     if spec.unit not in UNITS:
         raise ParameterError("unit", f"must be one of {', '.join(UNITS)}, not {spec.unit!r}")
     _check_ticks(spec)

@@ -55,23 +55,11 @@ class Compare:
         return -self.step if self.backward else self.step
 
     def clocks(self, clock_hz: int) -> int:
-        """Return clocks of a pulse.
-
-        Raises
-        ------
-        ParameterError
-            If it has no whole number of them.
-        """
+        """Return clocks of a pulse; ParameterError if it has no whole number of them."""
         return whole_clocks("compare", self.width, clock_hz)
 
     def check(self, clock_hz: int, position_width: int) -> None:
-        """Check that it fits a core.
-
-        Raises
-        ------
-        ParameterError
-            If a position, a number or a time is out of range.
-        """
+        """Check that it fits a core; ParameterError if a position, a number or a time is out of range."""
         half = 1 << position_width - 1
         clocks = self.clocks(clock_hz)
         for name, value, least, most in (

@@ -78,7 +78,6 @@ class Option:
         A sentence for `--help`.
     name : str
         Without dashes; empty: that of the field. Fields of several methods that have one name are one option.
-    metavar : str or None
     unit : str
         What the field's number counts: `clocks`, `ticks` or `rad/s`.
     group : str
@@ -180,7 +179,6 @@ def option(default: Any, help: str, *, text: str | None = None, also: tuple[Opti
     ----------
     default : object
         Default of the field; with a text, None for that of the text, or `REQUIRED` where only `read_options` has one.
-    help : str
     text : str or None
         The default as a text, read as it would be if it were given.
     also : tuple of Option

@@ -18,12 +18,10 @@ class Port:
 
     Parameters
     ----------
-    name : str
     direction : str
         `input` or `output`.
     width : int
         Bits.
-    signed : bool
     held_by : str
         Of an output, the strobe in whose clocks it is read; a strobe is read with itself.
     unit : str

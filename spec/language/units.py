@@ -78,7 +78,6 @@ def read_quantity(what: str, text: str, units: Units, default: str = "", also: s
     ----------
     what : str
         What the message calls the quantity.
-    text : str
     units : mapping of str to Unit
         Those that it may have.
     default : str
@@ -302,7 +301,6 @@ class Speed:
 
     Parameters
     ----------
-    value : Fraction
     unit : str
         `rad/s`, `rev/s` or `rpm`.
     """

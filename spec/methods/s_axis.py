@@ -25,13 +25,7 @@ class SAxis(OneAxis, STachometer):
 
     @classmethod
     def of(cls, spec: STachometer, axes: int, slots: int) -> SAxis:
-        """Return the core that each axis is if a round has so many slots.
-
-        Raises
-        ------
-        ParameterError
-            If it cannot be.
-        """
+        """Return the core that each axis is if a round has so many slots; ParameterError if it cannot be."""
         if spec.timing.max_ticks > MAX_TABLE:
             raise ParameterError(
                 "max_ticks",

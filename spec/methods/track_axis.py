@@ -30,13 +30,7 @@ class TrackAxis(OneAxis, TrackTachometer):
 
     @classmethod
     def of(cls, spec: TrackTachometer, axes: int, slots: int) -> TrackAxis:
-        """Return the core that each axis is if a round has so many slots.
-
-        Raises
-        ------
-        ParameterError
-            If it cannot be.
-        """
+        """Return the core that each axis is if a round has so many slots; ParameterError if it cannot be."""
         own = own_options(spec, slots)
         if spec.max_memory is not None:
             own["max_memory"] = max(spec.max_memory // slots, own["timing"].tick_cycles)

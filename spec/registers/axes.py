@@ -20,7 +20,6 @@ class AxesMap(RegisterMap):
     ----------
     spec : TachometerSpec
         Of one axis.
-    axes : AxesSpec
 
     Raises
     ------

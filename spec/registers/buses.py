@@ -19,7 +19,6 @@ class Bus:
 
     Parameters
     ----------
-    name : str
     help : str
         What it is, for --help.
     lines : tuple of Port
@@ -238,13 +237,7 @@ def ports_on(spec: AnySpec, bus: Bus | None) -> tuple[Port, ...]:
 
 
 def registers_on(spec: AnySpec, bus: Bus) -> RegisterMap:
-    """Return all registers of a core on a bus.
-
-    Raises
-    ------
-    ParameterError
-        If it can have none.
-    """
+    """Return all registers of a core on a bus; ParameterError if it can have none."""
     return replace(registers_of(spec), irq=bus.irq)
 
 

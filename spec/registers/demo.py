@@ -104,13 +104,7 @@ class DemoLoopMap(LoopMap, DemoMap):
 
 @singledispatch
 def demo_map(spec: TachometerSpec | LoopSpec) -> DemoMap:
-    """Return all registers of the demo of a core.
-
-    Raises
-    ------
-    ParameterError
-        If the gains of a loop are fixed.
-    """
+    """Return all registers of the demo of a core; ParameterError if the gains of a loop are fixed."""
     return DemoMap(spec.tachometer)
 
 

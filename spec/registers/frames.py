@@ -57,7 +57,6 @@ class Request:
 
     Parameters
     ----------
-    type : Type
     sequence : int
         Repeated in the answer.
     address : int
@@ -101,37 +100,19 @@ def with_check(data: bytes) -> bytes:
 
 
 def read_request(address: int, n_words: int = 1, sequence: int = 0) -> bytes:
-    """Return a request over the UART for words that follow each other.
-
-    Raises
-    ------
-    ValueError
-        If a number is out of range.
-    """
+    """Return a request over the UART for words that follow each other; ValueError if a number is out of range."""
     _check("n_words", n_words, 1 << COUNT_WIDTH)
     return with_check(_head(Type.READ, sequence, address) + bytes([n_words]))
 
 
 def write_request(address: int, data: int, sequence: int = 0) -> bytes:
-    """Return a request over the UART to write a word.
-
-    Raises
-    ------
-    ValueError
-        If a number is out of range.
-    """
+    """Return a request over the UART to write a word; ValueError if a number is out of range."""
     _check("data", data, 1 << 8 * _WORD_BYTES)
     return with_check(_head(Type.WRITE, sequence, address) + data.to_bytes(_WORD_BYTES, "little"))
 
 
 def decode_request(frame: bytes) -> Request:
-    """Return what a request over the UART asks for.
-
-    Raises
-    ------
-    FrameError
-        If it is none, or damaged.
-    """
+    """Return what a request over the UART asks for; FrameError if it is none, or damaged."""
     body = _checked(frame)
     if not body or body[0] >> TYPE_LOW not in (Type.READ, Type.WRITE):
         raise FrameError("a request must begin with its type")
@@ -142,13 +123,7 @@ def decode_request(frame: bytes) -> Request:
 
 
 def answer_length(request: bytes) -> int:
-    """Return bytes of the answer to a request.
-
-    Raises
-    ------
-    FrameError
-        If the request is none.
-    """
+    """Return bytes of the answer to a request; FrameError if the request is none."""
     asked = decode_request(request)
     return 2 + _CHECK_BYTES + (_WORD_BYTES * asked.value if asked.type is Type.READ else 0)
 
@@ -178,13 +153,7 @@ def telemetry_length(n_words: int) -> int:
 
 
 def decode_telemetry(frame: bytes) -> tuple[int, tuple[int, ...]]:
-    """Return sequence and words of a frame of telemetry.
-
-    Raises
-    ------
-    FrameError
-        If it is none, or damaged.
-    """
+    """Return sequence and words of a frame of telemetry; FrameError if it is none, or damaged."""
     body = _checked(frame)
     if len(body) % _WORD_BYTES != 2 or body[-1]:
         raise FrameError("telemetry must have whole words and status 0")
@@ -201,25 +170,13 @@ def encode_answer(request: Request, answer: Answer) -> bytes:
 
 
 def spi_read(address: int, n_words: int = 1) -> bytes:
-    """Return what to send over SPI to read words that follow each other.
-
-    Raises
-    ------
-    ValueError
-        If a number is out of range.
-    """
+    """Return what to send over SPI to read words that follow each other; ValueError if a number is out of range."""
     _check("address", address, 1 << SPI_ADDRESS_WIDTH)
     return bytes([address]) + bytes((1 + _WORD_BYTES) * n_words)
 
 
 def spi_write(address: int, data: int) -> bytes:
-    """Return what to send over SPI to write a word and to learn its status.
-
-    Raises
-    ------
-    ValueError
-        If a number is out of range.
-    """
+    """Return what to send over SPI to write a word and to learn its status; ValueError if a number is out of range."""
     _check("address", address, 1 << SPI_ADDRESS_WIDTH)
     _check("data", data, 1 << 8 * _WORD_BYTES)
     return bytes([SPI_WRITE | address]) + data.to_bytes(_WORD_BYTES, "big") + bytes(1)

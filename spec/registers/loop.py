@@ -27,7 +27,6 @@ class LoopMap(RegisterMap):
     Parameters
     ----------
     spec : TachometerSpec
-    loop : LoopSpec
 
     Raises
     ------
@@ -137,13 +136,7 @@ def _ranged(field: Field) -> Field:
 
 @singledispatch
 def registers_of(spec: AnySpec) -> RegisterMap:
-    """Return all registers of a core.
-
-    Raises
-    ------
-    ParameterError
-        If it can have none.
-    """
+    """Return all registers of a core; ParameterError if it can have none."""
     return RegisterMap(spec.tachometer)
 
 

@@ -41,12 +41,10 @@ class Field:
 
     Parameters
     ----------
-    name : str
     width : int
         Bits.
     low : int
         The lowest of them.
-    help : str
     writable : bool
         A write changes it; else a write has no effect on it.
     single : bool
@@ -104,10 +102,8 @@ class Register:
 
     Parameters
     ----------
-    name : str
     offset : int
         Bytes.
-    help : str
     fields : tuple of Field
         Bits of none of them read 0.
     captured : bool
@@ -146,7 +142,6 @@ class RegisterMap:
 
     Parameters
     ----------
-    spec : TachometerSpec
     irq : bool
         There is an output `irq`, with registers of its own, which follow all others.
     """

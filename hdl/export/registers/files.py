@@ -22,7 +22,6 @@ def register_files(registers: RegisterMap, name: str) -> dict[str, str]:
 
     Parameters
     ----------
-    registers : RegisterMap
     name : str
         Of the Verilog module; functions and types in C begin with it, macros with its capitals.
     """

@@ -34,7 +34,6 @@ class HalPin:
     ----------
     kind : str
         `float`, `s32`, `u32` or `bit`.
-    help : str
     source : str
         What of the frame it is made of; empty: the host makes it.
     """
@@ -49,7 +48,6 @@ def rio(spec: TachometerSpec, name: str, bus: Bus | None, made: Mapping[str, str
 
     Parameters
     ----------
-    spec : TachometerSpec
     name : str
         Of the module of the core.
     bus : None

@@ -30,7 +30,6 @@ def adaptive_windows(spec: RairanTachometer, start: Ints, next_turn: Ints) -> tu
 
     Parameters
     ----------
-    spec : RairanTachometer
     start : int64 array, shape (n,)
         Clocks of the nodes: of the reset, of the counts, and of the end.
     next_turn : int64 array, shape (n,)

@@ -10,12 +10,7 @@ from tachometry.spec.core.ports import BOUNDS
 
 
 class Model:
-    """Computes the M method.
-
-    Parameters
-    ----------
-    spec : MTachometer
-    """
+    """Computes the M method."""
 
     def __init__(self, spec: MTachometer) -> None:
         self._spec = spec

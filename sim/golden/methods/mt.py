@@ -11,12 +11,7 @@ from tachometry.spec import MTTachometer
 
 
 class Model:
-    """Computes the M/T method.
-
-    Parameters
-    ----------
-    spec : MTTachometer
-    """
+    """Computes the M/T method."""
 
     def __init__(self, spec: MTTachometer) -> None:
         self._spec = spec

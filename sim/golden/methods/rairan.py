@@ -130,12 +130,7 @@ def counting(lengths: Ints) -> Ints:
 
 
 class Model:
-    """Computes the method of Rairán.
-
-    Parameters
-    ----------
-    spec : RairanTachometer
-    """
+    """Computes the method of Rairán."""
 
     def __init__(self, spec: RairanTachometer) -> None:
         self._spec = spec

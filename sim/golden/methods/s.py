@@ -44,7 +44,6 @@ def windows(
     Parameters
     ----------
     alteration : bool array, shape (n,)
-    max_ticks : int
 
     Returns
     -------
@@ -71,12 +70,7 @@ def windows(
 
 
 class Model:
-    """Computes the S method.
-
-    Parameters
-    ----------
-    spec : STachometer
-    """
+    """Computes the S method."""
 
     def __init__(self, spec: STachometer) -> None:
         self._spec = spec

@@ -10,12 +10,7 @@ from tachometry.spec import TTachometer
 
 
 class Model:
-    """Computes the T method.
-
-    Parameters
-    ----------
-    spec : TTachometer
-    """
+    """Computes the T method."""
 
     def __init__(self, spec: TTachometer) -> None:
         self._spec = spec

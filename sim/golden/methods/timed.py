@@ -27,7 +27,6 @@ class Counts:
         Counts of the step or of the tick; never 0.
     clock_of : int64 array, shape (m,), or None
         Clock in which each period is seen; None: a period is a clock.
-    n_periods : int
     """
 
     period: Ints

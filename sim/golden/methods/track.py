@@ -144,12 +144,7 @@ def compiled(names: tuple[str, ...]) -> Rows | None:
 
 
 class Model:
-    """Computes the tracking method.
-
-    Parameters
-    ----------
-    spec : TrackTachometer
-    """
+    """Computes the tracking method."""
 
     def __init__(self, spec: TrackTachometer) -> None:
         self._spec = spec

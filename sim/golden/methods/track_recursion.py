@@ -38,7 +38,6 @@ class Recursion:
 
     Parameters
     ----------
-    form : Tracking
     lead : int
         Clocks by which the velocity that is shown is ahead of the end of the tick.
     """

@@ -35,7 +35,6 @@ class Steps:
     step : int64 array, shape (n,), +1 or -1
     duration : float, seconds
         Length of the recording.
-    counts_per_rev : int
     """
 
     time: FloatArray
@@ -164,7 +163,6 @@ def finite_difference(steps: Steps, period_s: float, filter_s: float = 5e-3) -> 
 
     Parameters
     ----------
-    steps : Steps
     period_s : float, seconds
     filter_s : float, seconds
         Time constant of the filter; 0 for none. SimpleFOC's default is 5 ms.
@@ -183,7 +181,6 @@ def timestamp_method(steps: Steps, period_s: float, timeout_s: float = 0.5, cloc
 
     Parameters
     ----------
-    steps : Steps
     period_s : float, seconds
         LinuxCNC's servo period is usually 1 ms.
     timeout_s : float, seconds
@@ -225,7 +222,6 @@ def mixed_method(steps: Steps, period_s: float, timeout_s: float = 0.1, clock_s:
 
     Parameters
     ----------
-    steps : Steps
     period_s : float, seconds
     timeout_s : float, seconds
         0.1 s in SimpleFOC.
@@ -253,7 +249,6 @@ def tracking_loop(
 
     Parameters
     ----------
-    steps : Steps
     period_s : float, seconds
         125 us in ODrive, 33 us in moteus.
     bandwidth_rad_s : float, rad/s

@@ -28,7 +28,6 @@ class Curve:
 
     Parameters
     ----------
-    name, what : str
     estimate : baselines.Estimate
         Velocity in rad/s, held from each time (s) on.
     measurement_time : float64 array, shape (n,), seconds
@@ -47,8 +46,6 @@ class Score:
 
     Parameters
     ----------
-    name, what : str
-    updates_per_second : float
     mean_time, worst_time : float or None, seconds
         Measurement time.
     rms, max : float or None, rad/s

@@ -51,11 +51,8 @@ class Comparison:
         Whose clock, tick and unit hold for all.
     specs : mapping of str to TachometerSpec or None
         Of the methods that are compared, by their names with their settings.
-    curves : list of Curve
-    scores : list of Score
     instants : float64 array, shape (n,), seconds
         At which they are compared.
-    true_speed : TrueSpeed or None
     recording : Recording
         The edges.
     n_tried : dict of str to int
@@ -118,7 +115,6 @@ def comparison(
         Each baseline, and M/T, takes part with the best of its settings.
     tradeoff : bool
         Measure what all settings cost.
-    bar : Bar
 
     Raises
     ------
@@ -170,10 +166,8 @@ class Setting:
 
     Parameters
     ----------
-    name : str
     spec : TachometerSpec or None
         None: it is a baseline.
-    encoder : Encoder
     """
 
     name: str
@@ -181,13 +175,7 @@ class Setting:
     encoder: Encoder
 
     def curve(self, recording: Recording) -> Curve:
-        """Return what it shows.
-
-        Raises
-        ------
-        ValueError
-            If its options are wrong, or do not fit the recording.
-        """
+        """Return what it shows; ValueError if its options are wrong, or do not fit the recording."""
         if self.spec is None:
             return steps_curve(self.name, Steps.of_sensor(recording, self.encoder))
         return core_curve(self.name, self.spec, PinTrace.of(recording, self.spec))

@@ -43,7 +43,6 @@ def least_squares(
 
     Parameters
     ----------
-    steps : Steps
     period_s : float, seconds
     edges : int, more than `order`, at most 10,000
         Number of edges that the polynomial is fitted to.
@@ -137,7 +136,6 @@ def adaptive_window(
 
     Parameters
     ----------
-    steps : Steps
     period_s : float, seconds
     noise_bound : float, counts, at least 0
         The paper's d: greatest distance of a reading from the line. Counting alone needs 1.
@@ -233,7 +231,6 @@ def kalman(steps: Steps, period_s: float, process_noise: float = 300.0, order: i
 
     Parameters
     ----------
-    steps : Steps
     period_s : float, seconds
     process_noise : float, more than 0, rad/s^2 with order 2, rad/s^3 with order 3
         Standard deviation of the acceleration, or of its derivative; the tracking index that follows from it must be

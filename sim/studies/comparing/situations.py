@@ -22,8 +22,6 @@ class Situation:
 
     Parameters
     ----------
-    name : str
-    motion : str
     start : str
         Errors before this time are left out.
     faults : mapping of str to str

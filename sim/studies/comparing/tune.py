@@ -117,7 +117,6 @@ def equivalent_delay(curve: Curve, instants: FloatArray, true_speed: TrueSpeed) 
 
     Parameters
     ----------
-    curve : Curve
     instants : float64 array, shape (n,), seconds, evenly spaced
     true_speed : callable
         Of a motion whose acceleration is not 0.

@@ -64,7 +64,6 @@ class Task:
     ----------
     motion : Command
         The commanded speed, and by its integral the commanded angle.
-    load : Load or None
     virtual : bool
         The load is a current that is added behind the controller, as in the paper's experiment, and no torque.
     noise : float, Nm rms
@@ -130,11 +129,6 @@ class Setting:
 
     Parameters
     ----------
-    spec : TachometerSpec
-    gains : Gains
-    task : Task
-    motor : Motor
-    encoder : VirtualEncoder
     begin : float, s
         From when on it is judged.
     gates : LoopSpec or None

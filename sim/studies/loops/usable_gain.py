@@ -31,9 +31,6 @@ class Kind:
 
     Parameters
     ----------
-    name : str
-    method : str
-    way : Observer
     filtered : bool
         Whether there is a low-pass filter of the velocity.
     options : tuple of (str, str)

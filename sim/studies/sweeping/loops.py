@@ -32,10 +32,8 @@ class LoopPoint:
     ----------
     method : str
         What the method is called.
-    setting : Setting
     text : str
         The motion in words.
-    seeds : tuple of int
     """
 
     method: str
@@ -96,13 +94,7 @@ def row_of(outcome: Outcome) -> dict[str, Any]:
 
 
 def seeds_from(first: int, count: int) -> tuple[int, ...]:
-    """Return so many seeds, one after the other.
-
-    Raises
-    ------
-    ParameterError
-        If it is none, or more than a thousand.
-    """
+    """Return so many seeds, one after the other; ParameterError if it is none, or more than a thousand."""
     if not 1 <= count <= 1000:
         raise ParameterError("seeds", f"must be from 1 to 1000, not {count}")
     return tuple(range(first, first + count))

@@ -104,13 +104,7 @@ class Results:
         return [point for point in self._points if point not in there]
 
     def add(self, row: Row) -> None:
-        """Add the row of a point that was missing.
-
-        Raises
-        ------
-        OSError
-            If it cannot be written.
-        """
+        """Add the row of a point that was missing; OSError if it cannot be written."""
         self._new.append(row)
         self._saved = False
         if self._journal is not None:
@@ -122,13 +116,7 @@ class Results:
             self.save()
 
     def save(self) -> None:
-        """Write the file, if there are rows that are not in it.
-
-        Raises
-        ------
-        OSError
-            If it cannot be written.
-        """
+        """Write the file, if there are rows that are not in it; OSError if it cannot be written."""
         if self._saved:
             return
         self._table = _joined([self._table, pa.Table.from_pylist(self._new, schema=self._schema)])

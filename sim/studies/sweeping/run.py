@@ -23,12 +23,10 @@ class SweepResult:
 
     Parameters
     ----------
-    grid : Points
     columns : dict of str to list
         Those that were wanted, with a value for each point.
     n_run : int
         Points that were run; the others were in the file.
-    seconds : float
     """
 
     grid: Points
@@ -43,10 +41,8 @@ class LoopResult:
 
     Parameters
     ----------
-    grid : Loops
     rows : dict of str to Row
         The mean of the seeds, by the digest of the point.
-    seconds : float
     seeds : list of Row
         A row for each seed of a loop that is alone, and
     log : Log

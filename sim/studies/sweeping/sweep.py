@@ -123,9 +123,6 @@ class Point:
     ----------
     method : str
         What the method is called.
-    spec : TachometerSpec
-    encoder : VirtualEncoder
-    motion : Motion
     text : str
         The motion in words.
     values : dict of str to float
