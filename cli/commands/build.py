@@ -64,12 +64,7 @@ Examples:
 )
 @BAUD
 def build(
-    board: Board,
-    spec: TachometerSpec | LoopSpec,
-    name: str,
-    directory: Path | None,
-    bus: str,
-    baud: int | None,
+    board: Board, spec: TachometerSpec | LoopSpec, name: str, directory: Path | None, bus: str, baud: int | None
 ) -> int:
     """Build a core for a board: with its registers on a UART or on SPI, and an emulated encoder beside it.
 

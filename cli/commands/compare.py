@@ -93,11 +93,7 @@ Examples:
     help="Also measure the cores on an ECP5: COMB, FF, Fmax. It takes half a minute a core, and needs the extra "
     "`size`.",
 )
-@output(
-    "--plot",
-    suffixes=(".png", ".pdf", ".svg"),
-    help="Figure of all velocities and of the error of each.",
-)
+@output("--plot", suffixes=(".png", ".pdf", ".svg"), help="Figure of all velocities and of the error of each.")
 @output("--csv", help="CSV with a row per method: the table.")
 @output(
     "--tradeoff",

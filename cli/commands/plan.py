@@ -46,12 +46,7 @@ Examples:
 @output("--plot", suffixes=(".png", ".pdf", ".svg"), help="Figure of resolution and measurement time.")
 @output("--csv", help="CSV with a row per speed, densely sampled: what the figure is drawn from.")
 def plan(
-    spec: TachometerSpec,
-    make: Make,
-    speeds: str | None,
-    methods: str | None,
-    plot: Path | None,
-    csv: Path | None,
+    spec: TachometerSpec, make: Make, speeds: str | None, methods: str | None, plot: Path | None, csv: Path | None
 ) -> int:
     """Tell what a core can measure, before it is generated.
 

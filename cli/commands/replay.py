@@ -39,12 +39,7 @@ a --clock that is a few times the edge rate then. Edges closer than a clock are 
 @OUTPUT_OPTIONS
 @ENGINE_OPTIONS
 def replay(
-    spec: CoreSpec,
-    capture: Path,
-    read: Callable[..., Recording],
-    targets: dict[str, Path],
-    engine: str,
-    window: Window,
+    spec: CoreSpec, capture: Path, read: Callable[..., Recording], targets: dict[str, Path], engine: str, window: Window
 ) -> int:
     """Run a core on captured encoder signals, against the golden model.
 
@@ -61,14 +56,7 @@ def replay(
     recordings = [read(capture, spec, axis) for axis in range(spec.axes or 1)]
     with outputs:
         simulation = simulation_of(
-            spec,
-            str(capture),
-            recordings,
-            None,
-            engine,
-            window=window,
-            vcd=outputs.get("--vcd"),
-            bar=progress_bar,
+            spec, str(capture), recordings, None, engine, window=window, vcd=outputs.get("--vcd"), bar=progress_bar
         )
         write_outputs(simulation, outputs.get)
     return print_simulation(simulation)

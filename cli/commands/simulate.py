@@ -65,14 +65,7 @@ def simulate(
     recordings = [truth.recording for truth in truths]
     with outputs:
         simulation = simulation_of(
-            spec,
-            "--motion",
-            recordings,
-            truths,
-            engine,
-            window=window,
-            vcd=outputs.get("--vcd"),
-            bar=progress_bar,
+            spec, "--motion", recordings, truths, engine, window=window, vcd=outputs.get("--vcd"), bar=progress_bar
         )
         write_outputs(simulation, outputs.get)
     return print_simulation(simulation)

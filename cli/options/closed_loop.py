@@ -18,15 +18,7 @@ from tachometry.spec.control.law import Law
 from tachometry.spec.control.motor import Motor
 from tachometry.spec.core.timing import whole_clocks
 from tachometry.spec.language.option import ParameterError, options_of
-from tachometry.spec.language.units import (
-    TIME,
-    TORQUE,
-    Units,
-    format_time,
-    number_reader,
-    parse_time,
-    read_nearest,
-)
+from tachometry.spec.language.units import TIME, TORQUE, Units, format_time, number_reader, parse_time, read_nearest
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.studies.loops.control import Load, Setting
@@ -89,12 +81,7 @@ _OPTIONS = [
         "are then of the time before it.",
     ),
     option(
-        _LOOP,
-        "--from",
-        "start",
-        default="0s",
-        metavar="TIME",
-        help="Leave out what comes before this time: the start.",
+        _LOOP, "--from", "start", default="0s", metavar="TIME", help="Leave out what comes before this time: the start."
     ),
 ]
 
@@ -182,11 +169,7 @@ def _core_motor_and_gains(
     law = Law(tachometer=spec, **take_values(Law, of_law, vars(spec.timing)))
     inertia, torque_constant = float(law.inertia), float(law.torque_constant)
     motor = Motor(
-        inertia=inertia,
-        torque_constant=torque_constant,
-        driver_seconds=driver_time,
-        viscous=viscous,
-        coulomb=friction,
+        inertia=inertia, torque_constant=torque_constant, driver_seconds=driver_time, viscous=viscous, coulomb=friction
     )
     late = 0 if delay is None else whole_clocks("delay", delay, spec.timing.clock_hz)
     if not 0 <= late <= law.period:

@@ -29,10 +29,7 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
     latencies = manifest(spec)["latency_cycles"]
     memory = spec.words.memory
     return [
-        (
-            "method",
-            f"{spec.method.upper()}, {f'{spec.chosen}: ' if spec.chosen else ''}{spec.words.description}",
-        ),
+        ("method", f"{spec.method.upper()}, {f'{spec.chosen}: ' if spec.chosen else ''}{spec.words.description}"),
         ("encoder", counts),
         ("clock", f"{timing.clock_hz:,} Hz"),
         ("tick", f"{short_time(timing.tick_seconds)} ({plural(timing.tick_cycles, 'clock')})"),

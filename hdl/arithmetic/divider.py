@@ -49,13 +49,7 @@ class Divider(wiring.Component):
     """
 
     def __init__(
-        self,
-        *,
-        divisor_width: int,
-        integer_bits: int,
-        scale_bits: int,
-        nearest: bool = False,
-        zeros: int = 0,
+        self, *, divisor_width: int, integer_bits: int, scale_bits: int, nearest: bool = False, zeros: int = 0
     ) -> None:
         self._steps = integer_bits + scale_bits
         self._scale_bits = scale_bits
@@ -99,21 +93,13 @@ class Divider(wiring.Component):
         digits = Signal(self._steps + 1, reset_less=True)
         by = Signal.like(self.by, reset_less=True)
         negative = remainder[-1]
-        m.d.comb += [
-            self.by.eq(by),
-            self.digit.eq(~negative),
-            self.quotient.eq(Cat(digits[:-1], ~digits[-1])),
-        ]
+        m.d.comb += [self.by.eq(by), self.digit.eq(~negative), self.quotient.eq(Cat(digits[:-1], ~digits[-1]))]
         # 2·remainder ± by with one adder: −by is ~by + 1, and the 1 comes from an additional bit at the adder's end.
         term = Cat(by, Const(0)) ^ (~negative).replicate(len(by) + 1)
         total = Cat(1, digits[-1], remainder).as_signed() + Cat(~negative, term).as_signed()
         m.d.sync += self.done.eq(running & left[-1] & ~self.start)
         with m.If(running):
-            m.d.sync += [
-                remainder.eq(total >> 1),
-                digits.eq(Cat(self.digit, digits)),
-                left.eq(left - 1),
-            ]
+            m.d.sync += [remainder.eq(total >> 1), digits.eq(Cat(self.digit, digits)), left.eq(left - 1)]
         with m.If(left[-1]):
             m.d.sync += running.eq(0)
         with m.If(self.start):

@@ -110,11 +110,7 @@ class Quotient(wiring.Component):
 
         self.scalers = {
             name: scaler(width)(
-                shape,
-                base_width=width - shape.frac_bits,
-                numerator_width=numerator_width,
-                tag=travels,
-                towards=towards,
+                shape, base_width=width - shape.frac_bits, numerator_width=numerator_width, tag=travels, towards=towards
             )
             for name, (width, towards) in quotients.items()
         }

@@ -118,8 +118,5 @@ class RemainderScaler(wiring.Component):
         valid, tag, total, quotient, up = delay(m, valid, tag, total, quotient, up)
         m.d.sync += self.results.valid.eq(valid)
         with m.If(valid):
-            m.d.sync += [
-                result.quotient.eq(_rounded(total, quotient.as_signed(), up)),
-                result.tag.eq(tag),
-            ]
+            m.d.sync += [result.quotient.eq(_rounded(total, quotient.as_signed(), up)), result.tag.eq(tag)]
         return m

@@ -41,13 +41,7 @@ class _Scaler(wiring.Component):
     """
 
     def __init__(
-        self,
-        reciprocal: Reciprocal,
-        *,
-        base_width: int,
-        numerator_width: int,
-        tag: data.StructLayout,
-        towards: int = 0,
+        self, reciprocal: Reciprocal, *, base_width: int, numerator_width: int, tag: data.StructLayout, towards: int = 0
     ) -> None:
         self._bits = numerator_width
         self._digits = reciprocal.digits

@@ -76,12 +76,7 @@ class AxisFilter(wiring.Component):
             self.seen_last.eq(last),
             self.seen_ready.eq(ready),
         ]
-        m.d.comb += [
-            read.addr.eq(self.slot),
-            write.addr.eq(self.seen_slot),
-            write.data.eq(after),
-            write.en.eq(1),
-        ]
+        m.d.comb += [read.addr.eq(self.slot), write.addr.eq(self.seen_slot), write.data.eq(after), write.en.eq(1)]
         return m
 
     def _next(self, m: Module, state: data.View, level: Signal, name: str) -> data.View:

@@ -43,14 +43,7 @@ class AxisWindow(wiring.Component):
         self._cancel = cancel
         count = signed(count_width)
         state = data.StructLayout(
-            {
-                "previous": count,
-                "offset": count,
-                "opening": count,
-                "m_s": range(max_ticks + 1),
-                "rests": 1,
-                "nearly": 1,
-            }
+            {"previous": count, "offset": count, "opening": count, "m_s": range(max_ticks + 1), "rests": 1, "nearly": 1}
         )
         super().__init__(
             {

@@ -93,12 +93,7 @@ class TrackTurns(wiring.Component):
             with m.If(turn == n - 1):
                 m.d.sync += [running.eq(0), first.eq(0)]
         with m.If(self.complete & (self.slot == 0)):
-            m.d.sync += [
-                running.eq(1),
-                clock.eq(-self._number * plan.apart),
-                turn.eq(0),
-                whose.eq(self._number),
-            ]
+            m.d.sync += [running.eq(1), clock.eq(-self._number * plan.apart), turn.eq(0), whose.eq(self._number)]
         counts, position = self._handed(m, whose, at["read"])
         after, pulses, saturated = self._follow(m, turn, first, counts, position, at)
         names = ("number", "times", "places", "last", "moved", "kind", "end", "down")
@@ -132,13 +127,7 @@ class TrackTurns(wiring.Component):
         return taken.count, taken.handed_position if self._axis.index_reset else None
 
     def _follow(
-        self,
-        m: Module,
-        turn: Signal,
-        first: Signal,
-        counts: data.View,
-        position: Signal | None,
-        at: dict[str, Signal],
+        self, m: Module, turn: Signal, first: Signal, counts: data.View, position: Signal | None, at: dict[str, Signal]
     ) -> tuple[data.View, Signal, Signal]:
         """Follow position and silence of the axis, whose state is in a memory."""
         axis, most = self._axis, self._axis.timing.max_ticks
@@ -176,12 +165,7 @@ class TrackTurns(wiring.Component):
                 pulses.eq(m_e),
                 saturated.eq(overflow),
             ]
-        m.d.comb += [
-            read.addr.eq(turn),
-            write.addr.eq(turn),
-            write.data.eq(after),
-            write.en.eq(at["keep"]),
-        ]
+        m.d.comb += [read.addr.eq(turn), write.addr.eq(turn), write.data.eq(after), write.en.eq(at["keep"])]
         return after, pulses, saturated
 
     def _show(self, m: Module, counts: data.View, after: data.View, shows: Signal) -> None:

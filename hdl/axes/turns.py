@@ -30,12 +30,7 @@ class Turns(wiring.Component):
     def __init__(self, axes: int, cycles: int) -> None:
         self._axes = axes
         super().__init__(
-            {
-                "begin": In(1),
-                "axis": Out(range(max(axes, 2))),
-                "clears": Out(1, init=1),
-                "step": Out(cycles, init=1),
-            }
+            {"begin": In(1), "axis": Out(range(max(axes, 2))), "clears": Out(1, init=1), "step": Out(cycles, init=1)}
         )
 
     def elaborate(self, platform: object) -> Module:

@@ -7,15 +7,7 @@ from amaranth.lib.wiring import In, Out
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.control.product import ParallelProduct, SerialProduct
 from tachometry.spec.control.form import POSITION_FRAC_BITS
-from tachometry.spec.control.generator import (
-    AMPLITUDE_WIDTH,
-    FACTOR_BITS,
-    MODE_WIDTH,
-    RAMP,
-    WORD,
-    GeneratorForm,
-    Scale,
-)
+from tachometry.spec.control.generator import AMPLITUDE_WIDTH, FACTOR_BITS, MODE_WIDTH, RAMP, WORD, GeneratorForm, Scale
 
 
 def _shifted(value: Signal, scale: Scale) -> Value:

@@ -53,11 +53,7 @@ class SerialProduct(_Product):
         addend = Cat(last, Mux(factor[0], self.word, 0)).as_signed()
         m.d.sync += [last.eq(running & (left == 1)), self.done.eq(last)]
         with m.If(running):
-            m.d.sync += [
-                total.eq((Cat(1, total).as_signed() + addend) >> 2),
-                factor.eq(factor >> 1),
-                left.eq(left - 1),
-            ]
+            m.d.sync += [total.eq((Cat(1, total).as_signed() + addend) >> 2), factor.eq(factor >> 1), left.eq(left - 1)]
         with m.If(last):
             m.d.sync += running.eq(0)
         with m.If(self.start):

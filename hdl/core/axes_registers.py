@@ -29,11 +29,7 @@ class AxesRegisterCore(wiring.Component):
         self.tachometer = AxesTachometer(registers.axes)
         self.bank = RegisterBank(registers)
         super().__init__(
-            {
-                **members(registers.core_ports),
-                "bus": In(native_port(registers.address_width - 2)),
-                "capture": In(1),
-            }
+            {**members(registers.core_ports), "bus": In(native_port(registers.address_width - 2)), "capture": In(1)}
         )
 
     def elaborate(self, platform: object) -> Module:

@@ -26,9 +26,7 @@ class EmulatedLine(wiring.Component):
     """
 
     def __init__(self) -> None:
-        super().__init__(
-            {"ideal": In(1), "drop": In(1), "bounce": In(BOUNCE_WIDTH), "random": In(1), "line": Out(1)},
-        )
+        super().__init__({"ideal": In(1), "drop": In(1), "bounce": In(BOUNCE_WIDTH), "random": In(1), "line": Out(1)})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

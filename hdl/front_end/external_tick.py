@@ -71,10 +71,7 @@ class ExternalTick(wiring.Component):
         enough = Signal()  # this clock is at least the `min_cycles`-th of the window
         error = Signal()
         m.d.comb += self.last.eq((rises & enough) | late)
-        m.d.sync += [
-            left.eq(left - Const(1, left.shape())),
-            error.eq(rises ^ self.last),
-        ]
+        m.d.sync += [left.eq(left - Const(1, left.shape())), error.eq(rises ^ self.last)]
         m.d.comb += self.tick_error.eq(*delay(m, error, clocks=self._latency - 1))
         # Lower bits tell the first clock that may end a window from all before it; later, `enough` is high anyway.
         first = self._min_cycles - 2

@@ -52,11 +52,7 @@ class IndexCapture(wiring.Component):
         m = Module()
         level, ready = delay(m, self.level_z, self.ready, clocks=self._latency - 2)
         past_z = Signal()
-        m.d.sync += [
-            past_z.eq(level),
-            self.rises.eq(level & ~past_z & ready),
-            self.index_valid.eq(self.rises),
-        ]
+        m.d.sync += [past_z.eq(level), self.rises.eq(level & ~past_z & ready), self.index_valid.eq(self.rises)]
         with m.If(self.rises):
             m.d.sync += self.index_position.eq(self.position)
         return m

@@ -7,16 +7,7 @@ from amaranth.lib.wiring import Out
 from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
 
 # Bits whose parity makes a shift register of so many bits go through all states but one (Alfke, XAPP 052).
-_TAPS = {
-    5: (5, 3),
-    6: (6, 5),
-    7: (7, 6),
-    8: (8, 6, 5, 4),
-    9: (9, 5),
-    10: (10, 7),
-    11: (11, 9),
-    12: (12, 6, 4, 1),
-}
+_TAPS = {5: (5, 3), 6: (6, 5), 7: (7, 6), 8: (8, 6, 5, 4), 9: (9, 5), 10: (10, 7), 11: (11, 9), 12: (12, 6, 4, 1)}
 
 
 class SamplingClock(wiring.Component):

@@ -37,13 +37,7 @@ class AlterationDetector(wiring.Component):
         self._seldom = seldom
         shape = signed(count_width)
         super().__init__(
-            {
-                "coming": In(1),
-                "tick": In(1),
-                "next_count": In(shape),
-                "pulse_count": In(shape),
-                "alteration": Out(1),
-            }
+            {"coming": In(1), "tick": In(1), "next_count": In(shape), "pulse_count": In(shape), "alteration": Out(1)}
         )
 
     def elaborate(self, platform: object) -> Module:

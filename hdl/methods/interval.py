@@ -58,14 +58,7 @@ class IntervalAccumulator(wiring.Component):
     """
 
     def __init__(
-        self,
-        *,
-        max_ticks: int,
-        kept_ticks: int,
-        count_width: int,
-        numerator_width: int,
-        cancel: bool,
-        seldom: bool,
+        self, *, max_ticks: int, kept_ticks: int, count_width: int, numerator_width: int, cancel: bool, seldom: bool
     ) -> None:
         if max_ticks < 2:
             raise ValueError(f"max_ticks must be at least 2, not {max_ticks}")
@@ -102,10 +95,7 @@ class IntervalAccumulator(wiring.Component):
         # One adder for both: where m_s is the longest, this leads to what is kept.
         back = Const((after_forced - self._max_ticks) % (1 << len(self.m_s)), len(self.m_s))
         with m.If(self.moves):
-            m.d.sync += [
-                self.m_s.eq(self.m_s + Mux(longest, back, 1)),
-                longest.eq(self.m_s == self._max_ticks - 1),
-            ]
+            m.d.sync += [self.m_s.eq(self.m_s + Mux(longest, back, 1)), longest.eq(self.m_s == self._max_ticks - 1)]
             with m.If(longest):
                 m.d.sync += longest.eq(after_forced == self._max_ticks)
             with m.If(self.alteration):

@@ -39,13 +39,7 @@ class MovingSum(wiring.Component):
 
     def __init__(self, length: int, *, count_width: int, sum_width: int) -> None:
         self._length = length
-        super().__init__(
-            {
-                "tick": In(1),
-                "m_e": In(signed(count_width)),
-                "total": Out(signed(sum_width)),
-            }
-        )
+        super().__init__({"tick": In(1), "m_e": In(signed(count_width)), "total": Out(signed(sum_width))})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -100,22 +100,14 @@ class QuotientVelocity(wiring.Component):
         m.d.comb += divider.dividend.eq(divided)
         forced, beyond = (Signal(name=name, reset_less=True) for name in ("forced", "beyond"))
         with m.If(divider.start):
-            m.d.sync += [
-                measuring.eq(self.measure),
-                forced.eq(self.forced_in),
-                beyond.eq(self.beyond_in),
-            ]
+            m.d.sync += [measuring.eq(self.measure), forced.eq(self.forced_in), beyond.eq(self.beyond_in)]
 
         nearer, beyond_most, velocity = self._bounded(m, measuring, new.velocity, measuring & too_far)
         update = Signal()
         m.d.comb += update.eq(divider.done & (measuring | nearer if spec.form.decays else 1))
         m.d.sync += self.updates.valid.eq(update)
         with m.If(update):
-            m.d.sync += [
-                new.velocity.eq(velocity),
-                new.interval.eq(divider.by),
-                new.forced.eq(forced),
-            ]
+            m.d.sync += [new.velocity.eq(velocity), new.interval.eq(divider.by), new.forced.eq(forced)]
             if spec.form.flags_range:
                 m.d.sync += new.out_of_range.eq(beyond | beyond_most)
         if spec.widths.stamp:

@@ -38,12 +38,7 @@ class SMethod(wiring.Component):
 
     def __init__(self, spec: STachometer) -> None:
         super().__init__(
-            {
-                **datapath_members(spec),
-                "coming": In(1),
-                "next_count": In(signed(spec.widths.count)),
-                "stalled": Out(1),
-            }
+            {**datapath_members(spec), "coming": In(1), "next_count": In(signed(spec.widths.count)), "stalled": Out(1)}
         )
         self._spec = spec
         self.alteration = AlterationDetector(spec.widths.count, seldom=spec.latency.serial)

@@ -35,12 +35,7 @@ class TimedDatapath(wiring.Component):
         self.quotient_velocity = QuotientVelocity(spec)
         if not spec.form.on_lattice:
             self.count_way = CountWay(reversals=not spec.paper_exact)
-        super().__init__(
-            {
-                **datapath_members(spec),
-                **({} if spec.form.on_lattice else {"step_before": In(signed(2))}),
-            }
-        )
+        super().__init__({**datapath_members(spec), **({} if spec.form.on_lattice else {"step_before": In(signed(2))})})
 
     @property
     def probes(self) -> dict[str, Value]:

@@ -129,10 +129,7 @@ class LowPass(wiring.Component):
         with m.If(adding):
             m.d.sync += y.eq((update.velocity << extra) + d)
         with m.If(rounding):
-            m.d.sync += [
-                filtered.eq(update),
-                filtered.velocity.eq((y + (1 << (extra - 1))) >> extra),
-            ]
+            m.d.sync += [filtered.eq(update), filtered.velocity.eq((y + (1 << (extra - 1))) >> extra)]
 
     def _factors(self, m: Module, take: Signal, interval: Signal) -> list[Signal]:
         """Return E of each table, valid in the clock after `take` and held until the next."""

@@ -113,12 +113,7 @@ class Gains:
 
 
 # What the parameters are called where they are given.
-_CALLED = {
-    "position": "kp",
-    "velocity": "kv",
-    "coulomb": "friction",
-    "driver_seconds": "driver_time",
-}
+_CALLED = {"position": "kp", "velocity": "kv", "coulomb": "friction", "driver_seconds": "driver_time"}
 
 
 def _more_than_0(what: object, *names: str) -> None:

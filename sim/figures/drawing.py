@@ -62,9 +62,7 @@ def draw(result: Result) -> Figure:
     FigureCanvasAgg(figure)
     for number, panel in enumerate(result.panels):
         lower = height - _TOP - (number + 1) * panel_height - number * _GAP
-        axes = figure.add_axes(
-            (_LEFT / _WIDTH, lower / height, 1 - (_LEFT + _RIGHT) / _WIDTH, panel_height / height),
-        )
+        axes = figure.add_axes((_LEFT / _WIDTH, lower / height, 1 - (_LEFT + _RIGHT) / _WIDTH, panel_height / height))
         _panel(axes, panel)
     figure.suptitle(f"{result.source}: {result.title}", y=1 - 0.1 / height, fontsize=10)
     figure.text(0.5, 1 - 0.33 / height, textwrap.shorten(result.settings, 140), ha="center", va="top", fontsize=7.5)

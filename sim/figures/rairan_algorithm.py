@@ -148,12 +148,7 @@ def fig3(lab: Lab) -> Result:
         "speed estimation and relative error for the proposed algorithm",
         "Table 1 to the letter, dt = 2520 ts, constant speeds",
         (
-            Panel(
-                "",
-                speed_label,
-                "ω_m1/ω_lim",
-                (Curve("$n_1$", speed, n1), Curve("ω", speed, speed, "reference")),
-            ),
+            Panel("", speed_label, "ω_m1/ω_lim", (Curve("$n_1$", speed, n1), Curve("ω", speed, speed, "reference"))),
             Panel(
                 "",
                 speed_label,

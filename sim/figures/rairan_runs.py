@@ -202,9 +202,7 @@ def _errors(lab: Lab, spec: RairanTachometer, speeds: FloatArray, limit: float, 
             rairan_eq08_sup_error(found.n2[settled]),
             rairan_eq13_max_error(found.n1[settled]),
         )
-        rows.append(
-            [(e.mean(), e.max(), np.max(e / bound)) for e, bound in zip(each, bounds, strict=True)],
-        )
+        rows.append([(e.mean(), e.max(), np.max(e / bound)) for e, bound in zip(each, bounds, strict=True)])
         low, high = found.n2[settled] / (1 + slack), found.n1[settled] / (1 - slack)
         within_ts.append(bool(np.all((low <= speed / limit) & (speed / limit <= high))))
     mean, greatest, of_bound = np.array(rows).transpose(2, 1, 0)

@@ -205,11 +205,7 @@ def fig12(lab: Lab) -> Result:
                 told("M/T"),
                 bool(rms["M/T"][0] < rms["M"][0] / 2 and rms["M/T"][1] > rms["M"][1] / 2),
             ),
-            Claim(
-                "S: high resolution in all speed ranges",
-                told("S"),
-                bool(max(rms["S"]) < rms["M"][1] / 2),
-            ),
+            Claim("S: high resolution in all speed ranges", told("S"), bool(max(rms["S"]) < rms["M"][1] / 2)),
             Claim(
                 "the deviation of S depends on the velocity and corresponds to Fig. 7",
                 f"updates less mean speeds over their windows: within Q_V, eq. (18), in {100 * within:.1f} %, in all "

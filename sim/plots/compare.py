@@ -24,11 +24,7 @@ def save_comparison(
 
 
 def _draw(
-    spec: TachometerSpec,
-    curves: list[Curve],
-    scores: list[Score],
-    instants: FloatArray,
-    true_speed: TrueSpeed | None,
+    spec: TachometerSpec, curves: list[Curve], scores: list[Score], instants: FloatArray, true_speed: TrueSpeed | None
 ) -> Figure:
     heights = {"velocity": 2.6} | ({curve.name: 0.55 for curve in curves} if true_speed else {})
     figure, panels = place_panels(spec, heights, "Comparison")

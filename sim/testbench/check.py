@@ -126,12 +126,7 @@ def _is_manifest(path: Path) -> bool:
 
 
 def check(
-    path: Path,
-    make: Make,
-    *,
-    simulation: bool = True,
-    netlists: Sequence[Path] = (),
-    waves: Path | None = None,
+    path: Path, make: Make, *, simulation: bool = True, netlists: Sequence[Path] = (), waves: Path | None = None
 ) -> Checked:
     """Make the core of a manifest again, and compare its files and its behaviour with what lies beside the manifest.
 

@@ -30,11 +30,7 @@ class Model:
             more = int(8 * counts * (1 + self._spec.bound.edge_error))
             return round_quotient(8 * total + more, 8 * length, self._spec.widths.native_frac_bits, towards)
 
-        columns = {
-            "velocity": quotient(0, 0),
-            "interval": length,
-            "forced": np.zeros(len(m_e), dtype=np.bool_),
-        }
+        columns = {"velocity": quotient(0, 0), "interval": length, "forced": np.zeros(len(m_e), dtype=np.bool_)}
         if self._spec.bounds:
             columns |= {name: quotient(one, one) for name, one in BOUNDS.items()}
             columns["bounds_valid"] = np.arange(len(m_e)) >= n

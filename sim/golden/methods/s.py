@@ -97,11 +97,7 @@ class Model:
             more = int(8 * counts * (1 + spec.bound.edge_error))
             return round_quotient(8 * numerator + whole * more, 8 * whole * m_s, spec.widths.native_frac_bits, towards)
 
-        columns = {
-            "velocity": quotient(0, 0),
-            "interval": m_s,
-            "forced": forced,
-        }
+        columns = {"velocity": quotient(0, 0), "interval": m_s, "forced": forced}
         if spec.bounds:
             columns |= {name: quotient(one, one) for name, one in BOUNDS.items()}
             columns["bounds_valid"] = np.arange(len(i)) > 0

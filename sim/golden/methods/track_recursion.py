@@ -91,16 +91,7 @@ class Recursion:
     # The recursion.
 
     def tick(
-        self,
-        number: int,
-        times: int,
-        places: int,
-        last: int,
-        moved: int,
-        kind: int,
-        down: int,
-        end: int,
-        length: int,
+        self, number: int, times: int, places: int, last: int, moved: int, kind: int, down: int, end: int, length: int
     ) -> Row:
         """Take a tick; velocity, place relative to the position, the deviation to be expected, acceleration."""
         k, bits = self._k, self._form.time_bits

@@ -25,12 +25,7 @@ _RIDGE = 1e-12  # of the normal equations: edges with one timestamp do not make 
 
 
 def least_squares(
-    steps: Steps,
-    period_s: float,
-    edges: int = 16,
-    order: int = 2,
-    timeout_s: float = 0.1,
-    clock_s: float = 1e-7,
+    steps: Steps, period_s: float, edges: int = 16, order: int = 2, timeout_s: float = 0.1, clock_s: float = 1e-7
 ) -> Estimate:
     """Return a polynomial of time through the latest edges by least squares; its slope at the reading is the speed.
 
