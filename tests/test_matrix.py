@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.nightly import only
+from support.nightly import nightly
 from support.verilog import LintingVerilator
 
 from tachometry.sim.encoder.stress import stress
@@ -14,24 +14,40 @@ from tachometry.sim.studies.lockstep import lockstep
 from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.spec import METHODS
 
-CORES = [words for method in METHODS for words in configurations(method)]
 # A build takes seconds, a motion milliseconds: as many motions as these numbers allow are played on every core. What is
 # played on few of them is so short that the compiler need not optimise.
 MOTIONS, CLOCKS, EDGES = 50, 2_000_000, 50
 FEW_MOTIONS, FEW_CLOCKS = 10, 300_000
 
 
+PARTS = 8  # which can be played beside each other
+
+
+def few(method: str) -> tuple[str, ...]:
+    """Return the first core with ticks of 3 clocks, whose motions are short; the tracking method has only long ones."""
+    return next(words for words in configurations(method) if method == "track" or "3clk" in words)
+
+
 # A build takes seconds, so that one core of each method is enough here; all options meet in `make test-all`.
-FEW = [configurations(method)[3] for method in METHODS]
+@pytest.mark.parametrize("method", METHODS)
+def test_options_of_one_core(method: str, tmp_path: Path) -> None:
+    check(few(method), tmp_path, FEW_MOTIONS, FEW_CLOCKS)
 
 
-@pytest.mark.parametrize("words", only(FEW, CORES), ids=" ".join)
-def test_every_pair_of_options(words: tuple[str, ...], tmp_path: Path) -> None:
+@nightly
+@pytest.mark.parametrize("part", range(PARTS))
+@pytest.mark.parametrize("method", METHODS)
+def test_every_pair_of_options(method: str, part: int, tmp_path: Path) -> None:
+    for place, words in enumerate(configurations(method)[part::PARTS]):
+        check(words, tmp_path / str(place), MOTIONS, CLOCKS)
+
+
+def check(words: tuple[str, ...], folder: Path, motions: int, left: int) -> None:
+    folder.mkdir(exist_ok=True)
     spec = spec_of(words)
     trace = stress(spec, 1, 300 if spec.timing.tick_cycles < 100 else 200)
-    motions, left = (FEW_MOTIONS, FEW_CLOCKS) if words in FEW else (MOTIONS, CLOCKS)
     n_clocks = trace.n_clocks + min(left, motions * stress(spec, 2, EDGES).n_clocks)
-    verilator = LintingVerilator(tmp_path, few=n_clocks < 500_000)
+    verilator = LintingVerilator(folder, few=n_clocks < 500_000)
     engine: CompiledEngine = verilator
     if trace.n_clocks > 2e7:  # which would take Verilator long
         verilator.text(Design(spec, list(spec.ports.pins)))
@@ -41,8 +57,8 @@ def test_every_pair_of_options(words: tuple[str, ...], tmp_path: Path) -> None:
     # All that the configuration can show has happened.
     actual, updates = found.actual, found.actual.updates
     # Long windows and what waits for the filter give few updates.
-    few = {"--min-time", "--lowpass"} & {*words}
-    assert np.count_nonzero(~updates.forced) > (5 if few else 100)
+    rare = {"--min-time", "--lowpass"} & {*words}
+    assert np.count_nonzero(~updates.forced) > (5 if rare else 100)
     if "--paper-exact" not in words:
         assert spec.method == "m" or np.count_nonzero(updates.forced) > 1
     assert actual.ticks.stalled.any()
