@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping, Sequence
 from functools import singledispatch
 from importlib.resources import files
@@ -122,8 +123,9 @@ def usual_motion(spec: TachometerSpec, seed: int = 1, most: int = _MOVING) -> Re
     """Return fast and slow, forward, backward and back over the index, with jitter and illegal transitions, then at
     rest.
 
-    It moves for at most so many clocks. The rest outlasts the maximum time, so that the core reads zero, unless that
-    takes as many as a million clocks for 160,000 of them.
+    With a compare output it goes over its first positions before that. It moves for at most so many clocks. The rest
+    outlasts the maximum time, so that the core reads zero, unless that takes as many as a million clocks for 160,000 of
+    them.
     """
     bounces = spec.filter_clocks and spec.encoder.sensor in ("quadrature", "pulses", "hall")
     encoder = VirtualEncoder.of(
@@ -136,7 +138,31 @@ def usual_motion(spec: TachometerSpec, seed: int = 1, most: int = _MOVING) -> Re
         index=spec.index,
         index_state=spec.index_place,
     )
-    return encoder.record(parse_motion(_usual_form(spec, most, backward=seed % 2 == 0))).recording
+    usual = _usual_form(spec, most, backward=seed % 2 == 0)
+    return encoder.record(parse_motion("+".join([*_to_compare(spec, 5 * most), usual]))).recording
+
+
+def _fastest(spec: TachometerSpec) -> float:
+    """Return counts per tick that the lines can have: an edge in two clocks, slower with a filter."""
+    edges = 12 if spec.encoder.sensor == "hall" else 8
+    return spec.timing.tick_cycles * spec.encoder.decoding / edges / (1 + spec.filter_clocks)
+
+
+def _to_compare(spec: TachometerSpec, longest: int) -> list[str]:
+    """Return segments over the first three positions of the compare output, if that takes no more clocks."""
+    if spec.compare is None:
+        return []
+    apart, most = spec.compare.apart, _fastest(spec)
+    start, more = spec.compare.start, 3 + abs(spec.compare.start) // 16  # since illegal transitions lose counts
+    ahead = start - int(math.copysign(more, apart))  # whence it is reached in its direction
+    ways = [ahead, start + 2 * apart + int(math.copysign(more, apart)) - ahead]
+    seconds = [abs(way) / most * float(spec.timing.tick_seconds) for way in ways]
+    if sum(seconds) * spec.timing.clock_hz > longest:
+        return []
+    speed = most * spec.scale.unit_velocity
+    return [
+        f"constant:{math.copysign(speed, way)}rad/s:{lasts}s" for way, lasts in zip(ways, seconds, strict=True) if way
+    ]
 
 
 def _usual_form(spec: TachometerSpec, longest: int, *, backward: bool) -> str:
@@ -144,8 +170,7 @@ def _usual_form(spec: TachometerSpec, longest: int, *, backward: bool) -> str:
     cycles, clock_hz = spec.timing.tick_cycles, spec.timing.clock_hz
     moving = max(min(longest, _MOST_TICKS * cycles), _FEWEST_TICKS * cycles)
     standing = min(5 * longest, cycles * (8 * spec.timing.max_ticks // 5 + 10))
-    # Counts per tick that the lines can have: an edge in two clocks, slower with a filter.
-    most = cycles * spec.encoder.decoding / (12 if spec.encoder.sensor == "hall" else 8) / (1 + spec.filter_clocks)
+    most = _fastest(spec)
     part = moving / 8 / clock_hz
 
     def speed(counts_per_tick: float) -> str:

@@ -41,9 +41,15 @@ class Compare:
         """Read START:STEP:COUNT:WIDTH, such as 100:100:50:10us, with :forward or :backward behind it, or neither."""
         found = _FORM.fullmatch(text.strip().lower())
         if found is None:
-            form = "must be START:STEP:COUNT:WIDTH, such as 100:100:50:10us, maybe with :backward at the end"
+            form = (
+                "must be START:STEP:COUNT:WIDTH, such as 100:100:50:10us, or 100:100:50:10us:backward for positions "
+                "that go down by STEP"
+            )
             raise ParameterError(what, f"{form}, not {text!r}")
         start, step, count, width, direction = found.groups()
+        if re.fullmatch(r"[\d.]+", width):
+            typed = text.strip().lower().replace(f":{count}:{width}", f":{count}:{width}us")
+            raise ParameterError(what, f"must have a WIDTH with a unit: type {typed}, or clk for clocks, not {text!r}")
         return cls(int(start), int(step), int(count), width, direction == "backward")
 
     def __str__(self) -> str:

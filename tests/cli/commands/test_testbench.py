@@ -14,8 +14,11 @@ import pytest
 from support.nightly import nightly, only
 
 from tachometry.cli.main import main
+from tachometry.sim import golden
+from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.testbench.vectors import usual_motion
 from tachometry.spec import Encoder, STachometer, Timing
+from tachometry.spec.core.compare import Compare
 from tachometry.spec.language.provenance import notice
 
 SMALL = "--ppr 8 --clock 1MHz --tick 8us --max-time 160us"
@@ -158,6 +161,16 @@ def test_usual_motion_stays_short_for_every_timing() -> None:
         recording = usual_motion(spec)
         assert 3 * cycles <= recording.duration * 48e6 <= 1_000_000 + 4 * cycles
         assert len(recording.time) <= 100_000
+
+
+@pytest.mark.parametrize("asked", ["-2000:500:0:10us", "300:100:0:1us:backward"])
+def test_usual_motion_goes_over_the_positions_of_compare(asked: str) -> None:
+    compare = Compare.parse("compare", asked)
+    spec = STachometer(encoder=Encoder(500, 4), timing=Timing.parse(), compare=compare)
+    run = golden.run(spec, PinTrace.of(usual_motion(spec), spec))
+    assert run.tables["compare_valid"].compare_position[:3].tolist() == [
+        compare.start + k * compare.apart for k in range(3)
+    ]
 
 
 def test_own_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
