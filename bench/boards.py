@@ -26,10 +26,7 @@ HEADS = ("board", "cells", "Fmax (MHz)", "clock (MHz)", "processor time (s)")
 def figures(name: str, folder: Path) -> tuple[str, ...]:
     """Build a bitstream with the command, and read what it prints: a row of the table.
 
-    Raises
-    ------
-    RuntimeError
-        If it cannot be built.
+    It raises RuntimeError if it cannot be built.
     """
     command = Path(sysconfig.get_path("scripts")) / "tachometry"
     begun = _processor_time()

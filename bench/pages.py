@@ -22,10 +22,7 @@ def write(page: Path, text: str) -> None:
 def write_block(page: Path, name: str, part: str) -> None:
     """Replace what a page has between the marks `<!-- NAME -->` and `<!-- end of NAME -->`.
 
-    Raises
-    ------
-    ValueError
-        If the page does not have these marks once.
+    It raises ValueError if the page does not have these marks once.
     """
     begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->\n"
     before, rest = page.read_text(encoding="utf-8").split(begin)

@@ -40,10 +40,7 @@ DEVICES = {**TARGETS, "ECP5-85F": LARGEST}
 def verilog_of(files: Sequence[Path], top: str) -> str:
     """Return the sources as one Verilog text; VHDL files are given in the order in which they are to be analysed.
 
-    Raises
-    ------
-    RuntimeError
-        If GHDL is missing or refuses the files.
+    It raises RuntimeError if GHDL is missing or refuses the files.
     """
     vhdl = [str(file.resolve()) for file in files if file.suffix.lower() in VHDL]
     texts = [file.read_text(encoding="utf-8") for file in files if file.suffix.lower() not in VHDL]

@@ -25,10 +25,7 @@ def lay_out() -> None:
 def build() -> str:
     """Build the site; what Zensical has said.
 
-    Raises
-    ------
-    RuntimeError
-        If it has a warning, such as a dead link.
+    It raises RuntimeError if it has a warning, such as a dead link.
     """
     lay_out()
     words = [str(Path(sys.executable).with_name("zensical")), "build", "--clean", "--strict"]

@@ -33,10 +33,7 @@ class NoCompiler(OSError):
 def find_compiler() -> tuple[str, ...] | None:
     """Return the compiler that `CXX` names, or the system's, or that of the package ziglang; None if there is none.
 
-    Raises
-    ------
-    NoCompiler
-        If there is none by the name of `CXX`.
+    It raises NoCompiler if there is none by the name of `CXX`.
     """
     if given := os.environ.get("CXX", "").strip():
         try:
@@ -85,10 +82,7 @@ def _is_gcc() -> bool:
 def run(command: Sequence[str | Path], what: str, folder: Path | None = None, text: str = "") -> str:
     """Run a tool on an input; its output.
 
-    Raises
-    ------
-    OSError
-        If it fails, with the line that says why.
+    It raises OSError if it fails, with the line that says why.
     """
     done = run_tool(list(map(str, command)), folder, text)
     if done.returncode:
@@ -150,12 +144,8 @@ def cache_folder() -> Path:
     be.
 
     Where there is none that can be written, a folder that ends with this process. It has code that this process runs:
-    it must be the user's, and nobody else may write to it.
-
-    Raises
-    ------
-    OSError
-        If TACHOMETRY_CACHE names one that cannot be written; if another user owns the folder, or can write to it.
+    it must be the user's, and nobody else may write to it. It raises OSError if TACHOMETRY_CACHE names one that cannot
+    be written; if another user owns the folder, or can write to it.
     """
     given = os.environ.get("TACHOMETRY_CACHE")
     folder = Path(given).absolute() if given else platformdirs.user_cache_path("tachometry")

@@ -144,10 +144,7 @@ def _with_tick(
 def _able(given: Mapping[str, str]) -> tuple[list[str], list[str]]:
     """Return methods that have all of these options, the best first, and the options that not all of the best have.
 
-    Raises
-    ------
-    ParameterError
-        If there is no such method.
+    It raises ParameterError if there is no such method.
     """
 
     def has(method: str, name: str) -> bool:
@@ -201,10 +198,7 @@ def _of_method(method: str, texts: Mapping[str, str]) -> TachometerSpec:
 def of_options(options: Mapping[str, str]) -> AnySpec:
     """Return the core that `options` describe, of one axis, of many or with a loop: those of a core or of a manifest.
 
-    Raises
-    ------
-    ParameterError
-        If they are not those of a core.
+    It raises ParameterError if they are not those of a core.
     """
     texts = dict(options)
     axes, parallel, loop = (texts.pop(name, "no") for name in ("axes", "parallel", "loop"))

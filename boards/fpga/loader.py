@@ -25,10 +25,7 @@ def command(board: Board, file: Path, flash: bool) -> list[str]:
 def load(board: Board, file: Path, flash: bool) -> str:
     """Load a bitstream; what openFPGALoader has said.
 
-    Raises
-    ------
-    ToolError
-        If openFPGALoader or its libraries are missing, or there is no board, or it fails.
+    It raises ToolError if openFPGALoader or its libraries are missing, or there is no board, or it fails.
     """
     done = run_tool(command(board, file, flash))
     said = done.stdout + done.stderr
@@ -45,10 +42,7 @@ def load(board: Board, file: Path, flash: bool) -> str:
 def bitstream(board: Board, place: Path) -> Path:
     """Return the bitstream that a path means: a file, or the only one for the board in a folder.
 
-    Raises
-    ------
-    ValueError
-        If it is that of another board, or there is none or several.
+    It raises ValueError if it is that of another board, or there is none or several.
     """
     if not place.exists():
         raise ValueError(f"FILE must be a bitstream that exists, not {str(place)!r}")

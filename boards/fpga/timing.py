@@ -23,10 +23,7 @@ class TimingError(ValueError):
 def slowest_clock(report: Mapping[str, Any], clock_hz: int) -> float:
     """Return Fmax in MHz of the slowest clock in a report of nextpnr.
 
-    Raises
-    ------
-    TimingError
-        If a clock is too slow, or was held against another frequency than this, or there is none.
+    It raises TimingError if a clock is too slow, or was held against another frequency than this, or there is none.
     """
     clocks: Mapping[str, Mapping[str, float]] = report.get("fmax", {})
     if not clocks:
@@ -43,10 +40,7 @@ def slowest_clock(report: Mapping[str, Any], clock_hz: int) -> float:
 def check_hold(log: str) -> None:
     """Check that no data come too early, in a log of nextpnr.
 
-    Raises
-    ------
-    TimingError
-        If there is a violation that is one, or one that is not listed, or cannot be read.
+    It raises TimingError if there is a violation that is one, or one that is not listed, or cannot be read.
     """
     counted = sum(map(int, _COUNTED.findall(log)))
     judged = 0

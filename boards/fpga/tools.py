@@ -34,10 +34,7 @@ def find(name: str) -> str:
 def run(command: Sequence[str], folder: Path) -> None:
     """Run a program in a folder; it sees nothing above it (YoWASP).
 
-    Raises
-    ------
-    ToolError
-        If it is missing or fails, with the first line that tells of an error, or the last one.
+    It raises ToolError if it is missing or fails, with the first line that tells of an error, or the last one.
     """
     done = run_tool([find(command[0]), *command[1:]], folder)
     if done.returncode:

@@ -30,11 +30,8 @@ def component(spec: TachometerSpec | LoopSpec, bus: Bus) -> wiring.Component:
 def described(spec: TachometerSpec | LoopSpec, bus: Bus, board: Board, name: str) -> dict[str, Any]:
     """Return the manifest of what `component` makes for a board.
 
-    Raises
-    ------
-    ParameterError
-        If the gains of a loop are fixed; if `name` cannot be the name of a module; if the clock cannot make the bits of
-        the bus.
+    It raises ParameterError if the gains of a loop are fixed; if `name` cannot be the name of a module; if the clock
+    cannot make the bits of the bus.
     """
     found = {**entries(), **demo_manifest(demo_map(spec), bus, name)}
     ports = {port["name"] for port in found["ports"]}

@@ -72,10 +72,7 @@ class DemoBoard:
     def stream(self, ticks: int) -> None:
         """Ask for telemetry every so many ticks; 0: for none.
 
-        Raises
-        ------
-        ValueError
-            If there are more of them than the register holds.
+        It raises ValueError if there are more of them than the register holds.
         """
         if not 0 <= ticks < 1 << PERIOD_WIDTH:
             raise ValueError(f"ticks must be from 0 to {(1 << PERIOD_WIDTH) - 1}, not {ticks}")

@@ -28,10 +28,7 @@ Fields = dict[str, int]
 def emulator_settings(spec: TachometerSpec, words: Iterable[str]) -> Fields:
     """Return fields of the demo's registers from words such as `speed=100rad/s`.
 
-    Raises
-    ------
-    ValueError
-        If a word is none of these, or its value cannot be set.
+    It raises ValueError if a word is none of these, or its value cannot be set.
     """
     found: Fields = {}
     for word in words:

@@ -84,10 +84,7 @@ def watch(
 ) -> None:
     """Show and record telemetry until it is stopped, or for so many seconds of the board.
 
-    Raises
-    ------
-    TimeoutError
-        If none has come in this time.
+    It raises TimeoutError if none has come in this time.
     """
     heard = looked = time.monotonic()
     over = False

@@ -109,10 +109,7 @@ def _working(what: str) -> AbstractContextManager[None]:
 def run(args: Sequence[str]) -> int:
     """Run a command line; its exit status.
 
-    Raises
-    ------
-    Refused
-        If it is wrong, or cannot be done here.
+    It raises Refused if it is wrong, or cannot be done here.
     """
     if instruction := os.environ.get(_COMPLETE):
         return shell_complete(cli, {}, "tachometry", _COMPLETE, instruction)

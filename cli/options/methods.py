@@ -66,10 +66,7 @@ def shown_name(name: str, spec: TachometerSpec) -> str:
 def listed_methods(text: str, others: Collection[str] = ()) -> list[tuple[str, str | None, Texts]]:
     """Return what is in a list with commas: each with its method, None of `others`, and what is given of its options.
 
-    Raises
-    ------
-    ValueError
-        If a name is not known.
+    It raises ValueError if a name is not known.
     """
     methods: list[tuple[str, str | None, Texts]] = []
     for name in (word.strip() for word in text.split(",")):

@@ -277,10 +277,7 @@ def take_texts(spec: type[Any], given: dict[str, Any]) -> dict[str, str]:
 def refuse_without(needed: str, options: Sequence[Callable[[Any], Any]]) -> None:
     """Check that none of some options is given to the running command: without another one they have no effect.
 
-    Raises
-    ------
-    ValueError
-        If one is.
+    It raises ValueError if one is.
     """
     context = click.get_current_context()
     command = click.Command(None)

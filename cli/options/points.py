@@ -190,12 +190,7 @@ def _fill(
 ) -> None:
     """Add the points of all methods at all values; with `everything`, a method that cannot be is left out.
 
-    `alone`: where there is one method and no axis, an error names neither.
-
-    Raises
-    ------
-    ValueError
-        If a point cannot be.
+    `alone`: where there is one method and no axis, an error names neither. It raises ValueError if a point cannot be.
     """
     for name, method, given in listed:
         assert method is not None

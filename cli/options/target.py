@@ -79,10 +79,7 @@ class Target:
 def target_of(port: str, core: CoreTexts, manifest: Path | None) -> Target:
     """Return the board at a port: of `sim:NAME` one with this core, of a serial port that of a manifest.
 
-    Raises
-    ------
-    ValueError
-        If there is none, its core cannot be, or its manifest is not that of a demo on a UART.
+    It raises ValueError if there is none, its core cannot be, or its manifest is not that of a demo on a UART.
     """
     if not port.startswith(SIMULATED):
         return _attached(port, core, manifest)

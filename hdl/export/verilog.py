@@ -26,10 +26,7 @@ _LED = re.compile(r"\\port\$(\d+)\$(\d+) ")
 def bundled_yosys() -> Iterator[None]:
     """Have Amaranth take the Yosys that is a package, whatever else is installed.
 
-    Raises
-    ------
-    OSError
-        If it fails, with the line that says why.
+    It raises OSError if it fails, with the line that says why.
     """
     yosys = "javascript" if sys.platform == "emscripten" else "builtin"  # a browser runs no process
     with patch.dict(os.environ, AMARANTH_USE_YOSYS=yosys):

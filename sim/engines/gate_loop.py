@@ -58,10 +58,7 @@ class Through:
 class GateLoop:
     """Runs a core with a control loop in gates about a motor; it is compiled once.
 
-    Raises
-    ------
-    NoCompiler
-        If there is no C++ compiler.
+    It raises NoCompiler if there is no C++ compiler.
     """
 
     def __init__(self, spec: LoopSpec) -> None:
@@ -79,10 +76,7 @@ class GateLoop:
         """Return a run as long as the course, from rest: the columns of a log as of `LoopSimulation.run`, and what went
         through.
 
-        Raises
-        ------
-        ValueError
-            If there were more edges than can be held.
+        It raises ValueError if there were more edges than can be held.
         """
         spec, form = self._spec, self._spec.form
         names = [port.name for port in self._design.outputs]

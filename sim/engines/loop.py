@@ -236,12 +236,8 @@ class LoopSimulation:
     ) -> Log:
         """Return a run as long as the course, from rest: a column of values at times `log` seconds apart for each name.
 
-        The motor goes on in steps of `step` seconds, or from event to event.
-
-        Raises
-        ------
-        ValueError
-            If the shaft runs away.
+        The motor goes on in steps of `step` seconds, or from event to event. It raises ValueError if the shaft runs
+        away.
         """
         return self.call(motor, edges, self._controller(gains), course, log, step, None)
 

@@ -48,10 +48,8 @@ class AxesTrace:
     def placed(cls, recordings: Sequence[Recording], spec: AxesSpec) -> AxesTrace:
         """Return what the pins of a core see of a recording for each axis.
 
-        Raises
-        ------
-        ValueError
-            If there are too many clocks to be told apart, or more than `MAX_TICKS` ticks, those of all axes together.
+        It raises ValueError if there are too many clocks to be told apart, or more than `MAX_TICKS` ticks, those of all
+        axes together.
         """
         for recording in recordings:
             check_ticks(recording.duration, spec.tachometer, MAX_TICKS // spec.axes, f" of each of {spec.axes} axes")

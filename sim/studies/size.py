@@ -143,10 +143,7 @@ def made(
 ) -> list[Any]:
     """Return what is in the JSON files that commands make of some files; kept, see `sim.build.cached`.
 
-    Raises
-    ------
-    RuntimeError
-        If a command fails.
+    It raises RuntimeError if a command fails.
     """
 
     def make(folder: Path) -> Path:
@@ -165,12 +162,7 @@ def made(
 def call(folder: Path, command: Sequence[str]) -> None:
     """Run a tool of this environment; it sees nothing above the folder (YoWASP).
 
-    The report of a placement that cannot be routed is empty.
-
-    Raises
-    ------
-    RuntimeError
-        If it fails.
+    The report of a placement that cannot be routed is empty. It raises RuntimeError if it fails.
     """
     program = Path(sys.executable).with_name(command[0])
     longest = LONGEST_ROUTE if "--seed" in command else None
@@ -199,12 +191,7 @@ def measure_core(
 ) -> Measurement:
     """Synthesise, pack and route a core for a target, and add its latency.
 
-    `ports` are those of the module, if it has others than the core.
-
-    Raises
-    ------
-    RuntimeError
-        If a tool fails.
+    `ports` are those of the module, if it has others than the core. It raises RuntimeError if a tool fails.
     """
     between = wrapper(tuple(ports) or spec.ports)
     found = measure_verilog(verilog, CORE, between, target, tools, seeds)
@@ -223,12 +210,7 @@ def measure_verilog(
     """Synthesise, pack and route a module for a target; what has been measured is not measured again.
 
     `between` is its wrapper, and `prepare` are passes of Yosys before the synthesis. Without seeds nothing is routed:
-    there is no Fmax.
-
-    Raises
-    ------
-    RuntimeError
-        If a tool fails.
+    there is no Fmax. It raises RuntimeError if a tool fails.
     """
     files = {"core.v": verilog, "wrapper.v": between, **({"after.py": target.after} if target.after else {})}
 

@@ -104,10 +104,7 @@ class Checked:
 def manifests(places: Sequence[Path]) -> list[Path]:
     """Return the manifests of cores in folders and below them, or files as they are named.
 
-    Raises
-    ------
-    ValueError
-        If there is none in one of them.
+    It raises ValueError if there is none in one of them.
     """
     found: list[Path] = []
     for place in places:

@@ -2,7 +2,9 @@
 
 Every function is vectorised: arguments are broadcast against each other, and the result has their shape, float64.
 Estimates n are in units of ω_lim = 1/(pul·dt): n1 = 1/Ndt1 at low speeds, Nep1 at high ones. Relative errors are
-fractions of the speed, where the paper prints them in per cent. What is out of range raises ValueError.
+fractions of the speed, where the paper prints them in per cent. A `speed` ω is more than 0, in the unit of its
+`speed_limit` ω_lim; `pulses_per_rev` is pul; dt is in seconds where no other unit is named. What is out of range raises
+ValueError.
 
 Low and high are told apart by the estimate, which is known, not by the speed, which is not: n1 ≤ 1 is low. So ω_lim
 itself, where n1 = 1, is low, with n2 = ½; eqs. (5) and (6) to the letter would make it high, with n2 = 0.
@@ -37,12 +39,6 @@ def rairan_eq01_update_time(speed: ArrayLike, speed_limit: ArrayLike, dt: ArrayL
 
     Below ω_lim it is the time between two pulses. It joins the values of `rairan_update_time` at the multiples of ω_lim
     by straight lines.
-
-    Parameters
-    ----------
-    speed : ω > 0, in the unit of `speed_limit`
-    speed_limit : ω_lim
-    dt : in any unit
     """
     ratio = positive("speed", speed) / positive("speed_limit", speed_limit)
     whole = np.maximum(np.floor(ratio), 1)
@@ -55,12 +51,6 @@ def rairan_update_time(speed: ArrayLike, speed_limit: ArrayLike, dt: ArrayLike) 
     A window begins with a pulse and takes dt; the first pulse later than that begins the next. Below ω_lim, where
     ⌊r⌋ = 0, it is the time between two pulses. At the multiples of ω_lim a pulse that comes with the end of dt belongs
     to no window; where it is taken into the next one, the time is dt.
-
-    Parameters
-    ----------
-    speed : ω > 0, in the unit of `speed_limit`
-    speed_limit : ω_lim
-    dt : in any unit
     """
     ratio = positive("speed", speed) / positive("speed_limit", speed_limit)
     return (np.floor(ratio) + 1) / ratio * positive("dt", dt)
@@ -99,10 +89,7 @@ def rairan_eq05_n2(n1: ArrayLike) -> Floats:
 def rairan_eq06_n2(n_ep1: ArrayLike, n_dt1: ArrayLike) -> Floats:
     """Compute eq. (6) of Rairán 2013: lower estimate n2 = Nep1/(Ndt1 + 1) if Nep1 = 1, else (Nep1 − 1)/Ndt1.
 
-    Parameters
-    ----------
-    n_ep1 : pulses in dt, Nep1
-    n_dt1 : dt between pulses, Ndt1; one of both is 1, else ValueError
+    Nep1 are pulses in dt, Ndt1 dt between pulses; one of both is 1, else ValueError.
     """
     n_ep1, n_dt1 = at_least("n_ep1", n_ep1, 1), at_least("n_dt1", n_dt1, 1)
     if np.any((n_ep1 > 1) & (n_dt1 > 1)):
@@ -165,12 +152,6 @@ def rairan_eq14_max_acceleration(n1: ArrayLike, pulses_per_rev: ArrayLike, dt: A
     rev/s².
 
     At low speeds it is (Ndt1 + 1)/2 times what `rairan_max_acceleration` finds by the same argument.
-
-    Parameters
-    ----------
-    n1 : upper estimate
-    pulses_per_rev : pul
-    dt : in seconds
     """
     n1 = _regime_n1(n1)
     n_dt1 = 1 / n1
@@ -183,12 +164,6 @@ def rairan_max_acceleration(n1: ArrayLike, pulses_per_rev: ArrayLike, dt: ArrayL
 
     ω_lim/(2·dt) at high speeds, where windows are shorter than 2·dt, as eq. (14) of Rairán 2013; at low ones, where
     they take up to (Ndt1 + 1)·dt, ω_lim/(dt·Ndt1·(Ndt1 + 1)²), Ndt1 = 1/n1.
-
-    Parameters
-    ----------
-    n1 : upper estimate
-    pulses_per_rev : pul
-    dt : in seconds
     """
     n1 = _regime_n1(n1)
     n_dt1 = 1 / n1

@@ -2,8 +2,9 @@
 
 Every function is vectorised: arguments are broadcast against each other, and the result has their shape, float64.
 Throughout, `counts_per_rev` is P and `tick_seconds` is T_s in seconds, both greater than 0; velocities and resolutions
-are in rad/s, measurement times in seconds, m_s and n in ticks, at least 1, whole or mean. What is out of range raises
-ValueError.
+are in rad/s, measurement times in seconds, m_s, n and m_c = T_c/T_s in ticks, at least 1, whole or mean. A `speed` is ω
+in rad/s, of either sign. A `pulse_sum` is Σ m_e(i−j) over j from 0 to m_s − 1 in counts: with the closing tick of the
+window, without the opening one. What is out of range raises ValueError.
 """
 
 import math
@@ -51,15 +52,7 @@ def tsuji_eq05_measurement_time(tick_seconds: ArrayLike) -> Floats:
 def tsuji_eq06_velocity(
     pulse_sum: ArrayLike, n: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike
 ) -> Floats:
-    """Compute eq. (6) of Tsuji 2009: velocity of the M method with averaging.
-
-    Parameters
-    ----------
-    pulse_sum : counts, Σ_{j=0}^{n−1} m_e(i−j)
-    n : ticks
-    counts_per_rev : P
-    tick_seconds : T_s in seconds
-    """
+    """Compute eq. (6) of Tsuji 2009: velocity of the M method with averaging."""
     return _mean_velocity(pulse_sum, at_least("n", n, 1), counts_per_rev, tick_seconds)
 
 
@@ -98,13 +91,8 @@ def tsuji_eq11_measurement_time(m_s: ArrayLike, tick_seconds: ArrayLike) -> Floa
 def tsuji_eq12_interval(speed: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
     """Compute eq. (12) of Tsuji 2009: mean m_s = ω_u/|ω| of the T method in ticks; infinite at standstill.
 
-    A single m_s is one of the two integers beside it. Above ω_u it is less than 1, and the method fails.
-
-    Parameters
-    ----------
-    speed : ω in rad/s, of either sign; the printed form is for ω > 0
-    counts_per_rev : P
-    tick_seconds : T_s in seconds
+    A single m_s is one of the two integers beside it. Above ω_u it is less than 1, and the method fails. The printed
+    form is for ω > 0.
     """
     with np.errstate(divide="ignore"):
         return unit_velocity(counts_per_rev, tick_seconds) / np.abs(np.asarray(speed, dtype=np.float64))
@@ -113,15 +101,7 @@ def tsuji_eq12_interval(speed: ArrayLike, counts_per_rev: ArrayLike, tick_second
 def tsuji_eq13_velocity(
     pulse_sum: ArrayLike, m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike
 ) -> Floats:
-    """Compute eq. (13) of Tsuji 2009: velocity of the M/T method, whose windows begin and end at ticks with a count.
-
-    Parameters
-    ----------
-    pulse_sum : counts, Σ_{j=0}^{m_s−1} m_e(i−j)
-    m_s : ticks
-    counts_per_rev : P
-    tick_seconds : T_s in seconds
-    """
+    """Compute eq. (13) of Tsuji 2009: velocity of the M/T method, whose windows begin and end at ticks with a count."""
     return _mean_velocity(pulse_sum, at_least("m_s", m_s, 1), counts_per_rev, tick_seconds)
 
 
@@ -132,14 +112,6 @@ def tsuji_eq14_resolution(
 
     Errors are less. The first term is the supremum for the time, uncertain by less than a tick at either end; the
     second is that for the counts when m_s = m_c, and more than it in longer windows.
-
-    Parameters
-    ----------
-    pulse_sum : counts of one direction, |Σ m_e| ≥ 1
-    m_s : ticks
-    m_c : ticks, T_c/T_s
-    counts_per_rev : P
-    tick_seconds : T_s in seconds
     """
     counts = at_least("|pulse_sum|", np.abs(pulse_sum), 1)
     by_time = counts * _interval_resolution(m_s, counts_per_rev, tick_seconds)
@@ -157,13 +129,6 @@ def tsuji_eq16_interval(speed: ArrayLike, m_c: ArrayLike, counts_per_rev: ArrayL
 
     x counts come in T_c; the window ends with the first one later than that. The printed form lacks the factor m_c: it
     is the time in units of T_c. Infinite at standstill.
-
-    Parameters
-    ----------
-    speed : ω in rad/s, of either sign
-    m_c : ticks, T_c/T_s
-    counts_per_rev : P
-    tick_seconds : T_s in seconds
     """
     m_c = at_least("m_c", m_c, 1)
     speed = np.abs(np.asarray(speed, dtype=np.float64))
@@ -175,15 +140,7 @@ def tsuji_eq16_interval(speed: ArrayLike, m_c: ArrayLike, counts_per_rev: ArrayL
 def tsuji_eq17_velocity(
     pulse_sum: ArrayLike, m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike
 ) -> Floats:
-    """Compute eq. (17) of Tsuji 2009: velocity of the S method, whose windows end at pulse alterations.
-
-    Parameters
-    ----------
-    pulse_sum : counts, Σ_{j=0}^{m_s−1} m_e(i−j)
-    m_s : ticks
-    counts_per_rev : P
-    tick_seconds : T_s in seconds
-    """
+    """Compute eq. (17) of Tsuji 2009: velocity of the S method, whose windows end at pulse alterations."""
     return _mean_velocity(pulse_sum, at_least("m_s", m_s, 1), counts_per_rev, tick_seconds)
 
 
@@ -201,14 +158,7 @@ def tsuji_eq19_measurement_time(m_s: ArrayLike, tick_seconds: ArrayLike) -> Floa
 
 
 def tsuji_eq20_interval(speed: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """Compute eq. (20) of Tsuji 2009: mean m_s = 1/|ω/ω_u − ⌊ω/ω_u + ½⌋| in ticks; infinite at multiples of ω_u.
-
-    Parameters
-    ----------
-    speed : ω in rad/s, of either sign
-    counts_per_rev : P
-    tick_seconds : T_s in seconds
-    """
+    """Compute eq. (20) of Tsuji 2009: mean m_s = 1/|ω/ω_u − ⌊ω/ω_u + ½⌋| in ticks; infinite at multiples of ω_u."""
     units = np.asarray(speed, dtype=np.float64) / unit_velocity(counts_per_rev, tick_seconds)
     with np.errstate(divide="ignore"):
         return 1 / np.abs(units - np.floor(units + 0.5))
@@ -224,17 +174,8 @@ def tsuji_eq21_velocity(
 ) -> Floats:
     """Compute eq. (21) of Tsuji 2009: velocity of the S method with alternate alterations cancelled.
 
-    The pulse numbers at both ends of the window count by one half: eq. (17)'s sum, half the opening more, half the
-    closing less.
-
-    Parameters
-    ----------
-    pulse_sum : counts, Σ_{j=0}^{m_s−1} m_e(i−j), as in eq. (17): with the closing tick, without the opening one
-    opening : counts, m_e(i−m_s)
-    closing : counts, m_e(i)
-    m_s : ticks
-    counts_per_rev : P
-    tick_seconds : T_s in seconds
+    The pulse numbers at both ends of the window count by one half: eq. (17)'s sum, half the opening m_e(i−m_s) more,
+    half the closing m_e(i) less.
     """
     counts = np.asarray(pulse_sum) + (np.asarray(opening) - np.asarray(closing)) / 2
     return _mean_velocity(counts, at_least("m_s", m_s, 1), counts_per_rev, tick_seconds)
@@ -245,15 +186,7 @@ def tsuji_eq22_low_pass(
 ) -> Floats:
     """Compute eq. (22) of Tsuji 2009: output y = y_0 + (1 − e^(−G·m_s·T_s))·(u − y_0) of the LPF after m_s ticks.
 
-    Exact for an input that is constant meanwhile.
-
-    Parameters
-    ----------
-    u : input, in any unit
-    y_0 : output before, in the unit of `u`
-    m_s : ticks
-    cutoff : G in rad/s, greater than 0
-    tick_seconds : T_s in seconds
+    It is exact for an input u that is constant meanwhile; y_0 is the output before, and G the cutoff in rad/s.
     """
     exponent = positive("cutoff", cutoff) * _duration("m_s", m_s, tick_seconds)
     y_0 = np.asarray(y_0, dtype=np.float64)

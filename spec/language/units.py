@@ -208,10 +208,7 @@ def parse_time(what: str, text: str) -> Fraction:
 class _Frequency:
     """Reads hertz in a text such as `48MHz`, a whole number; a plain number is hertz, if it can be nothing else.
 
-    Raises
-    ------
-    ParameterError
-        If the text is no frequency, or not a positive whole number of hertz.
+    It raises ParameterError if the text is no frequency, or not a positive whole number of hertz.
     """
 
     def __call__(self, what: str, text: str | int) -> int:

@@ -50,10 +50,7 @@ class Bus:
     def bit_cycles(self, clock_hz: int) -> int:
         """Return clocks of a bit on a line without a clock.
 
-        Raises
-        ------
-        ParameterError
-            If no whole number of clocks is near enough, or a bit would be too short to be sampled.
+        It raises ParameterError if no whole number of clocks is near enough, or a bit would be too short to be sampled.
         """
         cycles = max((2 * clock_hz + self.baud) // (2 * self.baud), _FEWEST_BIT_CYCLES)
         if abs(clock_hz - cycles * self.baud) * _BAUD_TOLERANCE > cycles * self.baud:
@@ -64,10 +61,7 @@ class Bus:
     def ports(self, registers: RegisterMap) -> tuple[Port, ...]:
         """Return ports that it adds to a core with these registers.
 
-        Raises
-        ------
-        ParameterError
-            If its frames do not reach all of them.
+        It raises ParameterError if its frames do not reach all of them.
         """
         words = 1 << self.address_bits
         if self.address_bits and len(registers.registers) >= words:
@@ -205,11 +199,8 @@ BUSES = {
 def bus_of(name: str, baud: int | None = None, *, irq: bool = False) -> Bus | None:
     """Return the bus of a name, with these bits a second if they are given, and an interrupt; None for `none`.
 
-    Raises
-    ------
-    ParameterError
-        If there is none of this name, or it has no bits a second of its own; if they are none; if there is an
-        interrupt without a bus.
+    It raises ParameterError if there is none of this name, or it has no bits a second of its own; if they are none; if
+    there is an interrupt without a bus.
     """
     if name != "none" and name not in BUSES:
         raise ParameterError("bus", f"must be one of none, {', '.join(BUSES)}, not {name!r}")
@@ -244,10 +235,7 @@ def registers_on(spec: AnySpec, bus: Bus) -> RegisterMap:
 def manifest_on(registers: RegisterMap, bus: Bus, name: str = "tachometer") -> dict[str, Any]:
     """Return the manifest of a core on a bus.
 
-    Raises
-    ------
-    ParameterError
-        If `name` cannot be the name of a module; if the clock cannot make the bits of the bus.
+    It raises ParameterError if `name` cannot be the name of a module; if the clock cannot make the bits of the bus.
     """
     ports = bus.ports(registers)
     if name in {port.name for port in ports}:

@@ -129,10 +129,7 @@ def demo_ports(registers: DemoMap, bus: Bus) -> tuple[Port, ...]:
 def demo_manifest(registers: DemoMap, bus: Bus, name: str = "tachometer") -> dict[str, Any]:
     """Return the manifest of a demo on a bus.
 
-    Raises
-    ------
-    ParameterError
-        If `name` cannot be the name of a module; if the clock cannot make the bits of the bus.
+    It raises ParameterError if `name` cannot be the name of a module; if the clock cannot make the bits of the bus.
     """
     ports = demo_ports(registers, bus)
     if name in {port.name for port in ports}:

@@ -131,10 +131,7 @@ def answer_length(request: bytes) -> int:
 def decode_answer(request: bytes, frame: bytes) -> Answer:
     """Return what the core has answered to a request.
 
-    Raises
-    ------
-    FrameError
-        If it is no answer, damaged, or that to another request.
+    It raises FrameError if it is no answer, damaged, or that to another request.
     """
     body = _checked(frame)
     length = answer_length(request)
@@ -185,10 +182,7 @@ def spi_write(address: int, data: int) -> bytes:
 def decode_spi(sent: bytes, received: bytes) -> Answer:
     """Return what came back over SPI while whole words of a read or a write were sent.
 
-    Raises
-    ------
-    FrameError
-        If a byte of status is none.
+    It raises FrameError if a byte of status is none.
     """
     if len(received) != len(sent):
         raise FrameError(f"as many bytes must be received as are sent, {len(sent)}, not {len(received)}")

@@ -47,10 +47,8 @@ _OF_OTHERS = frozenset(
 def check_module_name(name: str) -> str:
     """Return `name`, if it can be the name of a Verilog module, of an entity of VHDL, and of files.
 
-    Raises
-    ------
-    ValueError
-        If it is no plain identifier, or a keyword of Verilog or of SystemVerilog, in which the smoke test is written.
+    It raises ValueError if it is no plain identifier, or a keyword of Verilog or of SystemVerilog, in which the smoke
+    test is written.
     """
     if name in _KEYWORDS:
         raise ParameterError("name", f"must not be a Verilog keyword, which {name!r} is")
@@ -69,10 +67,7 @@ def described_port(port: Port) -> dict[str, Any]:
 def manifest(spec: AnySpec, name: str = "tachometer") -> dict[str, Any]:
     """Return all that a program or a driver must know of the exported core.
 
-    Raises
-    ------
-    ValueError
-        If `name` cannot be the name of a module.
+    It raises ValueError if `name` cannot be the name of a module.
     """
     if name in {port.name for port in spec.ports}:
         raise ParameterError("name", f"must not be that of a port, which {name!r} is")

@@ -64,10 +64,7 @@ TARGETS = {
 def bus_for(target: str, bus: str | None) -> str:
     """Return the bus of a core for this target, which may be `none`; None stands for whatever the target needs.
 
-    Raises
-    ------
-    ParameterError
-        If there is no such target, or it needs another bus.
+    It raises ParameterError if there is no such target, or it needs another bus.
     """
     if target != "none" and target not in TARGETS:
         raise ParameterError("target", f"must be one of none, {', '.join(TARGETS)}, not {target!r}")

@@ -112,10 +112,7 @@ class Readings(NamedTuple):
 def read(steps: Steps, period_s: float) -> Readings:
     """Return readings at `period_s`, twice that, ..., up to the end.
 
-    Raises
-    ------
-    ValueError
-        If the period (s) is not more than 0, or there were more than `MAX_TICKS` readings.
+    It raises ValueError if the period (s) is not more than 0, or there were more than `MAX_TICKS` readings.
     """
     if not period_s > 0:
         raise ValueError(f"control period must be more than 0 s, not {period_s} s")
@@ -133,10 +130,7 @@ def read(steps: Steps, period_s: float) -> Readings:
 def clocks(seconds: FloatArray, clock_s: float, period_s: float) -> IntArray:
     """Return what a clock of `clock_s` (s) shows at some times; a time within rounding of a clock edge is at the edge.
 
-    Raises
-    ------
-    ValueError
-        If the clock is not shorter than the control period.
+    It raises ValueError if the clock is not shorter than the control period.
     """
     if not 0 < clock_s < period_s:
         raise ValueError(f"clock must be more than 0 s and shorter than the control period, not {clock_s} s")

@@ -195,12 +195,8 @@ class _Trial:
     def tuned(self, specs: Specs) -> tuple[dict[str, TachometerSpec | None], dict[str, int]]:
         """Return the methods, in place of each baseline and of M/T without options its best setting.
 
-        Returns them, and the number of settings that were tried, by the name of the best.
-
-        Raises
-        ------
-        ValueError
-            If a method has no setting that can be.
+        Returns them, and the number of settings that were tried, by the name of the best. It raises ValueError if a
+        method has no setting that can be.
         """
         found: dict[str, TachometerSpec | None] = {}
         n_tried = {}
@@ -220,10 +216,7 @@ class _Trial:
         """Return what all settings of each method cost, and the RMS speed (rad/s) of the motion, with which delays were
         measured.
 
-        Raises
-        ------
-        ValueError
-            If the shaft does not move.
+        It raises ValueError if the shaft does not move.
         """
         speed = float(np.sqrt(np.mean(self.true_speed(self.instants) ** 2)))
         if not speed:

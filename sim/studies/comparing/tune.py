@@ -53,12 +53,8 @@ def core_settings(method: str) -> list[tuple[str, dict[str, str]]]:
 def possible(curves: Iterable[Callable[[], Curve]]) -> Iterable[Curve]:
     """Return curves of all settings that can be.
 
-    A setting can be wrong for a core or an encoder, or have periods that are too long for the motion.
-
-    Raises
-    ------
-    ValueError
-        If there is none: that of the last setting.
+    A setting can be wrong for a core or an encoder, or have periods that are too long for the motion. It raises
+    ValueError if there is none: that of the last setting.
     """
     refused, n_found = None, 0
     for make in curves:
@@ -76,10 +72,7 @@ def possible(curves: Iterable[Callable[[], Curve]]) -> Iterable[Curve]:
 def best(curves: Iterable[Curve], instants: FloatArray, true_speed: TrueSpeed) -> Curve:
     """Return the curve with the least RMS error at some instants (s), those before its first value left out.
 
-    Raises
-    ------
-    ValueError
-        If no curve has a value by then.
+    It raises ValueError if no curve has a value by then.
     """
     truth = true_speed(instants)
     found, least = None, np.inf

@@ -231,10 +231,7 @@ _simulation_of.register(LoopSpec, GateLoop)
 def in_gates(setting: Setting) -> Setting:
     """Return the same loop with its controller in gates; products are formed bit by bit where that is fast enough.
 
-    Raises
-    ------
-    ParameterError
-        If it is none that there is in gates.
+    It raises ParameterError if it is none that there is in gates.
     """
     gains = setting.gains
     for name, wrong in (

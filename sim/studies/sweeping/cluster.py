@@ -50,12 +50,8 @@ def cluster(scheduler: str | None, jobs: int | None) -> Iterator[Client]:
     """Yield a client of a scheduler, or, without an address, of so many processes here, by default one for each core.
 
     Whoever may talk to a Dask scheduler or worker may run Python there. The processes here talk to nobody else: by TLS,
-    with certificates that are made for them and only live in their memory.
-
-    Raises
-    ------
-    OSError
-        If the scheduler does not answer.
+    with certificates that are made for them and only live in their memory. It raises OSError if the scheduler does not
+    answer.
     """
     import dask
     from distributed import Client, LocalCluster, Security

@@ -73,10 +73,7 @@ def _code() -> str:
 def run_packed(code: str, packed: bytes) -> Row:
     """Return the row of a pickled point, on any machine with the same code: the figures of `FIGURES`, and `point`.
 
-    Raises
-    ------
-    OtherCode
-        If the code here is not that which is meant.
+    It raises OtherCode if the code here is not that which is meant.
     """
     if code != _code():
         raise OtherCode(f"{platform.node()} has another one")
