@@ -1,19 +1,16 @@
 """The package itself: its version, and `python -m tachometry`."""
 
 import importlib.metadata
-import inspect
 import re
 import subprocess
 import sys
 import tomllib
-from dataclasses import fields
 from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
 
 import tachometry
-from tachometry.spec import METHODS
 
 ROOT = Path(__file__).parent.parent
 
@@ -45,13 +42,3 @@ def test_constraints_are_what_pyproject_allows() -> None:
         needed += [Requirement(text) for extra in one.extras if one.name == "tachometry" for text in extras[extra]]
         for version in pinned[one.name] if one.name != "tachometry" else ():
             assert one.specifier.contains(version), (str(one), version)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_docstrings_have_inherited_parameters(method: str) -> None:
-    text = inspect.getdoc(METHODS[method])
-    assert text is not None
-    assert text.count("\nParameters\n----------\n") == 1
-    for field in fields(METHODS[method]):
-        assert text.count(f"\n{field.name} : ") == 1, field.name
-    assert text.index(": Encoder\n") < (text + "\n\nRaises\n------\n").index("\n\nRaises\n------\n")

@@ -22,7 +22,6 @@ from tachometry.spec.core.timing import Timing, parse_clocks, parse_filter
 from tachometry.spec.core.widths import Widths
 from tachometry.spec.core.words import Words
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS, parse_lsb
-from tachometry.spec.language.docstrings import with_inherited
 from tachometry.spec.language.option import Option, option, options_of, parse_whole
 from tachometry.spec.language.port import Port, Ports
 from tachometry.spec.language.units import FRACTION, Quantity, Speed, parse_bandwidth, parse_speed, written_time
@@ -266,9 +265,6 @@ class TachometerSpec:
     latency = cached_property(Latency["TachometerSpec"])
     recovery = cached_property(Recovery["TachometerSpec"])
     words = cached_property(Words["TachometerSpec"])
-
-    def __init_subclass__(cls) -> None:
-        cls.__doc__ = with_inherited(cls.__doc__, cls.__base__.__doc__ if cls.__base__ else None)
 
     def __post_init__(self) -> None:
         check(self)

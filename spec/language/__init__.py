@@ -1,1 +1,1 @@
-"""In what a spec is written: options, quantities with units, ports, docstrings."""
+"""In what a spec is written: options, quantities with units, ports."""

@@ -363,11 +363,6 @@ for _where in ("form.py: ControlForm._most_error_of_gains", "coefficients.py: co
     _argue(f"spec/control/{_where}", "A gain has one coefficient.", "0 → -1 #2")
 _argue("spec/registers/emulator.py: ", "Any of the random bits does.", *("3 → 4 #2", "22 → 23"))
 _argue(
-    "spec/language/docstrings.py: with_inherited",
-    "The heading is then taken for a name, which no parameter has.",
-    "1 → 0",
-)
-_argue(
     "hdl/export/registers/rdl.py: described",
     "The end of a line is a space to who reads it.",
     *("108 → 109", "108 → 107"),
