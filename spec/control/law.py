@@ -40,27 +40,12 @@ class _Filter:
 class Law(Motor):
     """Says how position and velocity are controlled, and how disturbances are observed.
 
+    A value out of range raises ParameterError.
+
     Parameters
     ----------
     tachometer : TachometerSpec
         Of any method.
-    position_gain, velocity_gain : Fraction
-        k_p in 1/s² and k_v in 1/s.
-    observer : Fraction
-        G_dis in rad/s.
-    velocity_filter : Fraction or None
-        G_v in rad/s. 0: y is the velocity. None: G_dis, but 0 with method track.
-    current_limit : Fraction
-        In A.
-    control_period : int or None
-        Clocks between two control ticks. None: a tick.
-    synchronised : bool
-        Filter and observer work at the updates of the velocity, as in Fig. 11, not at every control tick, as in Fig. 2.
-
-    Raises
-    ------
-    ParameterError
-        If a parameter is out of range.
     """
 
     tachometer: TachometerSpec

@@ -39,22 +39,8 @@ _LIMIT = 2  # to hold the sum within few bits, and within the limit
 class LoopSpec(Law):
     """A tachometer with a disturbance observer and a controller of position and velocity; see `ControlForm`.
 
-    Parameters
-    ----------
-    current_width : int
-        Bits of `current`.
-    multiplier : str
-        `serial`: a bit a clock; `parallel`: a product at once, for which tools take multipliers of the FPGA.
-    command : str
-        `ports`: position, velocity and acceleration are commanded from outside; `generator`: the core makes them, see
-        `GeneratorForm`.
-    gains : str
-        `fixed`, or `inputs`, which a bus makes registers.
-
-    Raises
-    ------
-    ParameterError
-        If a parameter is out of range, the program is longer than the period, or a format is too wide.
+    It raises ParameterError if a parameter is out of range, the program is longer than the period, or a format is too
+    wide.
     """
 
     current_width: int = option(16, "Bits of current, 8 to 24.", metavar="N", group=_GROUP)

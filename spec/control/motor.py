@@ -11,15 +11,7 @@ _GROUP = "Loop"
 
 @dataclass(frozen=True, kw_only=True)
 class Motor:
-    """Describes the motor as its controller knows it.
-
-    Parameters
-    ----------
-    inertia : Fraction
-        J in kg m².
-    torque_constant : Fraction
-        K_t in Nm/A.
-    """
+    """Describes the motor as its controller knows it."""
 
     inertia: Fraction = option(  # noqa: RUF009
         None, "Inertia J of motor and load, in kg m².", text="0.003", metavar="J", group=_GROUP, parse=Quantity(PLAIN)

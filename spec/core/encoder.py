@@ -51,24 +51,7 @@ def _inverted(what: str, text: str) -> str:
 class Encoder:
     """An incremental encoder, or another sensor of motion, and how its edges are counted.
 
-    Parameters
-    ----------
-    pulses_per_rev : int
-        Periods of one line in a revolution (PPR, also called lines or cycles per revolution); of halls, pole pairs.
-    decoding : int
-        Counts per period. Of quadrature: 4 (every edge), 2 (both edges of A) or 1 (A while B is low). Of pulses: 2
-        (every edge) or 1 (rises). Of steps 1, of halls 6. Not given: the usual one of the sensor.
-    sensor : str
-        `quadrature`, `pulses`, `step-dir`, `up-down` or `hall`.
-    reverse : bool
-        What would be forward counts backward.
-    invert : str or None
-        Lines that are low where others are high, with commas between.
-
-    Raises
-    ------
-    ParameterError
-        If a parameter is out of range.
+    A value out of range raises ParameterError.
     """
 
     pulses_per_rev: int = option(

@@ -76,19 +76,7 @@ def _ticks(what: str, text: str, timing: Mapping[str, Any]) -> int:
 class Timing:
     """Clock, tick and maximum measurement time.
 
-    Parameters
-    ----------
-    clock_hz : int
-        Frequency of `clk` in Hz.
-    tick_cycles : int
-        T, clocks in a sampling period T_s; `parse` takes 20 µs, if it is not given.
-    max_ticks : int
-        Ticks after which an update is forced (Tsuji 2009, Sec. V-B: 10 ms, which `parse` takes, if it is not given).
-
-    Raises
-    ------
-    ParameterError
-        If a parameter is out of range.
+    A value out of range raises ParameterError.
     """
 
     clock_hz: int = option(

@@ -116,17 +116,8 @@ class MWords(Words["MTachometer"]):
 class MTachometer(TachometerSpec):
     """M-method tachometer: an update every tick, the mean pulse number of the last n ticks.
 
-    Velocity is eq. (6) of Tsuji 2009, in counts per tick, correctly rounded. Ticks before the first count as empty.
-
-    Parameters
-    ----------
-    average : int
-        n, ticks that are averaged.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of range.
+    Velocity is eq. (6) of Tsuji 2009, in counts per tick, correctly rounded. Ticks before the first count as empty. A
+    value out of range raises ParameterError.
     """
 
     average: int = option(1, "Ticks that are averaged, 1 to 256.", metavar="N", unit="ticks", tests=("", "2", "3", "8"))

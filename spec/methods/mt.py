@@ -76,20 +76,7 @@ class MTTachometer(TimedTachometer):
     """M/T-method tachometer: counts over the time from the first to the last of them, eq. (13) of Tsuji 2009.
 
     A window opens at a count, and closes at the first count later than T_c after that. The closing count opens the next
-    window. The velocity is in counts per tick, correctly rounded.
-
-    Parameters
-    ----------
-    min_time : int or None
-        T_c in clocks; None: a tick.
-    whole_cycles : bool
-        A window that has travelled a cycle of the lines in T_c stays open until it has travelled whole cycles, up to
-        twice T_c. Both of its ends are then edges of one kind, and errors of phase and duty cancel.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of range.
+    window. The velocity is in counts per tick, correctly rounded. A value out of range raises ParameterError.
     """
 
     min_time: int | None = option(

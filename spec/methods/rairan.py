@@ -231,24 +231,8 @@ class RairanTachometer(TachometerSpec):
 
     A window begins with a count. It lasts dt, which has Nep1 counts (high speeds, n1 = Nep1), or until the next count,
     Ndt1 whole dt later (low speeds, n1 = 1/Ndt1). Velocity is n1, n2 or n3 in counts per tick, dt being the tick,
-    correctly rounded. What it does at reversals and at rest is in docs/concepts/rairan.md.
-
-    Parameters
-    ----------
-    estimate : str
-        `n1`, the upper end of what the speed can be; `n2`, the lower; `n3`, eq. (11), their harmonic mean.
-    paper_exact : bool
-        Table 1 to the letter and nothing else: no direction, no standstill.
-    bound_decay : bool
-        Without a count the estimate falls with the time since the last one.
-    adaptive : Fraction or None
-        Target for the error of eq. (13): dt is doubled up to K times, but no more than the target needs. None: dt is
-        always the tick.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of range.
+    correctly rounded. What it does at reversals and at rest is in docs/concepts/rairan.md. A value out of range raises
+    ParameterError.
     """
 
     estimate: str = option(

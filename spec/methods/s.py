@@ -211,20 +211,8 @@ class SWords(Words["STachometer"]):
 class STachometer(TachometerSpec):
     """S-method tachometer: averages in step with the alterations of the pulse number.
 
-    Velocity is eq. (21) of Tsuji 2009, or eq. (17) without cancelling, in counts per tick, correctly rounded.
-
-    Parameters
-    ----------
-    cancel : bool
-        Cancel alternate pulse alterations: eq. (21) instead of eq. (17).
-    reciprocal_source : str
-        Where 1/m_s comes from if ticks leave the time: `serial`, a division, or `table`, a block RAM. Otherwise from
-        the other; and where ticks are too short for both, it is carried along.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of range.
+    Velocity is eq. (21) of Tsuji 2009, or eq. (17) without cancelling, in counts per tick, correctly rounded. A value
+    out of range raises ParameterError.
     """
 
     cancel: bool = option(True, "Cancel alternate pulse alterations, eq. (21), or average plainly, eq. (17).")

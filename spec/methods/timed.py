@@ -216,19 +216,7 @@ class TimedWords(Words[T]):
 class TimedTachometer(TachometerSpec):
     """A quotient of counts and time, by a serial divider; docs/concepts/timed.md has the rules of every case.
 
-    Parameters
-    ----------
-    timer : str
-        What times are counted in: `clock`, or `tick`, the lattice of the paper, where all counts of a tick are one.
-    bound_decay : bool
-        At ticks without a count, a speed beyond 1½ counts over the time since the last count becomes that.
-    paper_exact : bool
-        The published algorithm and nothing else: no decay, and a reversal is no special case.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of range.
+    A value out of range raises ParameterError.
     """
 
     timer: str = option("clock", "What times are counted in: clocks, or ticks as in the paper.", choices=_TIMERS)
