@@ -116,6 +116,11 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         wide = len(run.tables[WIDE]) if WIDE in run.tables else 0
         told = f"; wider than a period {wide} times" if wide else ""
         rows.append(("index", f"{len(run.index.clock)} times{last}{index_distance(axis)}{told}"))
+    if spec.wheel is not None:
+        synced = np.flatnonzero(run.ticks.synced)
+        when = format_time(spec.times.seconds(int(run.ticks.clock[synced[0]]))) if len(synced) else ""
+        lost = "" if run.ticks.synced[-1] or not when else ", and lost"
+        rows.append(("gap of the wheel", f"found within {when}{lost}" if when else "not found"))
     if spec.health:
         code, faults = run.ticks.health[-1], plural(int(run.ticks.faults[-1]), "fault")
         rows.append(("health", f"{faults}, first: {FAULT_TEXTS[code]}" if code else "no fault"))

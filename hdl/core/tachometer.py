@@ -52,7 +52,7 @@ class Tachometer(wiring.Component):
         self._spec = spec
         super().__init__(members(spec.ports))
         self.conditioner = InputConditioner(spec.filter_clocks, spec.lines)
-        self.decoder = decoder_of(spec.encoder)
+        self.decoder = decoder_of(spec.encoder, spec.wheel)
         self.pulse_counter = PulseCounter(
             max(spec.times.longest_tick, spec.widths.max_pulse_count),
             spec.widths.max_pulse_count,
@@ -144,6 +144,9 @@ class Tachometer(wiring.Component):
                 self.sampling_clock.tick_in.eq(self.tick_in),
                 self.tick_error.eq(self.sampling_clock.tick_error),
             ]
+        if self._spec.wheel is not None:
+            with m.If(self.pulse_counter.coming):
+                m.d.sync += self.synced.eq(self.decoder.synced)
         if self._spec.filter_clocks:
             m.d.comb += self.swallowed_edges.eq(self.conditioner.swallowed_edges)
         return m
@@ -238,7 +241,6 @@ class Tachometer(wiring.Component):
         m.submodules.index_capture = index = self.index_capture
         level, ready = self._index_level(m)
         m.d.comb += [
-            self.conditioner.z.eq(self.z),
             index.level_z.eq(level),
             index.ready.eq(ready),
             index.position.eq(self.position_counter.next),
@@ -248,9 +250,12 @@ class Tachometer(wiring.Component):
         ]
 
     def _index_level(self, m: Module) -> tuple[Value, Value]:
-        """Return Z as it is, or in its state alone, and whether it is real, as is the level before."""
+        """Return Z as it is, in its state alone, or of a gap, and whether it is real, as is the level before."""
         level: Value
         ready: Value
+        if self._spec.wheel is not None:
+            return self.decoder.index, self.decoder.ready
+        m.d.comb += self.conditioner.z.eq(self.z)
         level, ready = self._level("z"), self.conditioner.ready_z
         if self.index_state is not None:
             m.submodules.index_state = state = self.index_state

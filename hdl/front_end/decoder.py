@@ -4,8 +4,10 @@ from amaranth import Cat, Const, Module, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.front_end.tooth_wheel import GapFiller
 from tachometry.spec.core.encoder import Encoder
 from tachometry.spec.core.sensors import Levels, changes, packed_levels
+from tachometry.spec.core.tooth_wheel import ToothWheel
 
 
 class QuadratureDecoder(wiring.Component):
@@ -100,12 +102,16 @@ class SensorDecoder(wiring.Component):
         −1, 0 or +1.
     decode_error : Out(1)
         The lines did what they should not.
+    index, synced : Out(1)
+        Only with a wheel: see `GapFiller`.
     """
 
-    def __init__(self, encoder: Encoder) -> None:
+    def __init__(self, encoder: Encoder, wheel: ToothWheel | None = None) -> None:
         self._encoder = encoder
+        self._wheel = wheel
         lines = {f"level_{line}": In(1) for line in encoder.kind.lines}
-        super().__init__({**lines, "ready": In(1), "step": Out(signed(2)), "decode_error": Out(1)})
+        of_wheel = {"index": Out(1), "synced": Out(1)} if wheel else {}
+        super().__init__({**lines, "ready": In(1), "step": Out(signed(2)), "decode_error": Out(1), **of_wheel})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
@@ -129,6 +135,16 @@ class SensorDecoder(wiring.Component):
             with m.If(~illegal | ~self.ready):
                 m.d.sync += past.eq(level)
             wrong |= illegal & ~told
+        if self._wheel is not None:
+            m.submodules.gap_filler = filler = GapFiller(self._wheel)
+            m.d.comb += [
+                filler.tooth.eq(self.ready & (forward | backward)),
+                self.step.eq(Cat(filler.filled, filler.filled & encoder.reverse)),
+                self.decode_error.eq(filler.error),
+                self.index.eq(filler.index),
+                self.synced.eq(filler.synced),
+            ]
+            return m
         m.d.comb += [
             self.step.eq(Cat(self.ready & (forward | backward), self.ready & backward)),
             self.decode_error.eq(self.ready & wrong),
@@ -147,8 +163,8 @@ def _looked_up(pairs: set[tuple[Levels, Levels]], level: Value, past: Value) -> 
     return Const(bits, 1 << 2 * len(level)).bit_select(Cat(level, past), 1)
 
 
-def decoder_of(encoder: Encoder) -> QuadratureDecoder | SensorDecoder:
-    """Return the decoder of a sensor."""
+def decoder_of(encoder: Encoder, wheel: ToothWheel | None = None) -> QuadratureDecoder | SensorDecoder:
+    """Return the decoder of a sensor, and of a wheel of which teeth are missing."""
     if encoder.sensor == "quadrature":
         return QuadratureDecoder(encoder.decoding, reverse=encoder.reverse)
-    return SensorDecoder(encoder)
+    return SensorDecoder(encoder, wheel)

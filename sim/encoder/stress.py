@@ -5,6 +5,7 @@ from functools import singledispatch
 import numpy as np
 
 from tachometry.sim.encoder.imperfections import pulsed
+from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.axes import AxesTrace, Trace
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
@@ -51,6 +52,7 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
         level = levels[place % 6] if sensor.name == "hall" else quadrature(place)
         if sensor.name == "hall":
             level[rng.random(len(level)) < 0.01] = 7
+        level[VirtualEncoder.of(spec.encoder).absent(place)] = 0
     z = (rng.random(len(clock)) < 0.05).astype(np.uint8)
     if spec.index_state is not None:  # at times wider than a period
         z |= np.repeat(rng.random(len(clock) // 12 + 1) < 0.1, 12)[: len(clock)].astype(np.uint8)

@@ -106,6 +106,8 @@ class VirtualEncoder(EncoderOptions):
         It is mounted the other way round, so its lines are those of a shaft that turns backward.
     invert : str or None
         Lines that are low where others are high, with commas between.
+    missing_teeth : str or None
+        Of pulses, see `Encoder`: the last teeth of a turn are not there.
 
     Raises
     ------
@@ -120,11 +122,14 @@ class VirtualEncoder(EncoderOptions):
     index_state: int = 0
     reverse: bool = False
     invert: str | None = None
+    missing_teeth: str | None = None
 
     @classmethod
     def of(cls, encoder: Encoder, **values: Any) -> "VirtualEncoder":
         """Return the encoder that a core is made for, with these values of its other parameters."""
-        own: dict[str, Any] = {"sensor": encoder.sensor, "reverse": encoder.reverse, "invert": encoder.invert}
+        own = {name: getattr(encoder, name) for name in ("sensor", "reverse", "invert", "missing_teeth")}
+        if encoder.missing:  # its gap is the index
+            values["index"] = False
         return cls(encoder.pulses_per_rev, **own, **values)
 
     def __post_init__(self) -> None:
@@ -197,6 +202,7 @@ class VirtualEncoder(EncoderOptions):
         level = _halls()[turned % 6] if self.sensor == "hall" else quadrature(turned)
         if self.sensor == "pulses":
             level &= np.uint8(1)
+            level[self.absent(turned)] = 0
         if self.lost:
             level, n_lost = imperfections.lose_pulses(level, self.lost, self._stream(LOST))
         row = np.flatnonzero(np.append(True, level[1:] != level[:-1]))
@@ -209,6 +215,12 @@ class VirtualEncoder(EncoderOptions):
         else:
             times, level = time[row], level[row]
         return self._indexed(times, level, time, turned, duration), n_illegal, n_lost
+
+    def absent(self, quarter: IntArray) -> NDArray[np.bool_]:
+        """Tell which quarters belong to teeth that are not there."""
+        missing = Encoder(self.pulses_per_rev, sensor=self.sensor, missing_teeth=self.missing_teeth).missing
+        absent: NDArray[np.bool_] = quarter // 4 % self.pulses_per_rev >= self.pulses_per_rev - missing
+        return absent
 
     def _indexed(
         self, times: FloatArray, level: NDArray[np.uint8], at: FloatArray, quarter: IntArray, duration: float
@@ -275,10 +287,18 @@ class Encoding:
     def _pulses(self, decoding: int) -> FloatArray:
         """Return times at which line A alone counts, on an ideal line."""
         time, quarter = find_crossings(self._shaft, self.encoder.disc)
-        first = self.encoder.disc.quarter(self._shaft.angle(np.zeros(1)))
-        change = np.diff((quadrature(np.append(first, quarter)) & 1).astype(np.int8))
-        counted: FloatArray = time[change != 0 if decoding == 2 else change > 0]
-        return counted
+        quarter = np.append(self.encoder.disc.quarter(self._shaft.angle(np.zeros(1))), quarter)
+        turned = -quarter if self.encoder.reverse else quarter
+        change = np.diff((quadrature(turned) & 1).astype(np.int8))
+        rises = change != 0 if decoding == 2 else change > 0
+        counted: FloatArray = time[rises]
+        if self.encoder.missing_teeth is None:
+            return counted
+        # Those of the first gap that ends what two teeth have begun are not known to be missing yet.
+        absent = self.encoder.absent(turned[1:][rises])
+        seen = np.cumsum(~absent)
+        gap = absent & (seen >= 2)
+        return counted[~absent | (seen > seen[np.argmax(gap)] if gap.any() else gap)]
 
     def true_speed(self, t: ArrayLike) -> FloatArray:
         """Return speed of the shaft in rad/s, vibration included, at times `t` in seconds; of pulses, which do not tell

@@ -1,12 +1,13 @@
 """The golden front end turns sampled levels into steps, pulse numbers and positions."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.ordered import places
+from tachometry.sim.golden.tooth_wheel import Teeth, filled
 from tachometry.sim.signals.recording import PinTrace, merged, packed
 from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, TachometerSpec
@@ -134,11 +135,15 @@ class Steps:
     errors : int64 array
         Clocks in which `decode_error` is high.
     index : int64 array
-        Clocks in which Z rises; none without an index.
+        Clocks in which Z rises, or of the first teeth after a gap; none without an index.
     swallowed : int64 array
         Clocks in which the glitch filter has counted a glitch.
     changed : uint8 array, shape (n,)
         The lines that change in `clock`: 1 of A, 2 of B, 3 both.
+    wide : int64 array
+        Clocks in which Z meets its state a second time.
+    wheel : Teeth or None
+        Of a wheel with missing teeth, the teeth.
     """
 
     clock: NDArray[np.int64]
@@ -148,6 +153,7 @@ class Steps:
     swallowed: NDArray[np.int64]
     changed: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, dtype=np.uint8))
     wide: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    wheel: Teeth | None = None
 
 
 def together(
@@ -178,6 +184,8 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     at = clock + spec.latency.pin_to_count + (np.arange(len(clock)) == 0)
     changed = packed([line[1:] ^ line[:-1] for line in levels])
     rises = wide = at[:0]
+    if spec.wheel is not None:
+        return _without_gaps(spec, Steps(at[1:], step[1:], at[:0], rises, np.sort(np.concatenate(returned)) + 3), trace)
     if spec.index:
         at_z, z = conditioned("z")
         z = z ^ np.uint8("z" in encoder.inverted)
@@ -188,6 +196,15 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
         rises = at_z[1:][z[1:] > z[:-1]] + spec.latency.pin_to_count
     # Two clocks for the synchroniser, one for the counter of glitches.
     return Steps(at[1:], step[1:], at[wrong], rises, np.sort(np.concatenate(returned)) + 3, changed, wide)
+
+
+def _without_gaps(spec: TachometerSpec, steps: Steps, trace: PinTrace) -> Steps:
+    """Return the steps of a wheel with its missing teeth."""
+    assert spec.wheel is not None
+    teeth = filled(spec.wheel, steps.clock[steps.step != 0], trace.n_clocks)
+    index = teeth.index if spec.index else steps.index
+    step = np.full(len(teeth.clock), -1 if spec.encoder.reverse else 1)
+    return replace(steps, clock=teeth.clock, step=step, errors=teeth.errors, index=index, wheel=teeth)
 
 
 def in_state(spec: TachometerSpec, levels: Sequence[NDArray[np.uint8]]) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
@@ -287,5 +304,7 @@ def count(
         "overflow": overflow,
         "swallowed_edges": 2 * np.minimum(glitches, (1 << 15) - 1),
     }
+    if steps.wheel is not None:
+        columns["synced"] = steps.wheel.synced(strobe - 1)
     index = {"index_position": wrapped(spec, captured - origin[:-1])}
     return Table(strobe, columns), Table(steps.index + spec.latency.tick, index)

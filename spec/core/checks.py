@@ -34,6 +34,10 @@ def check(spec: TachometerSpec) -> None:
         raise ParameterError("filter_clocks", f"must be from 0 to {most} clocks, {longest}, not {spec.filter_clocks}")
     if spec.index_reset and not spec.index:
         raise ParameterError("index_reset", "must be given together with an index")
+    if "z" in spec.encoder.inverted and "z" not in spec.lines:
+        raise ParameterError("invert", "must not have z without --index, which makes the line z")
+    if spec.encoder.missing and spec.bounds:
+        raise ParameterError("bounds", "must not be given with --missing-teeth: teeth that are not there have no edges")
     _check_index_state(spec)
     _check_health(spec)
     if spec.compare is not None:
@@ -55,6 +59,8 @@ def _check_index_state(spec: TachometerSpec) -> None:
         raise ParameterError("index_at", "must be given together with an index")
     if not kind.cycle:
         raise ParameterError("index_at", f"must be edge for {kind.name}, whose levels are no place")
+    if spec.encoder.missing:
+        raise ParameterError("index_at", "must be left out with --missing-teeth, where a gap is the index")
     named = [word[0].lower() for word in spec.index_at.split(",")]
     if named != [*kind.lines] or state not in kind.cycle:
         states = " or ".join(

@@ -1,5 +1,6 @@
 """The incremental encoder, or another sensor of motion."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +11,7 @@ from tachometry.spec.language.option import REQUIRED, Option, ParameterError, op
 _GROUP = "Encoder"
 _MOST = 1 << 24  # counts
 _INVERTIBLE = ("a", "b", "c", "z")
+_MOST_MISSING = 4  # with more, a gap is too long to go by the speed before it
 _OF_TURN: dict[str, Any] = {"metavar": "N", "group": _GROUP, "parse": parse_whole}
 
 
@@ -45,6 +47,16 @@ def _inverted(what: str, text: str) -> str:
     if wrong := sorted(names - {*_INVERTIBLE}):
         raise ParameterError(what, f"must be of {', '.join(_INVERTIBLE)}, with commas between, not {wrong[0]!r}")
     return ",".join(name for name in _INVERTIBLE if name in names)
+
+
+def _wheel(what: str, text: str) -> str:
+    match = re.fullmatch(r"(\d{1,8})-(\d)", text.strip(), re.ASCII)
+    if match is None or not 1 <= int(match[2]) <= _MOST_MISSING or int(match[1]) - int(match[2]) < 3:
+        most = f"at most {_MOST_MISSING} of them missing and at least 3 there"
+        raise ParameterError(
+            what, f"must be the teeth of a full wheel less those missing, as 60-2, {most}, not {text!r}"
+        )
+    return f"{int(match[1])}-{match[2]}"
 
 
 @dataclass(frozen=True)
@@ -107,12 +119,23 @@ class Encoder:
         tests=("", "a"),
         tacit=True,
     )
+    missing_teeth: str | None = option(
+        None,
+        "Teeth of a full crank wheel less those missing in its gap (with --sensor pulses and --ppr N), as 60-2 or "
+        "36-1. From the second gap on the missing teeth count where they would be. With --index the first tooth after "
+        "a gap is the index, and there is no pin z. Output synced tells that the gap is where it should be.",
+        metavar="N-M",
+        group=_GROUP,
+        parse=_wheel,
+        tests=(),
+        tacit=True,
+    )
 
     def __post_init__(self) -> None:
         if self.sensor not in SENSORS:
             raise ParameterError("sensor", f"must be one of {', '.join(SENSORS)}, not {self.sensor!r}")
         if self.decoding is None:
-            object.__setattr__(self, "decoding", self.kind.decodings[0])
+            object.__setattr__(self, "decoding", 1 if self.missing_teeth else self.kind.decodings[0])
         self._check_decoding()
         if not 1 <= self.counts_per_rev <= _MOST:
             raise ParameterError(
@@ -122,6 +145,8 @@ class Encoder:
         if wrong := sorted(self.inverted - {*self.kind.lines, "z"}):
             lines = ", ".join((*self.kind.lines, "z"))
             raise ParameterError("invert", f"must be of {lines} for {self.sensor}, not {wrong[0]}")
+        if self.missing_teeth:
+            self._check_teeth(_wheel("missing_teeth", self.missing_teeth))
 
     def _check_decoding(self) -> None:
         if self.decoding in self.kind.decodings:
@@ -130,6 +155,21 @@ class Encoder:
             raise ParameterError("decoding", f"must be 1, 2 or 4, or x1, x2 or x4, not {self.decoding}")
         allowed = " or ".join(map(str, sorted(self.kind.decodings)))
         raise ParameterError("decoding", f"must be {allowed} for {self.sensor}, not {self.decoding}")
+
+    def _check_teeth(self, wheel: str) -> None:
+        if self.sensor != "pulses":
+            raise ParameterError("missing_teeth", f"must be given with --sensor pulses, not {self.sensor}")
+        if self.decoding != 1:
+            raise ParameterError(
+                "decoding", f"must be 1 with --missing-teeth, one count for a tooth, not {self.decoding}"
+            )
+        if (teeth := int(wheel.split("-")[0])) != self.pulses_per_rev:
+            raise ParameterError("missing_teeth", f"must be of --ppr, {self.pulses_per_rev} teeth, not of {teeth}")
+
+    @property
+    def missing(self) -> int:
+        """Teeth that are missing in a row, 0 for none."""
+        return int(self.missing_teeth.split("-")[1]) if self.missing_teeth else 0
 
     @property
     def kind(self) -> Sensor:

@@ -18,11 +18,12 @@ BOUNDS = {"velocity_lower": -1, "velocity_upper": 1}
 
 def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
     """Return all ports of a core, in the order of the exported module; those of options and methods come last."""
+    place = "the first tooth after a gap" if spec.encoder.missing else "the rising edge of z"
     return (
         pin("clk", "Clock; all outputs change at its rising edge."),
         pin("rst", "Synchronous reset, active high."),
         *(pin(line, help) for line, help in zip(spec.encoder.kind.lines, spec.encoder.kind.pins, strict=True)),
-        *_if(spec.index, pin("z", "Index line, asynchronous; its rising edge captures the position.")),
+        *_if("z" in spec.lines, pin("z", "Index line, asynchronous; its rising edge captures the position.")),
         *_if(
             spec.external_tick,
             pin("tick_in", "External tick, asynchronous; its rising edge ends a sampling period."),
@@ -58,7 +59,7 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
         ),
         strobe(
             "decode_error",
-            f"One clock: {wrong}" if (wrong := spec.encoder.kind.wrong) else "Never high: one line cannot be wrong.",
+            f"One clock: {wrong}" if (wrong := _wrong(spec)) else "Never high: one line cannot be wrong.",
         ),
         held(TICK, "overflow", help="pulse_count was saturated at the maximum speed; position is exact all the same."),
         held(
@@ -84,8 +85,17 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
         ),
         *own,
         *_if(
+            spec.encoder.missing,
+            held(TICK, "synced", help="The gap of the wheel was found, and the latest one was where it had to be."),
+        ),
+        *_if(
             spec.index,
-            strobe(INDEX, "One clock for every rising edge of z; with --index-at, for every rise of z in its state."),
+            strobe(
+                INDEX,
+                "One clock for every first tooth after a gap."
+                if spec.encoder.missing
+                else "One clock for every rising edge of z; with --index-at, for every rise of z in its state.",
+            ),
         ),
         *_if(
             spec.index_state,
@@ -101,7 +111,7 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
                 *(INDEX, "index_position", spec.position_width),
                 signed=True,
                 unit="counts",
-                help="Position at the rising edge of z, before any reset of the position.",
+                help=f"Position at {place}, before any reset of the position.",
             ),
         ),
         *_if(
@@ -128,6 +138,12 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
             ),
         ),
     )
+
+
+def _wrong(spec: TachometerSpec) -> str:
+    if spec.encoder.missing:
+        return "the gap was not where it had to be, as of a tooth lost or extra; the next gap is taken."
+    return spec.encoder.kind.wrong
 
 
 def _compare_ports(spec: TachometerSpec) -> Iterable[Port]:

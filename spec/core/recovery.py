@@ -12,9 +12,11 @@ class Recovery(Follows[S]):
 
     @property
     def clocks(self) -> int | None:
-        """Clocks after which all is right; None: the core has a low-pass filter, which forgets only gradually."""
+        """Clocks after which all is right; None: the core has a low-pass filter, which forgets only gradually, or a
+        wheel with a gap, which must come.
+        """
         spec = self.spec
-        if spec.lowpass is not None:
+        if spec.lowpass is not None or spec.wheel is not None:
             return None
         # What counts the ticks of a silence may have to begin anew.
         silence = ((1 << spec.timing.max_ticks.bit_length()) + 1) * spec.times.longest_tick

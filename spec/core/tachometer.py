@@ -19,6 +19,7 @@ from tachometry.spec.core.scale import Scale
 from tachometry.spec.core.sensors import EDGE, Levels, parse_state
 from tachometry.spec.core.times import Times
 from tachometry.spec.core.timing import Timing, parse_clocks, parse_filter
+from tachometry.spec.core.tooth_wheel import ToothWheel
 from tachometry.spec.core.widths import Widths
 from tachometry.spec.core.words import Words
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS, parse_lsb
@@ -272,7 +273,15 @@ class TachometerSpec:
     @property
     def lines(self) -> tuple[str, ...]:
         """Lines of the sensor, the index included."""
-        return (*self.encoder.kind.lines, "z") if self.index else self.encoder.kind.lines
+        of_index = ("z",) if self.index and not self.encoder.missing else ()  # a gap needs none
+        return (*self.encoder.kind.lines, *of_index)
+
+    @property
+    def wheel(self) -> ToothWheel | None:
+        """The wheel, if teeth of it are missing; they are as far apart as an update may take."""
+        if not (missing := self.encoder.missing):
+            return None
+        return ToothWheel(self.encoder.pulses_per_rev - missing, missing, (1 << self.times.longest.bit_length()) - 1)
 
     @property
     def index_state(self) -> Levels | None:

@@ -1,0 +1,144 @@
+"""Wheels with missing teeth: the gap does not show, wherever the shaft begins and whatever it does."""
+
+from dataclasses import replace
+from pathlib import Path
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+from support.verilog import run_in_icarus
+
+from tachometry.hdl.front_end import decoder
+from tachometry.hdl.front_end.tooth_wheel import GapFiller
+from tachometry.sim import golden
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.stress import stress
+from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
+from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.golden.tooth_wheel import filled
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import Run
+from tachometry.sim.studies.lockstep import lockstep
+from tachometry.spec import METHODS, TachometerSpec, of_options, of_texts
+from tachometry.spec.core.tooth_wheel import ToothWheel
+
+BASE = {"clock": "1MHz", "max-time": "40ms", "sensor": "pulses"}
+WHEELS = ("4-1", "12-2", "9-3", "20-4", "60-2")
+
+
+def spec_of(wheel: str, method: str = "t", **more: str) -> TachometerSpec:
+    texts = {
+        **BASE,
+        "tick": "1ms" if method == "track" else "200us",
+        "ppr": wheel.split("-")[0],
+        "missing-teeth": wheel,
+    }
+    return of_texts(method, texts | {name.replace("_", "-"): text for name, text in more.items()})
+
+
+def turned(spec: TachometerSpec, motion: str, start: float = 0.0) -> tuple[Encoding, Run]:
+    """Return what the shaft did, and what the golden model shows of it."""
+    truth = VirtualEncoder.of(spec.encoder, start_angle_rad=start).record(parse_motion(motion))
+    return truth, golden.run(spec, PinTrace.of(truth.recording, spec))
+
+
+@pytest.mark.parametrize("wheel", WHEELS[:3])
+def test_every_bit_of_stress(wheel: str) -> None:
+    """Also backward, where a wheel without direction has its gap elsewhere, and is told so."""
+    spec = spec_of(wheel, "s", index="yes", index_reset="yes", reverse="yes", invert="a", max_time="4ms", tick="40us")
+    trace = stress(spec, 1, 60)
+    found = lockstep(spec, trace, PySim())
+    assert found.n_mismatches == 0, found.first
+    assert len(found.actual.errors)
+    assert len(found.actual.index) > 3
+    assert 0 < np.count_nonzero(found.actual.ticks.synced) < len(found.actual.ticks)
+
+    def wrong(wheel: ToothWheel) -> GapFiller:
+        return GapFiller(replace(wheel, missing=wheel.missing + 1))
+
+    with patch.object(decoder, "GapFiller", wrong):
+        assert lockstep(spec, trace, PySim()).n_mismatches
+
+
+def test_exported_verilog_in_icarus(tmp_path: Path) -> None:
+    spec = spec_of("12-2", "m", index="yes", filter="2")
+    trace = stress(spec, 2, 40)
+    expected, found = golden.run(spec, trace), run_in_icarus(spec, tmp_path, trace)
+    for strobe, table in expected.tables.items():
+        assert table.clock.tolist() == found.tables[strobe].clock.tolist()
+        for name, column in table.columns.items():
+            if name != "cause":
+                assert column.astype(int).tolist() == found.tables[strobe][name].astype(int).tolist(), name
+    assert len(expected.index) > 3
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_gap_does_not_show_in_the_velocity(method: str) -> None:
+    """A wheel with a gap is as good as a full one, from the second turn on."""
+    spec = spec_of("36-1", method)
+    motion = "constant:80rad/s:400ms"
+    run = turned(spec, motion)[1]
+    full = of_texts(
+        method, {name: text for name, text in spec.options.items() if name not in ("method", "missing-teeth")}
+    )
+    wheel = golden.run(full, PinTrace.of(VirtualEncoder.of(full.encoder).record(parse_motion(motion)).recording, full))
+    shown, wanted = (each.updates.velocity[each.updates.clock > 200_000] for each in (run, wheel))
+    least = wanted.min() // 300 if method == "track" else 2  # it remembers the first gap
+    assert shown.min() >= wanted.min() - least
+    assert shown.max() <= wanted.max() + least
+    assert np.all(run.ticks.synced[run.ticks.clock > 85_000])
+
+
+@pytest.mark.parametrize("wheel", WHEELS)
+def test_a_shaft_that_starts_anywhere_is_known_within_a_turn(wheel: str) -> None:
+    """From standstill, in acceleration; the count is that of a full wheel, and the index always at one place."""
+    spec = spec_of(wheel, index="yes")
+    rng = np.random.default_rng(5)
+    for start in rng.uniform(0, 2 * np.pi, 12):
+        truth, run = turned(spec, "ramp:0:160rad/s:600ms", start)
+        assert len(run.errors) == 0
+        assert {*np.diff(run.index.index_position)} == {spec.encoder.pulses_per_rev}
+        first = (run.index.clock[0] - spec.latency.tick - spec.latency.pin_to_count) / 1e6
+        counted = np.diff(truth.true_position([first, truth.motion.duration], 1))[0]
+        assert abs(run.ticks.position[-1] - run.index.index_position[0] - counted) <= 1
+        # A turn after so many teeth that their distances do not differ too much; it may begin in the gap.
+        turn = 133.4 * first**2 * spec.encoder.pulses_per_rev / (2 * np.pi)
+        assert turn <= spec.encoder.pulses_per_rev + {1: 5, 2: 6, 3: 8, 4: 11}[spec.encoder.missing]
+        # The acceleration goes on through the gap, and shows with the first tooth after it.
+        late = run.updates.clock > 1e6 * first + 100_000
+        speed = truth.true_speed(run.updates.clock[late] / 1e6)
+        off = run.updates.velocity[late] * spec.scale.rad_per_s_per_lsb - speed
+        a_tooth = 267 * 2 * np.pi / spec.encoder.pulses_per_rev / speed  # change of the speed
+        most = spec.encoder.missing * (spec.encoder.missing + 1) / 2 + 3
+        assert np.all(np.abs(off) < 1.25 * most * a_tooth + 0.01 * speed)
+
+
+@pytest.mark.parametrize("change", ["lost", "extra"])
+def test_a_tooth_too_many_or_too_few_is_told_at_the_gap(change: str) -> None:
+    wheel = ToothWheel(10, 2, 1023)
+    teeth = np.array([100 * turn * 12 + 100 * tooth for turn in range(5) for tooth in range(10)])
+    place = 24  # of the third turn
+    teeth = np.delete(teeth, place) if change == "lost" else np.insert(teeth, place, teeth[place] - 50)
+    found = filled(wheel, teeth, 6000)
+    assert found.index[:2].tolist() == [1200, 2400]
+    assert len(found.errors) == 1
+    assert 3300 <= found.errors[0] <= 3800
+    assert found.index[-1] == 4800
+
+
+def test_it_tells_what_cannot_be() -> None:
+    for more, message in (
+        ({"missing-teeth": "60+2"}, "^missing_teeth must be the teeth of a full wheel less those missing, as 60-2, "),
+        ({"missing-teeth": "6-4"}, "^missing_teeth must be the teeth of a full wheel less those missing"),
+        ({"missing-teeth": "36-1"}, "^missing_teeth must be of --ppr, 60 teeth, not of 36$"),
+        ({"decoding": "2"}, "^decoding must be 1 with --missing-teeth, one count for a tooth, not 2$"),
+        ({"sensor": "quadrature"}, "^missing_teeth must be given with --sensor pulses, not quadrature$"),
+        ({"bounds": "yes"}, "^bounds must not be given with --missing-teeth: "),
+        ({"index": "yes", "index-at": "A=1"}, "^index_at must be left out with --missing-teeth"),
+        ({"index": "yes", "invert": "z"}, "^invert must not have z "),
+    ):
+        with pytest.raises(ValueError, match=message):
+            of_texts("t", {**BASE, "ppr": "60", "missing-teeth": "60-2"} | more)
+    spec = spec_of("60-2", index="yes")
+    assert of_options(spec.options) == spec
+    assert {"z"} & {port.name for port in spec.ports} == set()
