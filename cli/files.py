@@ -17,7 +17,7 @@ _NEW, _OLD = "new", "old"
 
 
 class Outputs:
-    """The files that a command writes; use as a context manager.
+    """Holds the files that a command writes, as a context manager.
 
     Every file is written under its own name into a temporary directory beside its target. When the block has
     succeeded all are renamed onto their targets, existing files included; after an error or Ctrl-C nothing is left:

@@ -119,9 +119,7 @@ def precompiled(folder: Path, name: str, *more: str) -> list[str]:
 
 
 def compile_library(source: str, folder: Path, *more: str | Path) -> Path:
-    """Return a shared library of a C++ text, in `folder`; `more` are options, and files to be compiled or linked with
-    it.
-    """
+    """Return a shared library of a C++ text, in `folder`; `more` are options, and files to be compiled with it."""
     (folder / "model.cc").write_text(source, encoding="utf-8")
     command = [*compiler(), *flags(), "-shared", "-o", "model.so", "model.cc", *more]
     run(command, f"{' '.join(compiler())} cannot compile the core", folder)

@@ -104,9 +104,7 @@ class Receiver:
         self._bytes.clear()
 
     def forget(self) -> None:
-        """Forget the sequence, as the core restarts, or other telemetry is asked for: nothing is lost up to the next
-        frame.
-        """
+        """Forget the sequence, as the core restarts or sends other telemetry: nothing is lost up to the next frame."""
         self._last = None
 
     def _frame(self, at: int) -> int:

@@ -39,9 +39,7 @@ class Column:
 
 
 def columns(registers: DemoMap) -> list[Column]:
-    """Return every captured port but the time; what is in the LSB of the velocity is in the unit in which speeds are
-    shown.
-    """
+    """Return every captured port but the time; what is in LSB of the velocity is in the unit of shown speeds."""
     spec = registers.spec
     lsb = spec.scale.rad_per_s_per_lsb
     (speeds,) = (port.unit for port in registers.ports if port.name == "velocity")

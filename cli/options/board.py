@@ -11,7 +11,7 @@ from tachometry.boards.fpga.boards import BOARDS
 
 
 class _BoardChoice(click.Choice[str]):
-    """A board by its name."""
+    """Reads a board by its name."""
 
     name = "board"
 

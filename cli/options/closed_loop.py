@@ -1,4 +1,4 @@
-"""Options of a control loop about a core: controller, motor, task and encoder."""
+"""The options of `loop` say what controller, motor, task and encoder there are."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _LOOP, _MOTOR = "Controller", "Motor and load"
 
 
 class Quantity(click.types.FloatParamType):
-    """A number, plain or with one of some units."""
+    """Reads a number, plain or with one of some units."""
 
     def __init__(self, units: Units, default: str) -> None:
         self._read = number_reader(units, default)

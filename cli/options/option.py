@@ -147,7 +147,7 @@ SHORT = click.Option(
 
 
 class GroupedCommand(click.Command):
-    """A command whose help lists its options under the headings of their groups, a line each.
+    """Lists its options in the help under the headings of their groups, a line each.
 
     With -h it is the ten that most need. `tachometry help COMMAND` has all sentences.
     """

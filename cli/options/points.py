@@ -112,9 +112,7 @@ class _Maker:
         self._spec, self._encoder, self._motion = cache(_spec), cache(_parsed_encoder), cache(parse_motion)
 
     def point(self, name: str, method: str, given: Mapping[str, str], texts: Mapping[str, Text]) -> Point:
-        """Return the point of a method, of whose options some are given, with texts of options and of names in the
-        motion.
-        """
+        """Return the point of a method, with texts of some of its options and of names in the motion."""
         core = {key: texts[key] for key in core_click_options() if key in texts} | dict(given)
         spec = self._spec(method, tuple(core.items()))
         encoder, motion = self._encoder(_words(texts, ENCODER))

@@ -172,9 +172,7 @@ def _values(name: str, items: Iterable[str], options: Mapping[str, click.Option]
 
 
 def _range(name: str, item: str, match: re.Match[str], whole: bool) -> list[str]:
-    """Return values from LO to HI, evenly spaced or as their logarithms are; whole numbers between plain whole
-    numbers.
-    """
+    """Return values from LO to HI, evenly or logarithmically spaced; whole ones between plain whole numbers."""
     low, high, count, log = Fraction(match[1]), Fraction(match[3]), int(match[5]), match[6]
     unit = match[2] or match[4]
     if match[4] != unit:

@@ -118,7 +118,7 @@ def _lines(state: Callable[[], str]) -> Iterator[None]:
 
 
 class _PerSecond(ProgressColumn):
-    """How fast it goes."""
+    """Shows how fast it goes."""
 
     def __init__(self, what: str) -> None:
         super().__init__()

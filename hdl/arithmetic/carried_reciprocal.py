@@ -18,7 +18,7 @@ def _less_another(total: Signal, more: Value, q: Signal, borrow: Value) -> Value
 
 
 class CarriedReciprocal(wiring.Component):
-    """Q = ⌊C/m⌋ and R = C mod m, exactly: from a small table, and beyond it carried from m to m + 1 by subtraction.
+    """Gives Q = ⌊C/m⌋ and R = C mod m exactly: from a small table, and beyond it from m to m + 1 by subtraction.
 
     When it moves, m may count up by one, start over at 1, or go on at `entry`; it may do so in every clock. Why one
     correction is enough is shown in spec/formats/carried_reciprocal.py.

@@ -1,4 +1,4 @@
-"""A quotient, bit by bit."""
+"""A divider finds a quotient bit by bit."""
 
 from amaranth import Array, Cat, Const, Module, Signal, Value, signed
 from amaranth.lib import wiring
@@ -6,7 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 
 class Divider(wiring.Component):
-    """Signed serial divider, non-restoring: the quotient ⌊2^s · dividend / divisor⌋, or the nearest integer to it.
+    """Divides serially, signed, non-restoring: gives ⌊2^s · dividend / divisor⌋, or the nearest integer to it.
 
     In each step the divisor is taken from the doubled remainder, or added if that is negative; so it stays within
     −divisor … divisor − 1. The signs that it passes through, inverted but for the first, are the digits of the quotient
@@ -76,9 +76,7 @@ class Divider(wiring.Component):
         return Array(number >> self._reached(k) & 1 for k in range(1 << len(place)))[place]
 
     def _reached(self, place: int) -> int:
-        """Return the place of a digit that stands for one beyond them: most bits are the same, so few have to be looked
-        at.
-        """
+        """Return the place of the digit for one beyond: most bits are the same, so few have to be looked at."""
         for bit in reversed(range(place.bit_length() - 1)):
             if place < self._steps:
                 break

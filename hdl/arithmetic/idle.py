@@ -7,7 +7,7 @@ from typing import Protocol, Self, runtime_checkable
 
 @dataclass(frozen=True)
 class Idle:
-    """A register, or several, on whose values nothing depends but at their stops.
+    """Stands for registers on whose values nothing depends but at their stops.
 
     In clocks in which all else stands still, a simulation may move them on to the next stop at once. All texts are
     names of signals, behind those of the boxes around them: `sampling_clock.left`.
@@ -28,7 +28,7 @@ class Idle:
 
 @dataclass(frozen=True)
 class IdleRegister(Idle):
-    """A single register."""
+    """Stands for a single register."""
 
     path: str
 
@@ -59,7 +59,7 @@ class IdleCounter(IdleRegister):
 
 @dataclass(frozen=True)
 class IdleSum(IdleRegister):
-    """A sum to which every clock adds the same as long as all else stands still; it wraps."""
+    """Stands for a sum to which every clock adds the same as long as all else stands still; it wraps."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""base + N/m."""
+"""A quotient is base + N/m."""
 
 from collections.abc import Callable, Mapping
 from typing import Protocol, runtime_checkable
@@ -34,7 +34,7 @@ class _TakesRemainder(Protocol):
 
 
 class Quotient(wiring.Component):
-    """base + N/m, and bounds of it, correctly rounded and without a divider.
+    """Computes base + N/m, and bounds of it, correctly rounded and without a divider.
 
     1/m is looked up, divided, carried on from m to m + 1, or constant; it is multiplied step by step or all at once.
     All quotients share the reciprocal. A bound is the quotient of N − margin rounded down, or of N + margin rounded up.

@@ -1,4 +1,4 @@
-"""The reciprocal of m_s."""
+"""The reciprocal of m_s is looked up or divided."""
 
 from amaranth import Cat, Const, Module, Signal, signed
 from amaranth.lib import wiring
@@ -9,7 +9,7 @@ from tachometry.spec.formats import reciprocal as spec
 
 
 class LookedUpReciprocal(wiring.Component):
-    """q(m) from a table in block RAM.
+    """Looks q(m) up in a table in block RAM.
 
     Latency: q is there two clocks after m. The register behind the table is what the memories of many FPGAs have
     built in; without it, the way out of a memory and on to an adder limits the clock.
@@ -44,7 +44,7 @@ class LookedUpReciprocal(wiring.Component):
 
 
 class DividedReciprocal(wiring.Component):
-    """q(m) found by a subtraction a clock.
+    """Finds q(m) by a subtraction a clock.
 
     Latency: q is there `reciprocal.steps` and two clocks after `moves`, or after the reset, and stays until it moves.
 

@@ -28,7 +28,7 @@ def _rounded(total: Value, quotient: Value, up: Value) -> Value:
 
 
 class RemainderScaler(wiring.Component):
-    """A stage for every step: `start` may be high in every clock.
+    """Has a stage for every step: `start` may be high in every clock.
 
     Latency: a result comes as many clocks after `start` as N has bits and ⌊N·R/m⌋ has digits, and three more.
 

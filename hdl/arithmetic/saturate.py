@@ -54,9 +54,7 @@ def saturate_raised(m: Module, raised: Signal, limit: int) -> tuple[Signal, Sign
 
 
 def _bit_held(bit: Value, changed: Signal, sign: Signal, limit: int, place: int) -> Value:
-    """Return a bit of the number, or that of +`limit` or −`limit` if `changed`: most are the same in both, or need no
-    Mux.
-    """
+    """Return a bit of the number, or of +`limit` or −`limit` if `changed`: most are equal, or need no Mux."""
     kept = ~changed & bit
     match limit >> place & 1, -limit >> place & 1:
         case 1, 1:

@@ -63,7 +63,7 @@ class _Scaler(wiring.Component):
 
 
 class _SerialScaler(_Scaler):
-    """A digit of N a clock.
+    """Takes a digit of N a clock.
 
     `q` and `tag` must stay as they are until the result. `start` may come again as soon as the result has.
 
@@ -97,9 +97,7 @@ class _SerialScaler(_Scaler):
         return m
 
     def _next_digit(self, m: Module) -> Value:
-        """Return the two bits that tell a digit, and the one below them first; another digit in every clock after
-        `load`.
-        """
+        """Return the two bits that tell a digit, and the one below first; another digit in every clock after `load`."""
         raise NotImplementedError
 
     def _sum(self, m: Module, adds: Value, addend: Value, carry: Value) -> Value:
@@ -111,7 +109,7 @@ class _SerialScaler(_Scaler):
 
 
 class SerialScaler(_SerialScaler):
-    """A digit of N a clock, the greatest first, with one adder."""
+    """Takes a digit of N a clock, the greatest first, with one adder."""
 
     def _next_digit(self, m: Module) -> Value:
         digits = Signal(signed(2 * self._digits), reset_less=True)
@@ -139,7 +137,7 @@ class SerialScaler(_SerialScaler):
 
 
 class WideSerialScaler(_SerialScaler):
-    """A digit of N a clock, the least significant first, with two adders.
+    """Takes a digit of N a clock, the least significant first, with two adders.
 
     The sum moves down by two bits with each digit. So what the lower adder carries can wait for a clock: it is added to
     the two bits that move down then. All bits of the result but two come from the lower adder. q must be odd.
@@ -181,7 +179,7 @@ def _increment(bits: Value, by: Value) -> tuple[Value, Value]:
 
 
 class PipelinedScaler(_Scaler):
-    """An adder for every bit of N, the least significant first: `start` may be high in every clock.
+    """Has an adder for every bit of N, the least significant first: `start` may be high in every clock.
 
     Latency: a result comes as many clocks after `start` as N has bits, and one more.
     """

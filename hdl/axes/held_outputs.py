@@ -8,7 +8,7 @@ from amaranth.lib.wiring import In, Out
 
 
 class HeldOutputs(wiring.Component):
-    """A register for every value of every axis.
+    """Holds every value of every axis in a register.
 
     Latency: a value is in its register in the clock after its strobe.
 

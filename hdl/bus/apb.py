@@ -1,4 +1,4 @@
-"""APB."""
+"""A bridge answers APB from the bank of registers."""
 
 from amaranth import Module, Signal
 

@@ -1,4 +1,4 @@
-"""AXI4-Lite."""
+"""A bridge answers AXI4-Lite from the bank of registers."""
 
 from amaranth import Cat, Const, Module, Mux, Signal, Value
 
@@ -30,7 +30,7 @@ class _Read:
 
 
 class AxiLiteBridge(Bridge):
-    """AXI4-Lite, 32 bits, a read and a write at a time.
+    """Answers AXI4-Lite, 32 bits, a read and a write at a time.
 
     The write address and the write data are taken in any order. The answer to a write is there three clocks after the
     one in which the latter of them was taken, that to a read three or four clocks after its address. If both are to be

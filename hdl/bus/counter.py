@@ -1,4 +1,4 @@
-"""How often something happened."""
+"""A counter tells how often something happened."""
 
 from amaranth import Module
 from amaranth.lib import wiring

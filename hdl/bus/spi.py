@@ -1,4 +1,4 @@
-"""SPI."""
+"""A bridge answers SPI from the bank of registers."""
 
 from amaranth import Cat, Module, Mux, Signal
 
@@ -38,7 +38,7 @@ class _Frame:
 
 
 class SpiBridge(Bridge):
-    """SPI in mode 0, most significant bit first, as `spec.registers.frames` describes it.
+    """Answers SPI in mode 0, most significant bit first, as `spec.registers.frames` describes it.
 
     The lines are sampled in the clock domain, so that sck may have at most an eighth of the clock's frequency, and must
     be low and high for at least 4 clocks. Then miso changes at the latest 3 clocks after sck fell, and a clock is left

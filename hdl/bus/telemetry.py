@@ -1,4 +1,4 @@
-"""Frames of telemetry on a UART."""
+"""A sender makes frames of telemetry on a UART."""
 
 from amaranth import Cat, Const, Module, Mux, Signal
 from amaranth.lib import wiring

@@ -1,4 +1,4 @@
-"""The position at the latest tick."""
+"""A register keeps the position at the latest tick."""
 
 from amaranth import Module, Mux, Signal, signed
 from amaranth.lib import wiring

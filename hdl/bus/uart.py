@@ -1,4 +1,4 @@
-"""UART."""
+"""A bridge answers frames of a UART from the bank of registers."""
 
 from amaranth import Cat, Module, Mux, Signal
 from amaranth.lib.wiring import In, Out
@@ -71,7 +71,7 @@ class _Frame:
 
 
 class UartBridge(Bridge):
-    """UART, 8 bits without parity, with the frames that `spec.registers.frames` describes.
+    """Answers a UART, 8 bits without parity, with the frames that `spec.registers.frames` describes.
 
     A request that is whole and right is answered half a bit after its last stop bit; meanwhile nothing is received. Any
     other has no effect, and the receiver waits until the line has been quiet for `QUIET_BITS` bits. One timer, one

@@ -1,4 +1,4 @@
-"""Wishbone."""
+"""A bridge answers Wishbone from the bank of registers."""
 
 from amaranth import Module, Signal
 

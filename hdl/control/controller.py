@@ -1,4 +1,4 @@
-"""Disturbance observer and controller: one multiplier, and a product after the other."""
+"""Disturbance observer and controller share one multiplier, for one product after the other."""
 
 from collections.abc import Mapping
 from functools import reduce

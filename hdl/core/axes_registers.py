@@ -13,7 +13,7 @@ from tachometry.spec.registers.axes import AxesMap
 
 
 class AxesRegisterCore(wiring.Component):
-    """A core of many axes, with its registers; see `RegisterCore`.
+    """Joins a core of many axes and its registers; see `RegisterCore`.
 
     Members
     -------

@@ -29,7 +29,7 @@ def bridge_on(registers: RegisterMap, bus: Bus) -> Bridge:
 
 
 class BusTachometer(wiring.Component):
-    """A tachometer, maybe with a control loop, with its registers on a bus.
+    """Puts the registers of a tachometer, maybe with a control loop, on a bus.
 
     Members
     -------

@@ -1,4 +1,4 @@
-"""A line of the emulated encoder."""
+"""The line of an emulated encoder bounces and drops pulses."""
 
 from amaranth import Module, Mux, Signal
 from amaranth.lib import wiring

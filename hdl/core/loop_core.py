@@ -20,7 +20,7 @@ _DEMANDS = ("mode", "velocity", "acceleration", "amplitude", "rate")
 
 
 class LoopCore(wiring.Component):
-    """Encoder pins and commands in, current out, and all that the tachometer shows.
+    """Takes encoder pins and commands, gives the current, and shows all that the tachometer does.
 
     Members
     -------

@@ -16,7 +16,7 @@ from tachometry.spec.registers.map import RegisterMap
 
 
 class RegisterCore(wiring.Component):
-    """A tachometer, maybe with a control loop, with its registers.
+    """Joins a tachometer, maybe with a control loop, and its registers.
 
     Members
     -------

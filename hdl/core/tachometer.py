@@ -32,7 +32,7 @@ from tachometry.spec.language.port import UPDATE
 
 
 class Tachometer(wiring.Component):
-    """Encoder pins in, position and velocity out.
+    """Takes encoder pins, gives position and velocity.
 
     Latencies are those of the spec: `pin_to_count`, `tick_latency`, `tick_to_velocity`, in clocks of the `sync` domain.
 
@@ -206,9 +206,7 @@ class Tachometer(wiring.Component):
                 m.d.comb += standstill.shift.eq(self.datapath.tick_shift)
 
     def _output(self, m: Module) -> stream.Interface:
-        """Return from the datapath to the ports, by way of the low-pass filter and of the unit if they are there:
-        updates.
-        """
+        """Lead updates from the datapath to the ports, through low-pass filter and unit if they are there."""
         updates = self.datapath.updates
         if self.low_pass is not None:
             m.submodules.low_pass = low_pass = self.low_pass

@@ -11,7 +11,7 @@ from tachometry.spec.core.tooth_wheel import ToothWheel
 
 
 class QuadratureDecoder(wiring.Component):
-    """Quadrature decoder, x1, x2 or x4: one step of −1, 0 or +1 per clock, without latency.
+    """Decodes quadrature, x1, x2 or x4: gives a step of −1, 0 or +1 per clock, without latency.
 
     Forward is A before B: (A, B) = 00, 10, 11, 01. x4 counts every edge; x2 both edges of A; x1 the edges of A while B
     is low, rising forward and falling backward, so that a line which dithers on one edge never creeps. A clock in
@@ -87,7 +87,7 @@ def transition(
 
 
 class SensorDecoder(wiring.Component):
-    """Decoder of any sensor: one step of −1, 0 or +1 per clock, without latency.
+    """Decodes any sensor: gives a step of −1, 0 or +1 per clock, without latency.
 
     It looks up what a change of the lines counts, see `Sensor.change`. Levels that no sensor has, as of halls that are
     all equal, are reported when they come, and the levels before them are remembered.

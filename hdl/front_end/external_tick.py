@@ -1,4 +1,4 @@
-"""The sampling period from outside."""
+"""The sampling period comes from outside."""
 
 from amaranth import Const, Module, Signal, signed
 from amaranth.lib import wiring

@@ -1,4 +1,4 @@
-"""The position at the index."""
+"""A register keeps the position at the index."""
 
 from amaranth import Module, Signal, signed
 from amaranth.lib import wiring

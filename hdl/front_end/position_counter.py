@@ -1,4 +1,4 @@
-"""Position."""
+"""A counter sums steps to the position."""
 
 from amaranth import Module, Signal, signed
 from amaranth.lib import wiring

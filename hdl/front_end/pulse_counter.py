@@ -1,4 +1,4 @@
-"""m_e, the pulse number of a tick."""
+"""A counter finds m_e, the pulse number of a tick."""
 
 from amaranth import Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring

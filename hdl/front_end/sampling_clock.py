@@ -1,4 +1,4 @@
-"""The sampling period."""
+"""A counter divides the clock into sampling periods."""
 
 from amaranth import Cat, Const, Module, Signal, signed
 from amaranth.lib import wiring

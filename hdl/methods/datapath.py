@@ -12,7 +12,7 @@ from tachometry.spec import TachometerSpec
 
 
 class Datapath(Protocol):
-    """From pulse numbers to updates.
+    """Turns pulse numbers into updates.
 
     Among its members are `updates`, and those inputs that it needs: `tick` and `pulse_count`, `coming` and `next_count`
     (the same a clock earlier), `step` (as late as `tick`), `step_before` (a clock earlier), or `step_now` (as early as

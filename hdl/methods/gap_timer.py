@@ -1,4 +1,4 @@
-"""The time since the last count."""
+"""A timer measures the time since the last count."""
 
 from amaranth import Module, Signal
 from amaranth.lib import wiring

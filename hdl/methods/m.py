@@ -13,7 +13,7 @@ from tachometry.spec import MTachometer
 
 
 class MovingSum(wiring.Component):
-    """Sum of the last n pulse numbers, the present one included.
+    """Sums the last n pulse numbers, the present one included.
 
     It is the difference of two totals modulo 2^sum_width: all counts up to now, and all counts up to n ticks ago. n
     ticks after an upset, both totals contain its error, which cancels. A running sum, from which the oldest number is

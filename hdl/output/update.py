@@ -29,9 +29,7 @@ def update_layout(spec: TachometerSpec) -> data.StructLayout:
 
 
 def shown_layout(layout: data.StructLayout, output: VelocityOutput) -> data.StructLayout:
-    """Return what the output stage makes of such an update: velocities in another unit, and whether one was
-    saturated.
-    """
+    """Return what the output stage makes of an update: velocities in another unit, and whether one saturates."""
     shown = {name: signed(output.width) for name in layout.members if name in VELOCITIES}
     return data.StructLayout({**layout.members, **shown, "velocity_overflow": 1})
 

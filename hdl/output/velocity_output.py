@@ -62,7 +62,7 @@ class _VelocityOutput(wiring.Component):
 
 
 class SerialVelocityOutput(_VelocityOutput):
-    """A bit of the multiplier a clock.
+    """Takes a bit of the multiplier a clock.
 
     Latency: an update is shown as many clocks after it comes as the multiplier has bits, and three more; the next may
     come then.
@@ -110,7 +110,7 @@ class SerialVelocityOutput(_VelocityOutput):
 
 
 class PipelinedVelocityOutput(_VelocityOutput):
-    """An adder for every digit of the multiplier: there may be an update in every clock.
+    """Has an adder for every digit of the multiplier: there may be an update in every clock.
 
     Latency: an update is shown a clock after it comes for every digit but the first, one to round (if anything is to be
     rounded), and one to hold.

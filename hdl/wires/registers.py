@@ -1,4 +1,4 @@
-"""Registers of a structure."""
+"""Registers hold the members of a structure."""
 
 from collections.abc import Mapping
 

@@ -44,9 +44,7 @@ def fitted(recording: Recording, encoder: Encoder) -> Recording:
 
 
 def _with_first_pulse(recording: Recording) -> Recording:
-    """Return a recording that begins with a pulse of no width so that the line is low before it: earlier, by the time
-    to the next row.
-    """
+    """Return a recording that begins with a pulse of no width, earlier by the time to the next row: low before it."""
     later = recording.time[recording.time > 0]
     if not (later.size and recording.time[:2].tolist() == [0, 0] and recording.a[0] == 1):
         return recording

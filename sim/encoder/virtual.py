@@ -191,9 +191,7 @@ class VirtualEncoder(EncoderOptions):
         return Encoding(self, motion, recording, n_illegal, n_lost)
 
     def _lines(self, time: FloatArray, quarter: IntArray, duration: float) -> tuple[Recording, int, int]:
-        """Return what the lines make of quarters that begin at some times, and how many edges came together or were
-        lost.
-        """
+        """Return what lines make of quarters that begin at some times, and how many edges met or were lost."""
         n_lost, n_illegal = 0, 0
         turned = -quarter if self.reverse else quarter
         if self.sensor in ("step-dir", "up-down"):

@@ -69,9 +69,7 @@ class Design:
         return np.stack(lines, axis=1) if self.wide else packed(lines)
 
     def pins_text(self, assign: Callable[[str, str], str]) -> str:
-        """Return functions of the struct `Model` that set the pins; `assign` gives what sets one of them to a level in
-        C++.
-        """
+        """Return functions of the struct `Model` that set the pins; `assign` gives what sets one of them in C++."""
         level = "level[{}]" if self.wide else "level >> {} & 1"
         text = " ".join(assign(pin.name, level.format(place)) for place, pin in enumerate(self.pins))
         if self.wide:

@@ -52,9 +52,7 @@ def _plain(label: str) -> str:
 
 
 def draw(result: Result) -> Figure:
-    """Return the figure, panels one below the other; placed by hand, as `sim.plot` does, to be
-    equal from run to run.
-    """
+    """Return the figure, panels one below the other; placed by hand, to be equal from run to run."""
     n = len(result.panels)
     panel_height = _PANEL if n > 1 else _ONLY_PANEL
     height = _TOP + _BOTTOM + n * panel_height + (n - 1) * _GAP

@@ -47,9 +47,7 @@ class _Estimates:
 
 
 def _estimates(spec: RairanTachometer, run: Run) -> _Estimates:
-    """Return n1 from the counts at the ports, n2 and n3 from it; in the regime that was updated last, as the velocity
-    is.
-    """
+    """Return n1 of the counts at the ports, n2 and n3 of it, in the regime that was updated last."""
     updates = run.updates
     unit = 2.0**spec.widths.frac_bits
     # n3 tells the regime: 2/3 and less is low, 4/3 and more is high.
@@ -66,9 +64,7 @@ def _held(at: _Estimates, values: FloatArray, clock: FloatArray) -> FloatArray:
 
 
 def _window_means(spec: RairanTachometer, encoding: Encoding, at: _Estimates) -> FloatArray:
-    """Return mean true speed, in counts per dt, over what each update has measured: dt, or the time since the last
-    count.
-    """
+    """Return mean true speed, in counts per dt, over what each update has measured: dt, or the last gap."""
     clock_hz, dt = spec.timing.clock_hz, spec.timing.tick_cycles
     trace = encoding.recording.place(clock_hz)
     counted = trace.clock[1:]  # all edges count, in one direction
@@ -210,9 +206,7 @@ def _errors(lab: Lab, spec: RairanTachometer, speeds: FloatArray, limit: float, 
 
 
 def fig7(lab: Lab) -> Result:
-    """Compute fig. 7: relative error for pul = 160, dt = 1 ms, and ts = 100 µs; the hardware over a short run of all
-    speeds.
-    """
+    """Compute fig. 7: relative error for pul = 160, dt = 1 ms, ts = 100 µs; hardware over a short run."""
     pulses, dt, ts = 160, 1e-3, 100e-6
     speeds = _shown_speeds()
     spec = _core(ts, to_the_letter=False)

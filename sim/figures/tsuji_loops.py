@@ -108,9 +108,7 @@ SOLUTIONS = (
 
 
 def fig14(lab: Lab) -> Result:
-    """Compute fig. 14: S without the technical solutions, with alternate alterations cancelled, and
-    synchronised too.
-    """
+    """Compute fig. 14: S without the technical solutions, with alterations cancelled, and synchronised too."""
     motion = parse_motion("ramp:0:39rad/s:5s+constant:39rad/s:10s")
     panels, means = [], []
     limits: dict[str, Any] = {"levels": tuple(_COUNT / 1e-3 * k for k in range(1, 4)), "y_limits": (0.0, 48.0)}

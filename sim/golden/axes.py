@@ -16,9 +16,7 @@ from tachometry.spec.methods.axis import WARM_UP
 
 
 def run_axes(spec: AxesSpec, trace: AxesTrace, tables: Callable[[TachometerSpec, PinTrace], dict[str, Table]]) -> Run:
-    """Return what the core of `spec` must show at its ports for these pins; `tables` is the golden model of a single
-    core.
-    """
+    """Return what the core of `spec` must show for these pins; `tables` is the golden model of a single core."""
     found: dict[str, list[Table]] = {name: [] for name in spec.axis.ports.strobes}
     for axis, pins in enumerate(trace.each):
         rows = tables(spec.at(axis), seen(spec, pins, axis))

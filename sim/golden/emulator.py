@@ -144,9 +144,7 @@ class GoldenEmulator:
         return PinTrace(np.concatenate(clocks), a, b, n_clocks, None if self._lines_per_rev is None else z)
 
     def _speeds(self, n: int, target: int, rate: int) -> NDArray[np.int64]:
-        """Return speeds in n clocks and in the one after; they change in every second clock, by what the one before
-        found.
-        """
+        """Return speeds in n clocks and in the one after; they change every second clock, by the finding before."""
         first = np.full(self._clock % 2, self._speed, dtype=np.int64)  # the second clock of a change that has begun
         speed = self._speed
         if len(first):

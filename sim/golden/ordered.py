@@ -33,9 +33,7 @@ def next_place(chosen: Ints, n: int) -> Ints:
 
 
 def not_before(clock: Ints, wanted: Ints) -> Ints:
-    """Return the first place after each whose clock is not before the wanted one, which does not decrease; n for
-    none.
-    """
+    """Return the first place after each whose clock is not before the wanted one, which never falls; n for none."""
     n = len(clock)
     found = np.arange(1, n + 1)
     left = np.flatnonzero(clock[1:] < wanted[:-1])

@@ -46,9 +46,7 @@ def with_trip(spec: TachometerSpec, ticks: Table, tripped: Table) -> Table:
 
 
 def with_age(spec: TachometerSpec, ticks: Table, updates: Table) -> Table:
-    """Return ticks with the age of the velocity: how many came after the cause of its update, or from reset on, this
-    one included.
-    """
+    """Return ticks with the age of the velocity: the ticks after the cause of its update, or from reset on."""
     if not spec.age:
         return ticks
     cause = np.append(-1, updates.cause)[np.searchsorted(updates.clock, ticks.clock, side="right")]

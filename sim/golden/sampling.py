@@ -9,9 +9,7 @@ from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 
 
 def windows(spec: TachometerSpec, trace: PinTrace) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return last clocks of all windows, and clocks of all `tick_error`s; each `tick` and `tick_error` is within the
-    trace.
-    """
+    """Return last clocks of all windows, and clocks of all `tick_error`s, all within the trace."""
     n_clocks = trace.n_clocks - spec.latency.tick
     if not spec.external_tick:
         cycles = spec.timing.tick_cycles

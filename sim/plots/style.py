@@ -112,9 +112,7 @@ def _title(spec: TachometerSpec, what: str | None) -> str:
 
 
 def in_words(name: str) -> str:
-    """Return a method for a legend, such as `M method (average=8)` of `m:average=8`; what is no method keeps its
-    name.
-    """
+    """Return a method for a legend, `M method (average=8)` of `m:average=8`; other names stay as they are."""
     method, _, options = name.partition(":")
     if method not in METHODS:
         return name

@@ -41,9 +41,7 @@ def packed(lines: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
 
 
 def merged(*clocks: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return all clocks of ordered lists, in their order, each once; `np.union1d` would hash them, ten times as
-    slowly.
-    """
+    """Return all clocks of ordered lists, in order, each once; `np.union1d` hashes them, ten times as slowly."""
     every = np.sort(np.concatenate(clocks), kind="stable")
     return every[np.diff(every, prepend=every[:1] - 1) > 0]
 
@@ -248,9 +246,7 @@ def check_ticks(duration: float, spec: TachometerSpec, most: int = MAX_TICKS, of
 
 
 def nominal_ticks(spec: TachometerSpec, n_clocks: int) -> NDArray[np.int64]:
-    """Return clocks at which an external tick rises that is exactly as long as nominal, in step with the core's
-    reset.
-    """
+    """Return clocks at which an external tick rises that is exactly nominal, in step with the core's reset."""
     cycles = spec.timing.tick_cycles
     ends = np.arange(2 * cycles - 1 if cycles <= TICK_IN_TO_WINDOW_END + 1 else cycles - 1, n_clocks, cycles)
     return ends.astype(np.int64) - TICK_IN_TO_WINDOW_END

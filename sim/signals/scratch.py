@@ -64,7 +64,7 @@ def scratch(parent: Path | None = None) -> Iterator[Path]:
 
 
 class Claim:
-    """A new temporary folder in `parent`, which others leave alone for as long as this process lives."""
+    """Makes a temporary folder in `parent`, which others leave alone for as long as this process lives."""
 
     def __init__(self, parent: Path) -> None:
         while True:

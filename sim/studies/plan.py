@@ -163,9 +163,7 @@ class Plans:
 
     @cached_property
     def worst(self) -> Plan | None:
-        """The plan at the speed of the range where the error with a real disc may be greatest; None where nothing is
-        known of the method.
-        """
+        """The plan at the speed whose error with a real disc may be greatest; None where the method tells nothing."""
         return self._worst(self.spec)
 
     def _worst(self, spec: TachometerSpec) -> Plan | None:

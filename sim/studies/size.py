@@ -37,7 +37,7 @@ ADDED_TO_NAME = re.compile(r"(\$|_(SB|TRELLIS|LUT4|CCU2C|PFUMX|L6MUX21|DFFLC)(_|
 
 @dataclass(frozen=True)
 class Target:
-    """A device and the commands that fill it.
+    """Describes a device and the commands that fill it.
 
     Parameters
     ----------
@@ -270,9 +270,7 @@ def limit(path: Sequence[Mapping[str, Any]]) -> str:
 
 
 def split_name(cell: str) -> list[str]:
-    """Return instances and signal in the name of a cell, which Yosys makes from that of a net; an unnamed signal is
-    empty.
-    """
+    """Return instances and signal in the name of a cell, made by Yosys of a net; an unnamed signal is empty."""
     return [ADDED_TO_NAME.sub("", part) for part in cell.split(".") if not part.isdigit()]
 
 

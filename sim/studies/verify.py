@@ -39,7 +39,7 @@ _PATIENCE = 10.0  # seconds in which a process that is told to end does so
 
 @dataclass(frozen=True)
 class Failure:
-    """The first motion on which hardware and golden model differ.
+    """Holds the first motion on which hardware and golden model differ.
 
     Parameters
     ----------

@@ -63,9 +63,7 @@ def rairan_eq02_error(estimate: ArrayLike, speed: ArrayLike) -> Floats:
 
 
 def rairan_eq03_error(n1: ArrayLike, speed: ArrayLike, speed_limit: ArrayLike) -> Floats:
-    """Compute eq. (3) of Rairán 2013: relative error n1·ω_lim/ω − 1 of the upper estimate n1, which
-    is never below ω.
-    """
+    """Compute eq. (3) of Rairán 2013: relative error n1·ω_lim/ω − 1 of the upper estimate n1, never below ω."""
     return _regime_n1(n1) * positive("speed_limit", speed_limit) / positive("speed", speed) - 1
 
 
@@ -79,9 +77,7 @@ def rairan_eq04_max_error(n1: ArrayLike) -> Floats:
 
 
 def rairan_eq05_n2(n1: ArrayLike) -> Floats:
-    """Compute eq. (5) of Rairán 2013: lower estimate n2 = 1/(1/n1 + 1) if n1 ≤ 1, else n1 − 1.
-    Never above the speed.
-    """
+    """Compute eq. (5) of Rairán 2013: lower estimate n2 = 1/(1/n1 + 1) if n1 ≤ 1, else n1 − 1; never above ω."""
     n1 = _regime_n1(n1)
     return np.where(n1 < 1.5, 1 / (1 / n1 + 1), n1 - 1)
 
@@ -98,9 +94,7 @@ def rairan_eq06_n2(n_ep1: ArrayLike, n_dt1: ArrayLike) -> Floats:
 
 
 def rairan_eq07_error(n2: ArrayLike, speed: ArrayLike, speed_limit: ArrayLike) -> Floats:
-    """Compute eq. (7) of Rairán 2013: relative error 1 − n2·ω_lim/ω of the lower estimate n2, which
-    is never above ω.
-    """
+    """Compute eq. (7) of Rairán 2013: relative error 1 − n2·ω_lim/ω of the lower estimate n2, never above ω."""
     return 1 - _regime_n2(n2) * positive("speed_limit", speed_limit) / positive("speed", speed)
 
 
@@ -115,9 +109,7 @@ def rairan_eq08_sup_error(n2: ArrayLike) -> Floats:
 
 
 def rairan_eq09_left_error(n3: ArrayLike, n2: ArrayLike) -> Floats:
-    """Compute eq. (9) of Rairán 2013: relative error n3/n2 − 1 of an estimate n3 from n2 to n1, at the interval's left
-    end.
-    """
+    """Compute eq. (9) of Rairán 2013: relative error n3/n2 − 1 of n3 from n2 to n1, at the left end."""
     return positive("n3", n3) / _regime_n2(n2) - 1
 
 

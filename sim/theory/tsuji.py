@@ -57,9 +57,7 @@ def tsuji_eq06_velocity(
 
 
 def tsuji_eq07_resolution(n: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """Compute eq. (7) of Tsuji 2009: resolution Q_V = ω_u/n of the M method with averaging. The supremum of the
-    errors.
-    """
+    """Compute eq. (7) of Tsuji 2009: resolution ω_u/n of the M method with averaging, the supremum of errors."""
     return unit_velocity(counts_per_rev, tick_seconds) / at_least("n", n, 1)
 
 
@@ -69,9 +67,7 @@ def tsuji_eq08_measurement_time(n: ArrayLike, tick_seconds: ArrayLike) -> Floats
 
 
 def tsuji_eq09_velocity(m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """Compute eq. (9) of Tsuji 2009: velocity ω_u/m_s of the T method, m_s ticks from count to
-    count. It has no sign.
-    """
+    """Compute eq. (9) of Tsuji 2009: velocity ω_u/m_s of the T method, without sign; m_s ticks from count to count."""
     return _mean_velocity(1, at_least("m_s", m_s, 1), counts_per_rev, tick_seconds)
 
 

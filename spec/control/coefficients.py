@@ -74,9 +74,7 @@ def control_form(units: Units, ratios: dict[Term, list[Fraction]], *, inputs: bo
 
 
 def _usual(units: Units, term: Term) -> Fraction:
-    """Return the ratio for which the range of a gain is made: that of its option, or of k_p = (k_v/2)² where that is
-    0.
-    """
+    """Return the ratio for which the range of a gain is made: its option's, or of k_p = (k_v/2)² where that is 0."""
     gain = _gain(units.law, term) or units.law.velocity_gain**2 / 4
     return gain * _of_one(units, term)
 

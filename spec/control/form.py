@@ -98,7 +98,7 @@ def decay(exponent: Fraction) -> Fraction:
 
 @dataclass(frozen=True)
 class Coefficients:
-    """The coefficients of a term, in 2^(shift − p) of a unit of its result: one for each n from 1 on, or a single one.
+    """Holds the coefficients of a term, in 2^(shift − p) of a unit of its result: one for each n from 1 on, or one.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class Coefficients:
 
 @dataclass(frozen=True)
 class ControlForm:
-    """Numbers that hardware and golden model share.
+    """Holds the numbers that hardware and golden model share.
 
     Parameters
     ----------

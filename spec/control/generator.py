@@ -43,7 +43,7 @@ _SERIAL, _PARALLEL = 3 * (FACTOR_BITS + 1) + 5, 3 * 3 + 5
 
 @dataclass(frozen=True)
 class Scale:
-    """From the generator's unit to that of a port: round((word·2^−shift)·factor/2^32), where a shift rounds down.
+    """Converts the generator's unit to that of a port: round((word·2^−shift)·factor/2^32), where a shift rounds down.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class Scale:
 
 @dataclass(frozen=True)
 class GeneratorForm:
-    """Numbers that hardware and golden model share.
+    """Holds the numbers that hardware and golden model share.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ _LIMIT = 2  # to hold the sum within few bits, and within the limit
 
 @dataclass(frozen=True, kw_only=True)
 class LoopSpec(Law):
-    """A tachometer with a disturbance observer and a controller of position and velocity; see `ControlForm`.
+    """Describes a tachometer with disturbance observer and controller of position and velocity; see `ControlForm`.
 
     It raises ParameterError if a parameter is out of range, the program is longer than the period, or a format is too
     wide.

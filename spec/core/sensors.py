@@ -17,7 +17,7 @@ def packed_levels(levels: Levels) -> int:
 
 @dataclass(frozen=True)
 class Sensor:
-    """A kind of sensor.
+    """Describes a kind of sensor.
 
     Parameters
     ----------

@@ -74,7 +74,7 @@ def _ticks(what: str, text: str, timing: Mapping[str, Any]) -> int:
 
 @dataclass(frozen=True)
 class Timing:
-    """Clock, tick and maximum measurement time.
+    """Holds clock, tick and maximum measurement time.
 
     A value out of range raises ParameterError.
     """
@@ -165,9 +165,7 @@ class Timing:
 
 
 def whole_clocks(what: str, given: str, clock_hz: int) -> int:
-    """Return a time such as `40us`, or clocks such as `960clk`, as a whole number of clocks;
-    ParameterError if it is none.
-    """
+    """Return a time such as `40us`, or clocks such as `960clk`, as whole clocks; ParameterError if it is none."""
     return _whole(what, given, time_or_clocks(what, given, clock_hz), Fraction(1, clock_hz), "clock")
 
 

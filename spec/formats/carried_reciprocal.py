@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class CarriedReciprocal:
-    """Widths and contents for Q = ⌊2^(frac_bits−halvings)/m⌋ and its remainder R.
+    """Finds widths and contents for Q = ⌊2^(frac_bits−halvings)/m⌋ and its remainder R.
 
     Parameters
     ----------

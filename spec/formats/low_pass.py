@@ -24,7 +24,7 @@ MAX_EXTRA_BITS = 26
 
 @dataclass(frozen=True)
 class LowPass:
-    """Widths and tables of the filter.
+    """Finds widths and tables of the filter.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ _LONG_SUM = 40
 
 @dataclass(frozen=True)
 class Reciprocal:
-    """Widths and contents of q(m), here 2^(frac_bits+guard_bits)/m rounded to the nearest, so that |δ| ≤ ½.
+    """Finds widths and contents of q(m), here 2^(frac_bits+guard_bits)/m rounded to the nearest, so that |δ| ≤ ½.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ WIDE = "index_wide"
 
 @dataclass(frozen=True)
 class Port:
-    """A scalar port of the exported core.
+    """Describes a scalar port of the exported core.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def held(by: str, name: str, width: int = 1, *, signed: bool = False, unit: str 
 
 
 class Ports(tuple[Port, ...]):
-    """All ports of an exported core, in order."""
+    """Holds all ports of an exported core, in order."""
 
     __slots__ = ()
 

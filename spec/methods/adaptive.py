@@ -18,7 +18,7 @@ def parse_target(what: str, text: str) -> Fraction:
 
 @dataclass(frozen=True)
 class AdaptiveDt:
-    """The rule by which a window takes its k from what the one before it measured, see docs/concepts/rairan.md.
+    """Says how a window takes its k from what the one before it measured, see docs/concepts/rairan.md.
 
     Parameters
     ----------

@@ -276,9 +276,7 @@ class AxesSpec:
         return int(self.shown(axis, 0)) - int(self.look(axis, 0))
 
     def look(self, axis: int, number: Any) -> Any:
-        """Return the clock in which the level of an axis is looked at for the `number`-th time, of a number or an
-        array.
-        """
+        """Return the clock in which the level of an axis is looked at for the `number`-th time, an array or not."""
         return number * self.slots + axis
 
     def tick_clock(self, axis: int, tick: Any) -> Any:
@@ -332,9 +330,7 @@ class AxesSpec:
                 yield replace(port, name=f"{port.name}_{axis}", help=f"Of axis {axis}, held: {port.help}")
 
     def _of_an_axis(self) -> tuple[Port, ...]:
-        """Return those of the core that each axis is; but its clocks are rounds, and times here are in clocks of this
-        core.
-        """
+        """Return those of the core that each axis is, whose clocks are rounds, in clocks of this core."""
         unit = next(port.unit for port in self.tachometer.ports if port.name == "interval")
         return tuple(replace(port, unit=unit) if port.name == "interval" else port for port in self.axis.ports.outputs)
 

@@ -114,7 +114,7 @@ class MWords(Words["MTachometer"]):
 
 @dataclass(frozen=True, kw_only=True)
 class MTachometer(TachometerSpec):
-    """M-method tachometer: an update every tick, the mean pulse number of the last n ticks.
+    """Describes an M-method tachometer, which shows the mean pulse number of the last n ticks at every tick.
 
     Velocity is eq. (6) of Tsuji 2009, in counts per tick, correctly rounded. Ticks before the first count as empty. A
     value out of range raises ParameterError.

@@ -73,7 +73,7 @@ class MTWords(TimedWords["MTTachometer"]):
 
 @dataclass(frozen=True, kw_only=True)
 class MTTachometer(TimedTachometer):
-    """M/T-method tachometer: counts over the time from the first to the last of them, eq. (13) of Tsuji 2009.
+    """Divides counts by the time from the first to the last of them (M/T method, eq. (13) of Tsuji 2009).
 
     A window opens at a count, and closes at the first count later than T_c after that. The closing count opens the next
     window. The velocity is in counts per tick, correctly rounded. A value out of range raises ParameterError.

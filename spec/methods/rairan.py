@@ -167,9 +167,7 @@ class RairanForm(Follows["RairanTachometer"]):
         return 2 * max(self.low_depth, self.high_depth << self.spec.times.max_tick_shift)
 
     def tie(self, shift: int) -> int | None:
-        """Return the Ndt1 for which n1 or n2 is just half an LSB, if there can be one: it is rounded up, to 1 or to
-        −0.
-        """
+        """Return the Ndt1 for which n1 or n2 is just half an LSB, if there is one: it rounds up, to 1 or to −0."""
         ndt1 = (2 << self.spec.widths.native_frac_bits >> shift) - (self.spec.estimate == "n2")
         return ndt1 if self.spec.estimate != "n3" and ndt1 <= self.max_dt(shift) else None
 

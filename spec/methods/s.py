@@ -55,9 +55,7 @@ class SForm(Follows["STachometer"]):
 
     @property
     def numerator_per_count(self) -> int:
-        """The number that one count adds to N: 2 in eq. (21), whose N is of half counts, and 1 in eq. (17); or finer
-        parts.
-        """
+        """The number that one count adds to N: 2 in eq. (21), of half counts, and 1 in eq. (17); or finer parts."""
         return (2 if self.spec.cancel else 1) << self.finer
 
     @property
@@ -209,7 +207,7 @@ class SWords(Words["STachometer"]):
 
 @dataclass(frozen=True, kw_only=True)
 class STachometer(TachometerSpec):
-    """S-method tachometer: averages in step with the alterations of the pulse number.
+    """Averages in step with the alterations of the pulse number (S method).
 
     Velocity is eq. (21) of Tsuji 2009, or eq. (17) without cancelling, in counts per tick, correctly rounded. A value
     out of range raises ParameterError.

@@ -19,7 +19,7 @@ class SAxisTimes(AxisTimes, STimes):
 
 @dataclass(frozen=True, kw_only=True)
 class SAxis(OneAxis, STachometer):
-    """One of many axes with the S method."""
+    """Describes one of many axes with the S method."""
 
     times = cached_property(SAxisTimes)
 

@@ -39,7 +39,7 @@ class TWidths(TimedWidths["TTachometer"]):
 
 @dataclass(frozen=True, kw_only=True)
 class TTachometer(TimedTachometer):
-    """T-method tachometer: one count over the time since the count before, eq. (9) of Tsuji 2009.
+    """Divides one count by the time since the count before (T method, eq. (9) of Tsuji 2009).
 
     The velocity is in counts per tick, correctly rounded. It is 0 for two consecutive counts of opposite sign, which
     are from the same edge of the encoder.

@@ -13,7 +13,7 @@ from tachometry.spec.methods.track import FETCH_CLOCKS, TrackTachometer
 
 @dataclass(frozen=True, kw_only=True)
 class TrackAxis(OneAxis, TrackTachometer):
-    """One of many axes with the tracking method.
+    """Describes one of many axes with the tracking method.
 
     Parameters
     ----------

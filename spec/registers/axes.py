@@ -14,7 +14,7 @@ _WHOSE = ("axis", "index_axis")  # what is held says it by its name
 
 @dataclass(frozen=True)
 class AxesMap(RegisterMap):
-    """All registers of a core of many axes: those of axis 0, of axis 1 …, in windows of one size.
+    """Holds all registers of a core of many axes: those of axis 0, of axis 1 …, in windows of one size.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ PERIOD_WIDTH = 16  # bits of the telemetry's period
 
 @dataclass(frozen=True)
 class DemoMap(RegisterMap):
-    """All registers of a demo.
+    """Holds all registers of a demo.
 
     A write takes effect in the next clock, and CHANGED keeps the instant of the write. So whoever knows all writes
     since a restart knows every edge that the emulator has made.
@@ -84,7 +84,7 @@ class DemoMap(RegisterMap):
 
 @dataclass(frozen=True)
 class DemoLoopMap(LoopMap, DemoMap):
-    """All registers of a demo of a core with a control loop: those of the loop come before those of the demo.
+    """Holds all registers of a demo of a core with a control loop: first those of the loop, then those of the demo.
 
     Parameters
     ----------

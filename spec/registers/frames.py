@@ -53,7 +53,7 @@ class FrameError(ValueError):
 
 @dataclass(frozen=True)
 class Request:
-    """A request over the UART, as `decode_request` found it.
+    """Holds a request over the UART, as `decode_request` found it.
 
     Parameters
     ----------

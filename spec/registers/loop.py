@@ -19,7 +19,7 @@ _WORDS = ((0, "_LOW", "Lower word. "), (WORD, "_HIGH", "Upper word. "))
 
 @dataclass(frozen=True)
 class LoopMap(RegisterMap):
-    """All registers of a core with a control loop.
+    """Holds all registers of a core with a control loop.
 
     What is written is taken with all else in the clock before a control tick, unless LOOP.freeze is set. A value that
     does not fit is held at the nearest that does, but a position wraps.

@@ -37,7 +37,7 @@ _DESCRIBED = ("name", "low", "width", "access", "reset", "signed", "unit", "port
 
 @dataclass(frozen=True)
 class Field:
-    """Some bits of a register.
+    """Describes some bits of a register.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class Field:
 
 @dataclass(frozen=True)
 class Register:
-    """A word of 32 bits.
+    """Describes a word of 32 bits.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ Draft = tuple[str, str, tuple[Field, ...], dict[str, bool]]  # name, help, field
 
 @dataclass(frozen=True)
 class RegisterMap:
-    """All registers of a core.
+    """Holds all registers of a core.
 
     Parameters
     ----------

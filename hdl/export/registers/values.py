@@ -8,7 +8,7 @@ from tachometry.spec.registers.map import WORD, Field, Register, RegisterMap
 
 @dataclass(frozen=True)
 class CapturedValue:
-    """A port of several bits, as its registers show it.
+    """Describes a port of several bits as its registers show it.
 
     Parameters
     ----------

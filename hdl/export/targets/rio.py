@@ -28,7 +28,7 @@ _EVENTS = {"decode_errors": "decode_error", "overflows": "tick & overflow", "tic
 
 @dataclass(frozen=True)
 class HalPin:
-    """A pin of HAL.
+    """Describes a pin of HAL.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ from tachometry.spec.registers.buses import Bus
 
 @dataclass(frozen=True)
 class Target:
-    """A framework.
+    """Describes a framework.
 
     Parameters
     ----------

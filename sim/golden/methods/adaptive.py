@@ -12,9 +12,7 @@ Ints = NDArray[np.int64]
 
 
 def next_shift(rule: AdaptiveDt, shift: int, n: int, *, high: bool, falling: bool) -> tuple[int, bool]:
-    """Return k of a window after one of dt·2^shift that measured Nep1 = n (high) or Ndt1 = n, and whether it falls to
-    0.
-    """
+    """Return k of a window after one of dt·2^shift with Nep1 = n (high) or Ndt1 = n, and whether it is 0."""
     wanted = rule.slow + (shift > 0)
     seldom = n * wanted <= 1 << shift if high else n << shift >= wanted
     enough = high and n >= rule.fewest

@@ -16,9 +16,7 @@ class Model:
         self._spec = spec
 
     def updates(self, ticks: Table, steps: Steps | None, n_clocks: int) -> Table:
-        """Return all updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows
-        it.
-        """
+        """Return all updates below `n_clocks` clocks, with the velocity in counts per tick as the datapath has it."""
         n = self._spec.average
 
         m_e = ticks.pulse_count

@@ -17,9 +17,7 @@ class Model:
         self._spec = spec
 
     def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
-        """Return all updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows
-        it.
-        """
+        """Return all updates below `n_clocks` clocks, with the velocity in counts per tick as the datapath has it."""
         spec = self._spec
         counts = Counts.of(spec, ticks, steps, n_clocks)
         n, period = len(counts.period), counts.period
@@ -74,9 +72,7 @@ class Model:
         return np.searchsorted(clock, begun + self._spec.form.division_clocks)
 
     def _distance(self, size: Ints, opening: Ints, closing: Ints) -> Ints:
-        """Return counts from the edge of an opening count to that of a closing one; on the lattice, the last of each
-        tick.
-        """
+        """Return counts from the edge of an opening count to that of a closing one; on the lattice, the tick's last."""
         through = np.cumsum(size)
         whole = through[closing] - through[opening]
         if self._spec.paper_exact:

@@ -144,9 +144,7 @@ class Model:
         return last, beyond, np.repeat(1 << found.shift, found.n_dt)
 
     def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
-        """Return all updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows
-        it.
-        """
+        """Return all updates below `n_clocks` clocks, with the velocity in counts per tick as the datapath has it."""
         spec = self._spec
         delay = spec.latency.tick + spec.latency.datapath
         found = windows(spec, steps, n_clocks - delay)

@@ -76,9 +76,7 @@ class Model:
         self._spec = spec
 
     def updates(self, ticks: Table, steps: Steps | None, n_clocks: int) -> Table:
-        """Return all updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows
-        it.
-        """
+        """Return all updates below `n_clocks` clocks, with the velocity in counts per tick as the datapath has it."""
         spec, m_e = self._spec, ticks.pulse_count
         i, m_s, forced = windows(alterations(m_e), spec.timing.max_ticks)
         at = i + 1  # m_e(−1) = 0 comes first

@@ -95,9 +95,7 @@ class Measurements:
         return Measurements(**columns)
 
     def with_more(self, more: "Measurements") -> "Measurements":
-        """Return the rows of both in order of their clocks; `more`, of which there are few, after those of the same
-        clock.
-        """
+        """Return the rows of both in order of their clocks; `more`, which are few, after those of the same clock."""
         at = np.searchsorted(self.clock, more.clock, side="right")
         columns: dict[str, Any] = {
             name: None if own is None else np.insert(own, at, vars(more)[name], axis=0)
@@ -191,9 +189,7 @@ def _asking(spec: TimedTachometer, counts: Counts, taken: Measurements, held: In
 
 
 def _greatest(spec: TimedTachometer, velocity: Ints, age: Ints) -> Ints:
-    """Return the greatest velocity of this sign after a silence; an edge may lie half a count off, so it allows 1½
-    counts.
-    """
+    """Return the greatest velocity of a sign after a silence; an edge may lie half a count off, so 1½ counts."""
     return rounded(spec, 3 * np.where(velocity < 0, -1, 1), age)[0]
 
 

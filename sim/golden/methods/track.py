@@ -150,9 +150,7 @@ class Model:
         self._spec = spec
 
     def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
-        """Return all updates of the clocks below `n_clocks`, with the velocity in counts per tick as the datapath shows
-        it.
-        """
+        """Return all updates below `n_clocks` clocks, with the velocity in counts per tick as the datapath has it."""
         spec = self._spec
         windows = Windows.of(steps, ticks.clock - spec.latency.tick, spec.form.most_number)
         lead = spec.program.lead

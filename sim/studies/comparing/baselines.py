@@ -27,7 +27,7 @@ MOTEUS_3DB_RATIO = 2.48
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """The counts of an encoder, one by one.
+    """Holds the counts of an encoder, one by one.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class Steps:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """A measured speed.
+    """Holds a measured speed.
 
     Parameters
     ----------

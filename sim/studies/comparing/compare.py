@@ -84,9 +84,7 @@ def run_curve(name: str, spec: TachometerSpec, run: Run) -> Curve:
 
 
 def common_instants(curves: Iterable[Curve], duration: float, tick_seconds: float, earliest: float = 0.0) -> FloatArray:
-    """Return evenly spaced instants, a tick apart or more, from when every curve has begun, and `earliest` (s), to the
-    end.
-    """
+    """Return evenly spaced instants, a tick apart or more, from when all curves and `earliest` (s) have begun."""
     begun = max((curve.estimate.time[0] for curve in curves if len(curve.estimate.time)), default=0.0)
     begun = max(begun, earliest)
     n = min(int((duration - begun) / tick_seconds), _MOST_INSTANTS)

@@ -162,7 +162,7 @@ def _time(seconds: float) -> str:
 
 @dataclass(frozen=True)
 class Setting:
-    """A method with its options.
+    """Holds a method with its options.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ def _number(what: str, text: str) -> float:
 
 @dataclass(frozen=True)
 class Parameter:
-    """An option of a baseline.
+    """Describes an option of a baseline.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ _ORDER = Parameter("order", parse_whole)
 
 @dataclass(frozen=True)
 class Baseline:
-    """A float model of what others do.
+    """Describes a float model of what others do.
 
     Parameters
     ----------
@@ -227,9 +227,7 @@ def baseline_model(name: str) -> tuple[str, Callable[[Steps], Estimate]]:
 
 
 def steps_curve(name: str, steps: Steps) -> Curve:
-    """Return what a baseline shows of steps; ValueError if its name or options are not known, or it is shorter than two
-    of its periods.
-    """
+    """Return what a baseline shows of steps; ValueError if there is none such, or not two of its periods."""
     what, model = baseline_model(name)
     estimate = model(steps)
     if len(estimate.time) < 2:

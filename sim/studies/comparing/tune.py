@@ -41,9 +41,7 @@ class Cost:
 
 
 def core_settings(method: str) -> list[tuple[str, dict[str, str]]]:
-    """Return names of a core's method with all settings that are tried, and their options; as it is if there are
-    none.
-    """
+    """Return names of a core's method with all settings that are tried, and their options."""
     if method not in CORES:
         return [(method, {})]
     option, values = CORES[method]

@@ -38,7 +38,7 @@ class Command(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Load:
-    """A torque for some time.
+    """Describes a torque that acts for some time.
 
     Parameters
     ----------
@@ -190,9 +190,7 @@ def _dip(log: Log, load: Load) -> float:
 
 
 def as_shown(log: Log, rad_per_count: float, rate: float = 30.0, period: float = 1e-3) -> FloatArray:
-    """Return the speed by the M method every `period` through a low-pass filter of `rate` rad/s, as in Figs. 13 and
-    14.
-    """
+    """Return the speed by the M method every `period`, low-pass filtered at `rate` rad/s, as in Figs. 13 and 14."""
     every = round(period / (log["time"][1] - log["time"][0]))
     measured = np.diff(log["position"][::every], prepend=0.0) * rad_per_count / period
     kept, found, state = math.exp(-rate * period), [], 0.0

@@ -12,7 +12,7 @@ from tachometry.sim.studies.loops.control import Outcome, Setting, in_gates, sim
 
 @dataclass(frozen=True)
 class Checked:
-    """A run in gates.
+    """Holds a run in gates.
 
     Parameters
     ----------

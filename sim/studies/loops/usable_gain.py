@@ -27,7 +27,7 @@ TASK = Task(
 
 @dataclass(frozen=True, kw_only=True)
 class Kind:
-    """A way to close the loop.
+    """Says how the loop is closed.
 
     Parameters
     ----------
@@ -73,9 +73,7 @@ TICKS = {
 
 
 def core(kind: Kind, seconds: float, decoding: int = 4, kv: float = GAINS[0]) -> TachometerSpec:
-    """Return the core of a kind at a control tick: at one clock per tick with bits that keep the LSB below 2^-6
-    rad/s.
-    """
+    """Return the core of a kind, whose tick is a control tick, with an LSB below 2^-6 rad/s."""
     clock, tick = TICKS[seconds]
     if seconds < kind.shortest:
         clock, tick = TICKS[20e-6]
@@ -100,9 +98,7 @@ def setting(kind: Kind, kv: float, seconds: float, encoder: VirtualEncoder, deco
 
 
 def is_usable(outcome: Outcome) -> bool:
-    """Tell whether nothing is heard, and the loop does not swing: the current stays below its
-    limit, the speed close.
-    """
+    """Tell whether nothing is heard or swings: the current stays below its limit, the speed close."""
     return outcome.sound <= SOUND and outcome.limited == 0 and outcome.largest <= DEVIATION
 
 

@@ -39,7 +39,7 @@ class Grid(Generic[Item]):
 
 
 class Points(Grid[Point]):
-    """The points of a sweep."""
+    """Holds the points of a sweep."""
 
     @property
     def unit(self) -> SpeedUnit:

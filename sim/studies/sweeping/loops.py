@@ -26,7 +26,7 @@ FIGURES = {
 
 @dataclass(frozen=True)
 class LoopPoint:
-    """A setting with its seeds.
+    """Holds a setting with its seeds.
 
     Parameters
     ----------

@@ -204,9 +204,7 @@ def _read(path: Path) -> pa.Table:
 
 
 def _read_journal(path: Path) -> list[Row]:
-    """Return rows of a journal after its first line, the code; the last line may not be whole, even if it is the
-    first.
-    """
+    """Return rows of a journal after its first line, the code; any last line may not be whole."""
     whole = path.read_text(encoding="ascii").split("\n")[:-1]
     rows: list[Row] = [json.loads(line) for line in whole[1:]]
     if rows:

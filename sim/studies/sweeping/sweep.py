@@ -117,7 +117,7 @@ def _content(about: Option) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class Point:
-    """A core on a motion.
+    """Describes a core on a motion.
 
     Parameters
     ----------
