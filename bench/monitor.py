@@ -22,12 +22,7 @@ PICTURE = Path(__file__).resolve().parent.parent / "docs" / "guides" / "monitor.
 CORE = {"ppr": "500", "clock": "12MHz", "max-speed": "1000rad/s", "filter": "4", "age": "yes"}
 STEP = 12_000  # clocks of a look at the line
 # Settings, each with the seconds that it lasts.
-MOTION = [
-    ("speed=300rad/s", 3.0),
-    ("speed=-100rad/s", 3.0),
-    ("speed=0", 2.0),
-    ("speed=40rad/s", 2.0),
-]
+MOTION = [("speed=300rad/s", 3.0), ("speed=-100rad/s", 3.0), ("speed=0", 2.0), ("speed=40rad/s", 2.0)]
 SIZE = 110, 26
 
 

@@ -65,13 +65,7 @@ def measure(where: str, run: Callable[[], Iterable[object]]) -> list[str]:
     started = time.monotonic()
     n_points = sum(1 for _ in arriving)
     took, processor = time.monotonic() - started, _processor() - before
-    return [
-        where,
-        str(n_points),
-        f"{started - begun:.1f} s",
-        f"{n_points / took:.0f}",
-        f"{n_points / processor:.0f}",
-    ]
+    return [where, str(n_points), f"{started - begun:.1f} s", f"{n_points / took:.0f}", f"{n_points / processor:.0f}"]
 
 
 def _processor() -> float:

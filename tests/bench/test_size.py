@@ -270,9 +270,7 @@ def test_what_a_greatest_speed_changes() -> None:
     changes: dict[str, dict[str, float]] = {"ECP5": {"COMB": 264, "FF": 273}, "HX8K": {"LC": 330, "Fmax": 135.5}}
     for target, changed in changes.items():
         found["default", target] = size.Measurement({**found["reference", target].figures, **changed}, "")
-    assert size.speed_table(found).rows == [
-        ["reference", "default", "+1", "-13", "+0.0", "+10", "-5.5", "", ""],
-    ]
+    assert size.speed_table(found).rows == [["reference", "default", "+1", "-13", "+0.0", "+10", "-5.5", "", ""]]
 
 
 @pytest.mark.parametrize(("changed", "missed"), [({}, ""), ({"LC": 341}, "LC"), ({"Fmax": 129.9}, "Fmax")])

@@ -38,11 +38,7 @@ _SHARED = {
 }
 _TIMED = {"timer": "timer", "bound_decay": "bound-decay", "paper_exact": "paper-exact"}
 _RAIRAN = {"estimate": "estimate", "paper_exact": "paper-exact", "bound_decay": "bound-decay", "adaptive": "adaptive"}
-_TRACK = {
-    "max_memory": "max-memory",
-    "multiplier": "multiplier",
-    "fine_bits": "fine-bits",
-}
+_TRACK = {"max_memory": "max-memory", "multiplier": "multiplier", "fine_bits": "fine-bits"}
 WORDS = {
     "s": {**_SHARED, "cancel": "cancel", "reciprocal_source": "reciprocal"},
     "m": {**_SHARED, "average": "average"},

@@ -35,19 +35,11 @@ PAPER: dict[str, Sequence] = {
     # Sec. V-D: alternate alterations of size 1 around a multiple of the unit velocity cancel, as in Fig. 9(b).
     "3 2 4 3 3": (
         [3, 3, 3, 2, 4, 3, 3],
-        [
-            (0, 1, False, F(3), F(3, 2)),
-            (3, 3, False, F(8, 3), F(17, 6)),
-            (4, 1, False, F(4), F(3)),
-        ],
+        [(0, 1, False, F(3), F(3, 2)), (3, 3, False, F(8, 3), F(17, 6)), (4, 1, False, F(4), F(3))],
     ),
     "1 2 0 1": (
         [1, 1, 1, 2, 0, 1, 1],
-        [
-            (0, 1, False, F(1), F(1, 2)),
-            (3, 3, False, F(4, 3), F(7, 6)),
-            (4, 1, False, F(0), F(1)),
-        ],
+        [(0, 1, False, F(1), F(1, 2)), (3, 3, False, F(4, 3), F(7, 6)), (4, 1, False, F(0), F(1))],
     ),
     # Fig. 10: the shaft swings over one edge at rest; the average velocity between alternate pulses is 0.
     "+1 -1 at rest": (
@@ -71,21 +63,9 @@ PAPER: dict[str, Sequence] = {
         ],
     ),
     # An alteration in the very tick in which the update would be forced is an alteration.
-    "alteration at max_ticks": (
-        [2] + [0] * 7 + [1, 0],
-        [(0, 1, False, F(2), F(1)), (8, 8, False, F(1, 8), F(3, 16))],
-    ),
-    "standstill": (
-        [0] * 17,
-        [(7, 8, True, F(0), F(0)), (11, 8, True, F(0), F(0)), (15, 8, True, F(0), F(0))],
-    ),
-    "reversal": (
-        [2, 2, 2, -1, -1, -1],
-        [
-            (0, 1, False, F(2), F(1)),
-            (3, 3, False, F(1), F(3, 2)),
-        ],
-    ),
+    "alteration at max_ticks": ([2] + [0] * 7 + [1, 0], [(0, 1, False, F(2), F(1)), (8, 8, False, F(1, 8), F(3, 16))]),
+    "standstill": ([0] * 17, [(7, 8, True, F(0), F(0)), (11, 8, True, F(0), F(0)), (15, 8, True, F(0), F(0))]),
+    "reversal": ([2, 2, 2, -1, -1, -1], [(0, 1, False, F(2), F(1)), (3, 3, False, F(1), F(3, 2))]),
 }
 
 

@@ -64,10 +64,7 @@ EVENTS = {
         *COMMON,
     ],
     "m": ["one tick", "a power of two", "another number", "update in every clock", *COMMON],
-    "mt": [
-        "longer than the maximum time",
-        *(event for event in [*TIMED, *COMMON] if event != "out of range"),
-    ],
+    "mt": ["longer than the maximum time", *(event for event in [*TIMED, *COMMON] if event != "out of range")],
     "t": [*TIMED, *COMMON],
     "track": [
         "serial product",

@@ -112,11 +112,7 @@ _PIPELINED = """
 
 
 def every_quotient(
-    spec: STachometer,
-    numerators: Sequence[int],
-    folder: Path,
-    towards: int = 0,
-    every: int = 1,
+    spec: STachometer, numerators: Sequence[int], folder: Path, towards: int = 0, every: int = 1
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Return (base, N, m, velocity) of each `every`-th m with every N, from start to start as fast as can be.
 

@@ -66,12 +66,7 @@ class Loop(wiring.Component):  # type: ignore[misc]
         inputs = ("a", "b", "z", "tick_in", "capture", "uart_rx", "spi_cs_n")
         outputs = ("emulated_a", "emulated_b", "emulated_z", "uart_tx", "spi_miso", "captured", "velocity_valid")
         super().__init__(
-            {
-                **dict.fromkeys(inputs, In(1)),
-                **dict.fromkeys(outputs, Out(1)),
-                "leds": Out(4),
-                "velocity": Out(20),
-            }
+            {**dict.fromkeys(inputs, In(1)), **dict.fromkeys(outputs, Out(1)), "leds": Out(4), "velocity": Out(20)}
         )
 
     def elaborate(self, platform: object) -> Module:

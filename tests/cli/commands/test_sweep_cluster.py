@@ -193,10 +193,7 @@ def test_a_point_that_no_worker_outlives(tmp_path: Path) -> None:
     script.write_text(
         "import os\nfrom tachometry.sim.studies.sweeping import sweep\nsweep.run_point = lambda point: os._exit(1)\n"
     )
-    more = {
-        "DASK_DISTRIBUTED__WORKER__PRELOAD": f'["{script}"]',
-        "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0",
-    }
+    more = {"DASK_DISTRIBUTED__WORKER__PRELOAD": f'["{script}"]', "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0"}
     words = [*COMMAND, *SWEEP[:-2], "--methods", "m", "--vary", "speed=5rad/s", "--jobs", "1"]
     done = subprocess.run(words, env=os.environ | more, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (2, "")

@@ -76,8 +76,7 @@ def test_the_form_has_every_option_of_the_command(client: TestClient) -> None:
 @pytest.mark.parametrize(
     "options",
     only(
-        [WITH_BUS],
-        [CORE, WITH_BUS, {**CORE, "tick": "200us", "loop": "yes", "gains": "inputs", "testbench": "cocotb"}],
+        [WITH_BUS], [CORE, WITH_BUS, {**CORE, "tick": "200us", "loop": "yes", "gains": "inputs", "testbench": "cocotb"}]
     ),
 )
 def test_the_archive_has_what_the_command_writes(client: TestClient, options: dict[str, str], tmp_path: Path) -> None:

@@ -20,10 +20,7 @@ from tachometry.spec.control import LoopSpec
 from tachometry.spec.registers.loop import LoopMap
 
 CORE = replace(SMALL, tachometer=replace(SMALL.tachometer, timing=Timing(1_000_000, 100, 3)), gains="inputs")
-SPECS = {
-    "commands": CORE,
-    "generator": replace(CORE, command="generator"),
-}
+SPECS = {"commands": CORE, "generator": replace(CORE, command="generator")}
 
 
 def random_accesses(registers: LoopMap, seed: int, n_clocks: int) -> tuple[list[Access], list[int]]:

@@ -154,10 +154,7 @@ def test_whole_cycles_after_silence() -> None:
         ),
         ({"min_time": 0}, "min_time must be from 1 to 400 clocks, the maximum time, not 0"),
         ({"min_time": 401}, "min_time must be from 1 to 400 clocks, the maximum time, not 401"),
-        (
-            {"min_time": 30, "timer": "tick"},
-            "min_time must be a multiple of 20 clocks with times in ticks, not 30",
-        ),
+        ({"min_time": 30, "timer": "tick"}, "min_time must be a multiple of 20 clocks with times in ticks, not 30"),
         ({"timer": "x"}, "timer must be clock or tick, not 'x'"),
     ],
 )

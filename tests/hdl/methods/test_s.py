@@ -41,12 +41,7 @@ def check_paper_sequences(*, cancel: bool = True, serial: bool = True) -> None:
             wanted.append(
                 (
                     tick * spec.timing.tick_cycles + spec.latency.tick_to_velocity,
-                    {
-                        "velocity_valid": 1,
-                        "velocity": velocity,
-                        "interval": m_s,
-                        "forced": int(forced),
-                    },
+                    {"velocity_valid": 1, "velocity": velocity, "interval": m_s, "forced": int(forced)},
                 )
             )
         assert got == wanted, name

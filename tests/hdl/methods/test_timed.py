@@ -133,10 +133,7 @@ def test_burst_after_standstill(method: str) -> None:
 def test_count_at_the_maximum_time(method: str) -> None:
     """It is a count, and the silence of a clock more is one."""
     got = run(timed(method, bound_decay=False), {5: 1, 5 + SILENCE: 1, 6 + 2 * SILENCE: 1}, 7 + 2 * SILENCE)
-    assert got == [
-        (5 + SILENCE, speed(1, SILENCE), SILENCE, False),
-        (5 + 2 * SILENCE, 0, SILENCE, True),
-    ]
+    assert got == [(5 + SILENCE, speed(1, SILENCE), SILENCE, False), (5 + 2 * SILENCE, 0, SILENCE, True)]
     # Where a second 0 would be forced, it is the first after a silence.
     assert run(timed(method), {5: 1, 5 + 2 * SILENCE: 1}, 6 + 2 * SILENCE) == silence(5, 5 + 2 * SILENCE)
 

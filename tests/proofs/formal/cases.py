@@ -170,14 +170,7 @@ def small(**options: Any) -> STachometer:
 def small_m(average: int) -> MTachometer:
     """Return a core of the M method, a tick a clock, with bounds."""
     s = small(tick_cycles=1, bounds=True)
-    return MTachometer(
-        encoder=s.encoder,
-        timing=s.timing,
-        frac_bits=4,
-        position_width=8,
-        bounds=True,
-        average=average,
-    )
+    return MTachometer(encoder=s.encoder, timing=s.timing, frac_bits=4, position_width=8, bounds=True, average=average)
 
 
 _RAIRAN_PROBES = {

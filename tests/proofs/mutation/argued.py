@@ -89,11 +89,7 @@ ARGUED = {
     ("mt, in clocks", _LEFT, "left[1] const1"): _GOES_ON,
     ("mt, in clocks", '"was_negative": Out(1),', "B[0] const1"): _NO_COUNT,
     ("mt, in clocks", '"was_negative": Out(1),', "S[0] const0"): _NO_COUNT,
-    (
-        "mt, in clocks",
-        "copy = Signal(len(divider.quotient), init=1 << (len(divider.quotient) - 1))",
-        "B[8] const0",
-    ): (
+    ("mt, in clocks", "copy = Signal(len(divider.quotient), init=1 << (len(divider.quotient) - 1))", "B[8] const0"): (
         "it is the sign of the copy after a reset: until a measurement replaces the copy, what decays is 0, and a "
         "quotient passes this bound with its first digit as it passes 0, so nothing is shown, and the copy stays"
     ),

@@ -87,7 +87,4 @@ def _case(axes: int, tick_cycles: int, max_ticks: int, mutants: int, *, parallel
     return AxesCase(f"{axes} axes{', held' * parallel}", spec, mutants)
 
 
-AXES = [
-    _case(5, 55, 4, 240, parallel=False, index=True),
-    _case(2, 35, 3, 120, parallel=True, index=False),
-]
+AXES = [_case(5, 55, 4, 240, parallel=False, index=True), _case(2, 35, 3, 120, parallel=True, index=False)]

@@ -122,9 +122,7 @@ _argue(
 )
 _argue(f"{_REGISTERS}.answers", "No event that is counted is in clock 0.", "1 → 0")
 _argue(
-    f"{_REGISTERS}.answers",
-    "It is only read if something has been captured, and then it has been set.",
-    "False → True",
+    f"{_REGISTERS}.answers", "It is only read if something has been captured, and then it has been set.", "False → True"
 )
 _argue(
     f"{_REGISTERS}._read",
@@ -178,9 +176,7 @@ _argue(
     "False → True",
 )
 _argue(
-    f"{_RAIRAN}: Model._events",
-    "Before the first measurement n is 0, and 0 is shifted.",
-    *("0 → -1 #3", "0 → 1 #3"),
+    f"{_RAIRAN}: Model._events", "Before the first measurement n is 0, and 0 is shifted.", *("0 → -1 #3", "0 → 1 #3")
 )
 
 _argue(
@@ -268,16 +264,8 @@ _argue(
     "It is 2 at least anyway.",
     *("0 → 1", "0 → 1 #2", "0 → -1", "0 → -1 #2"),
 )
-_argue(
-    "spec/methods/rairan.py: RairanForm._bound",
-    "It is only asked for −1 and 1.",
-    "towards < 0 → towards <= 0",
-)
-_argue(
-    "spec/methods/rairan.py: RairanForm.lower_table.loose",
-    "Whatever is not negative is rounded up.",
-    "1 → 0 #2",
-)
+_argue("spec/methods/rairan.py: RairanForm._bound", "It is only asked for −1 and 1.", "towards < 0 → towards <= 0")
+_argue("spec/methods/rairan.py: RairanForm.lower_table.loose", "Whatever is not negative is rounded up.", "1 → 0 #2")
 _argue(
     "spec/core/widths.py: Widths.needed_velocity",
     "The greatest output does not depend on the width that it is held within.",

@@ -131,11 +131,7 @@ def test_a_motion_counts_what_the_log_says(
     ],
 )
 def test_options_of_counts(
-    options: str,
-    message: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    options: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "log.csv").write_text("time,n\n0,0\n1,9\n")
     monkeypatch.chdir(tmp_path)

@@ -37,8 +37,7 @@ def test_cut_compressed_text(tmp_path: Path) -> None:
     assert read_capture(tmp_path / "x.csv.gz").a.tolist() == [0, 1]
     (tmp_path / "x.csv.gz").write_bytes(content[:-9])
     assert_error(
-        tmp_path / "x.csv.gz",
-        "cannot read PATH: Compressed file ended before the end-of-stream marker was reached",
+        tmp_path / "x.csv.gz", "cannot read PATH: Compressed file ended before the end-of-stream marker was reached"
     )
 
 
@@ -296,14 +295,8 @@ def test_csv_without_rows(tmp_path: Path, rows: str) -> None:
             "2,2,0",
             "PATH line 4: level of a must be 0 or 1, not '2' (of both lines in one number, --a a[0] is the lowest bit)",
         ),
-        (
-            "2,0,-1",
-            "PATH line 4: level of b must be 0 or 1, not '-1' VOLTAGE",
-        ),
-        (
-            "2,0,0.5",
-            "PATH line 4: level of b must be 0 or 1, not '0.5' VOLTAGE",
-        ),
+        ("2,0,-1", "PATH line 4: level of b must be 0 or 1, not '-1' VOLTAGE"),
+        ("2,0,0.5", "PATH line 4: level of b must be 0 or 1, not '0.5' VOLTAGE"),
         (
             "2,0,01",
             "PATH line 4: level of b must be 0 or 1, not '01' "

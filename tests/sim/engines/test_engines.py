@@ -36,10 +36,7 @@ def turning(n_clocks: int, spacing: int = 7) -> PinTrace:
 
 @pytest.mark.parametrize(
     ("name", "method", "seed"),
-    [
-        *(("cxxrtl", *case) for case in [("m", 4), ("s", 9), ("mt", 2), ("t", 0), ("rairan", 1)]),
-        ("verilator", "mt", 2),
-    ],
+    [*(("cxxrtl", *case) for case in [("m", 4), ("s", 9), ("mt", 2), ("t", 0), ("rairan", 1)]), ("verilator", "mt", 2)],
 )
 @nightly  # the tests below hold CXXRTL against the golden model, too, and test_matrix.py holds Verilator
 def test_random_cases(name: str, method: str, seed: int) -> None:

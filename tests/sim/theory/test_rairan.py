@@ -109,11 +109,7 @@ def test_bounds_of_the_errors_are_attained_or_suprema() -> None:
     for estimate, error in zip((m.n1, n2), errors, strict=True):
         np.testing.assert_allclose(error, rairan.rairan_eq02_error(estimate, m.speed), atol=1e-12)
     errors.append(rairan.rairan_eq02_error(n3, m.speed))
-    bounds = [
-        rairan.rairan_eq04_max_error(m.n1),
-        rairan.rairan_eq08_sup_error(n2),
-        rairan.rairan_eq12_max_error(n3),
-    ]
+    bounds = [rairan.rairan_eq04_max_error(m.n1), rairan.rairan_eq08_sup_error(n2), rairan.rairan_eq12_max_error(n3)]
     np.testing.assert_allclose(rairan.rairan_eq13_max_error(m.n1), bounds[2])
     attained = [lambda n1: n1 <= 1, lambda n1: n1 >= 1, lambda n1: True]
     for error, bound, is_attained in zip(errors, bounds, attained, strict=True):

@@ -150,16 +150,8 @@ def test_after_an_upset_an_axis_is_right_as_late_as_a_core_of_its_own() -> None:
         (8, {"max_ticks": 4096}, "max_ticks must be at most 2048 with axes, not 4096: 1/m_s is looked up"),
         (8, {"max_ticks": 2048}, ""),
         (8, {"tick": 67 * 16}, ""),
-        (
-            8,
-            {"tick": 997},
-            "tick_cycles must be a multiple of a number from 8 to 64, and long enough for a turn of ",
-        ),
-        (
-            2,
-            {"tick": 998},
-            "tick_cycles must be a multiple of a number from 4 to 64, and long enough for a turn of ",
-        ),
+        (8, {"tick": 997}, "tick_cycles must be a multiple of a number from 8 to 64, and long enough for a turn of "),
+        (2, {"tick": 998}, "tick_cycles must be a multiple of a number from 4 to 64, and long enough for a turn of "),
         (64, {"tick": 1000}, "tick_cycles must be a multiple of 64, and long enough for a turn of "),
     ],
 )

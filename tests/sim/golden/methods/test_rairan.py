@@ -313,10 +313,7 @@ def test_a_burst_after_standstill() -> None:
             {"adaptive": Fraction(1, 10), "paper_exact": True},
             "adaptive must not be given with paper_exact, whose dt is constant",
         ),
-        (
-            {"adaptive": Fraction(1, 10), "max_ticks": 3},
-            "max_ticks must be at least 4 with adaptive, not 3",
-        ),
+        ({"adaptive": Fraction(1, 10), "max_ticks": 3}, "max_ticks must be at least 4 with adaptive, not 3"),
         (
             {"adaptive": Fraction(1, 10), "dt": 1025},
             "max_speed must be at most 1024 counts per tick with adaptive, not 1025",
