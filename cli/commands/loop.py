@@ -13,7 +13,7 @@ from tachometry.cli.options.motion import FORMS
 from tachometry.cli.options.option import option, output
 from tachometry.cli.options.points import loops_of
 from tachometry.cli.options.settings import Settings
-from tachometry.cli.options.sweep import VaryingCommand
+from tachometry.cli.options.sweep import JOBS, SCHEDULER, VaryingCommand, check_machines
 from tachometry.cli.reports.closed_loop import log_table, loop_table, print_loops
 from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim import build
@@ -57,20 +57,8 @@ Examples:
     "as in mt:timer=tick.",
 )
 @option("Sweep", "--seeds", type=int, default=6, metavar="N", help="Runs of each loop, with seeds from --seed on.")
-@option(
-    "Sweep",
-    "--jobs",
-    type=int,
-    metavar="N",
-    help="Number of runs at once on this machine. [default: one for each core]",
-)
-@option(
-    "Sweep",
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Run on the workers of a Dask scheduler, such as tcp://host:8786, with the same version of tachometry. "
-    "Whoever can connect to it can run code there and here, see docs/guides/sweep.md.",
-)
+@JOBS
+@SCHEDULER
 @output(
     "--plot",
     suffixes=(".png", ".pdf", ".svg"),
@@ -106,10 +94,7 @@ def loop(
     Several methods, or axes with --vary, are run on all cores, which needs the extra `sweep`. Equal options give equal
     files. It needs a C++ compiler.
     """
-    if jobs is not None and scheduler is not None:
-        raise ValueError("--jobs must not be given together with --scheduler")
-    if jobs is not None and jobs < 1:
-        raise ValueError(f"--jobs must be at least 1, not {jobs}")
+    check_machines(jobs, scheduler)
     grid = loops_of(settings, methods, seeds)
     alone = len(grid.points) == 1 and scheduler is None
     if log is not None and not alone:

@@ -12,7 +12,7 @@ from tachometry.cli.options.motion import FORMS
 from tachometry.cli.options.option import FilePath, option, output
 from tachometry.cli.options.points import points_of
 from tachometry.cli.options.settings import Settings
-from tachometry.cli.options.sweep import VaryingCommand, point_options
+from tachometry.cli.options.sweep import JOBS, SCHEDULER, VaryingCommand, check_machines, point_options
 from tachometry.cli.reports.sweep import COLUMNS, print_sweep
 from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim.engines.pick import pick
@@ -81,20 +81,8 @@ Examples:
     help="Also run the hardware, as simulate does, in lockstep with the golden model. [default: only the golden model, "
     "which the hardware equals bit for bit]",
 )
-@option(
-    "Machines",
-    "--jobs",
-    type=int,
-    metavar="N",
-    help="Number of processes on this machine. [default: one for each core]",
-)
-@option(
-    "Machines",
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Run on the workers of a Dask scheduler, such as tcp://host:8786, with the same version of tachometry. "
-    "Whoever can connect to it can run code there and here, see docs/guides/sweep.md.",
-)
+@JOBS
+@SCHEDULER
 @output(
     "--results",
     suffixes=(".parquet",),
@@ -141,12 +129,9 @@ def sweep(
     earliest = 0.0 if start is None else float(parse_time("start", start))
     if earliest < 0:
         raise ValueError(f"--from must be at least 0, not {start}")
-    if jobs is not None and scheduler is not None:
-        raise ValueError("--jobs must not be given together with --scheduler")
     if axes is not None and plot is None:
         raise ValueError("--axes must be given together with --plot")
-    if jobs is not None and jobs < 1:
-        raise ValueError(f"--jobs must be at least 1, not {jobs}")
+    check_machines(jobs, scheduler)
     grid = points_of(settings, methods, earliest, pick(engine).name if engine == "auto" else engine)
     across = {} if plot is None else _axes(axes, grid)
     every = {"--results": results, "--plot": plot}

@@ -8,11 +8,35 @@ import click
 
 from tachometry.cli.options.core import core_click_options
 from tachometry.cli.options.motion import ENCODER_OPTIONS
-from tachometry.cli.options.option import SHORT, GroupedCommand, options_named
+from tachometry.cli.options.option import SHORT, GroupedCommand, option, options_named
 from tachometry.cli.options.settings import arguments, of_command_line, of_file
 
 # Gives what the options of the encoder make.
 ENCODER = click.command("sweep")(ENCODER_OPTIONS(lambda encoder, motion: (encoder, motion)))
+
+
+SCHEDULER = option(
+    "Machines",
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Run on the workers of a Dask scheduler, such as tcp://host:8786, with the same version of tachometry. "
+    "Whoever can connect to it can run code there and here, see docs/guides/sweep.md.",
+)
+JOBS = option(
+    "Machines",
+    "--jobs",
+    type=int,
+    metavar="N",
+    help="Number of processes on this machine. [default: one for each core]",
+)
+
+
+def check_machines(jobs: int | None, scheduler: str | None) -> None:
+    """Refuse machines that cannot be: both kinds, or none; a ValueError."""
+    if jobs is not None and scheduler is not None:
+        raise ValueError("--jobs must not be given together with --scheduler")
+    if jobs is not None and jobs < 1:
+        raise ValueError(f"--jobs must be at least 1, not {jobs}")
 
 
 def by_name(command: click.Command) -> dict[str, click.Option]:

@@ -31,11 +31,6 @@ def read_fst(
 
     Bit 0 of a vector is its last one, as pywellen does not tell how it was declared.
 
-    Parameters
-    ----------
-    path, a, b, samplerate_hz, others
-        As of `read_vcd`.
-
     Raises
     ------
     CaptureError

@@ -60,16 +60,8 @@ def read_sr(
     number of samples / samplerate. Change times are rounded down to float64 and the duration up, hence
     `Recording.place` on a clock that is a multiple of the samplerate finds sample k at clock k * multiple, exactly.
 
-    Parameters
-    ----------
-    path : path
-    a, b : str, int or None
-        Name of the channel, else its number: N is sigrok's D<N>, bit N of a sample. When not given: the channels named
-        A and B if there are both, else the first two.
-    samplerate_hz : float or None, Hz
-        For a file that has no samplerate.
-    others : mapping of str to str or int
-        Channels of further lines, `z` or `tick_in`, likewise; what is not given, the recording has not.
+    A channel is a name or a number: N is sigrok's D<N>, bit N of a sample. `others` are channels of further lines, by
+    the names of these; the other arguments are as of `read_capture`.
 
     Raises
     ------

@@ -47,19 +47,8 @@ def read_csv(
     Without a column of times, a row is a sample, and the last row lasts for its sample, too. What sigrok writes in
     comments is used: the samplerate, and the names of the channels.
 
-    Parameters
-    ----------
-    path : path
-        What ends in `.gz` is compressed by gzip.
-    a, b : str, int or None
-        Name of the column, else its number, from 0, the time left out; `state[1]` is bit 1 of the whole numbers in a
-        column. When not given: the columns named A and B (in any case) if there are both, else the first two.
-    samplerate_hz : float or None, Hz
-        Only for a file that has neither times nor a samplerate.
-    others : mapping of str to str or int
-        Columns of further lines, `z` or `tick_in`, likewise; what is not given, the recording has not.
-    options : TextOptions
-        What the text does not say.
+    A channel is the name of a column or its number from 0, the time left out; `state[1]` is bit 1 of the whole numbers
+    in a column. `options` say what the text does not; the other arguments are as of `read_sr`.
 
     Raises
     ------

@@ -34,18 +34,9 @@ def read_vcd(
     The recording begins when all of them have first been 0 or 1, and ends with the last time in the file. Where a line
     is x or z after that, its level before holds.
 
-    Parameters
-    ----------
-    path : path
-        What ends in `.gz` is compressed by gzip.
-    a, b : str, int or None
-        Name of the variable with its scopes, as `top.core.a`, or `top.enc[0]` for a bit of a vector, as it is declared;
-        else its number, from 0, among those of one bit. When not given: the variables whose names without scopes are a
-        and b, if there is one of each, else the first two.
-    samplerate_hz : None
-        Not allowed: a waveform has its times.
-    others : mapping of str to str or int
-        Variables of further lines, `z` or `tick_in`, likewise; what is not given, the recording has not.
+    A channel is the name of a variable with its scopes, as `top.core.a`, or `top.enc[0]` for a bit of a vector as it is
+    declared; else its number, from 0, among those of one bit. When not given: the variables whose names without scopes
+    are a and b, if there is one of each, else the first two. The other arguments are as of `read_sr`.
 
     Raises
     ------
