@@ -272,7 +272,7 @@ CONFIGURATIONS = (
         TrackTachometer(**COMMON, max_speed=MAX_SPEED, multiplier="block"),
         {"ECP5": {"COMB": 1500, "FF": 900, "MULT": 3, "Fmax": 60}},
         is_option=False,
-        targets=("ECP5",),
+        targets=("ECP5", "UP5K"),
     ),
     Configuration(
         "track-external-tick",

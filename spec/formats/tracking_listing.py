@@ -210,6 +210,8 @@ learn:                                  # nothing below is in a hurry
     before = e
     log_X + log_256
     if pos goto short
+    trouble
+    if pos goto short
     e over 1
     change = e + ~ keep
 short:

@@ -133,7 +133,8 @@ class Tracker:
         self.events = min(self.events + 1, 504)
         b = math.floor(math.log2(self.events + 8))
         self.long = share < 1 / 256
-        change = 3 / 2 * abs(e) if self.long else abs(e - self.before)
+        alike = self.long and self.lag**2 < 7 / 2 * self.expected
+        change = 3 / 2 * abs(e) if alike else abs(e - self.before)
         self.noise = max(self.noise + 2.0 ** -min(b, 8) * (min(change, 4 * self.noise) - self.noise), 2**-10)
         self.before = e
         self.lag += 3 / 2 * share * (e - self.lag)

@@ -129,7 +129,7 @@ struct Recursion {
     emit(ahead(), place());
     // What is learned.
     noises = std::min(noises + k.noises_one, k.noises_most);
-    if (is_long) change = e + round(e, 1);
+    if (is_long && trouble < 0) change = e + round(e, 1);
     noise += round(std::min(std::abs(change) - noise, 3 * noise), shift(std::min(noises, k.noises_offset)));
     noise = std::max(noise, k.least_noise);
     v = std::max(-k.most, std::min(v, k.most)), a = std::max(-k.most, std::min(a, k.most));

@@ -196,7 +196,7 @@ class Recursion:
         k, x = self._k, self.log_share
         self.noises = min(self.noises + k["noises_one"], k["noises_most"])
         shift = self._shift(min(self.noises, k["noises_offset"]))
-        if x + k["log_256"] < 0:
+        if x + k["log_256"] < 0 and self.trouble < 0:
             change = e + self._round(e, 1)
         self.noise += self._round(min(abs(change) - self.noise, 3 * self.noise), shift)
         self.noise = max(self.noise, k["least_noise"])

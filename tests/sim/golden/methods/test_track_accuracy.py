@@ -98,6 +98,14 @@ def test_the_errors_are_those_that_are_promised(name: str) -> None:
     assert np.median([errors(ROWS[name], seed)[0] for seed in seeds]) < 1.1 * PROMISED[name]
 
 
+def test_a_speed_that_begins_to_change_gently_is_followed() -> None:
+    """The errors grow as slowly as the noise is learned: they are not taken for noise."""
+    gentle = replace(ROWS["fast, jitter"], motion="constant:30rad/s:500ms+s-curve:30rad/s:0:1s")
+    own, other = errors(gentle, 1, beside=True)
+    assert own < 0.04
+    assert own == pytest.approx(other, rel=0.1)
+
+
 # Near the rate of the ticks early and late counts share ticks, so errors in a row are alike: there it once failed.
 @pytest.mark.parametrize("rate", only([10_000], [5000, 9800, 10_000, 25_000]))
 def test_no_noise_of_a_disc_is_taken_for_a_change_of_the_speed(rate: int) -> None:
