@@ -59,6 +59,8 @@ _TEXTS = {
     "late-log.csv": _LOG + "1e29,10\n",
     "deep.toml": "ppr = " + "[" * 100_000,
     "deep-table.toml": "ppr = " + "{a = " * 5_000,
+    "good.toml": 'ppr = 100\nclock = "1MHz"\nmax-time = "20ms"\nmotion = "constant:{speed}:100ms"\n'
+    '[vary]\nspeed = ["5rad/s", "50rad/s"]\ntick = ["100us", "1ms"]\n',
     "broken.toml": "ppr = \n",
     "unknown-key.toml": "revolutions = 9\n",
     "list.toml": "ppr = [9, 10]\n",

@@ -9,7 +9,6 @@ from tachometry.boards.host.registers import HostRegisters
 from tachometry.spec.registers.frames import CRC_POLYNOMIAL, CRC_START, SEQUENCES, TELEMETRY_HEADER
 
 FRAME_CLOCKS = 12_000
-_WORD_BYTES = 4
 
 
 @dataclass(frozen=True)

@@ -105,25 +105,6 @@ def test_verilog_without_warnings(words: tuple[str, ...], tmp_path: Path) -> Non
     lint(["axes.v"], "axes", tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        ("--parallel", "--parallel must be given together with --axes"),
-        ("--axes 65", "--axes must be from 1 to 64, not 65"),
-        ("--axes 4 --method m", "--method must be s or track together with --axes, not m"),
-        ("--axes 4 --age", "--age must not be given together with axes: "),
-        ("--axes 8 --tick 1us --max-time 1ms", "--tick, in clocks, must be a multiple of a number from 8 to 64, "),
-        ("--axes 4 --bus apb", "--parallel must be given together with axes and a bus: "),
-        ("--axes 64 --method s --parallel --bus spi", "--bus must be another than spi for 324 registers: it has 127"),
-        ("--axes 4 --for rio", "--for must be another than rio with axes: "),
-    ],
-)
-def test_what_is_refused(words: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("generate", "--ppr", "500", "-o", tmp_path / "out", *words.split()) == 2
-    assert capsys.readouterr().err.startswith(f"tachometry: error: {told}")
-    assert not (tmp_path / "out").exists()
-
-
 def test_an_axis_has_one_motion_at_most(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("simulate", *CORE, "--axes", "2", "--motion", "stop:1ms,stop:1ms,stop:1ms") == 2
     assert "must have at most one motion for each of the --axes 2, not 3" in capsys.readouterr().err

@@ -37,49 +37,6 @@ def test_options_of_methods(capsys: pytest.CaptureFixture[str]) -> None:
     assert names == ["s", "s:cancel=no", "m:average=10"]
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--methods", "x"], "--methods must be of auto, s, m, "),
-        (["--methods", ""], "or all, not ''"),
-        (["--methods", "s:foo=1"], "options of method s must be of cancel, reciprocal, not 'foo'"),
-        (["--methods", "m:average=q"], "--average must be a whole number, not 'q'"),
-        (["--methods", "m:average=900"], "--average must be from 1 to 256, not 900"),
-        (["--motion", "stop:1us"], "--motion must last at least two control periods of difference, not 1e-06 s"),
-        (["--motion", "stop:1500us", "--methods", "s"], "--motion must last until every method has a value"),
-        (["--replay", "x.sr"], "--motion must be given, or --replay, and not both"),
-        (["--from", "2s"], "--motion must last until every method has a value, and beyond --from, longer than 400ms"),
-        (["--from", "-1s"], "--from must be at least 0, not -1s"),
-        (["--plot", "x.jpg"], "file must end in .png, .pdf or .svg"),
-        (["--tradeoff", "x.gif"], "file must end in .png, .pdf, .svg or .csv"),
-        (["--methods", "hostmot2:x=1"], "options of hostmot2 must be of period, not 'x'"),
-        (["--motion", "stop:1us", "--methods", "difference,hostmot2:x=1"], "options of hostmot2 must be of period"),
-        (
-            ["--methods", "hostmot2:period=1"],
-            "period must be a number with one of the units s, ms, us, ns: type 1s,",
-        ),
-        (["--methods", "hostmot2:period=0s"], "control period must be more than 0 s, not 0.0 s"),
-        (["--methods", "kalman:order=4"], "order of the filter must be 2 or 3, not 4"),
-        (["--tune", "--from", "2s"], "--motion must last longer than --from, not 400ms"),
-        (["--tune", "--motion", "stop:1us"], "--motion must last"),
-        (
-            ["--tradeoff", "new/t.png", "--motion", "stop:50ms"],
-            "--motion must move the shaft where there is a --tradeoff",
-        ),
-    ],
-)
-def test_what_cannot_be_is_told_in_one_line(
-    options: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run("compare", *CORE, *MOTION, "--csv", tmp_path / "new" / "c.csv", *options) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.startswith("tachometry: error: ")
-    assert captured.err.count("\n") == 1
-    assert message in captured.err
-    assert not list(tmp_path.iterdir())
-
-
 def test_a_capture_in_place_of_a_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Edges of a capture give the same updates, and no errors, for nobody knows the truth."""
     saved = [*"simulate --method s --motion ramp:0:40rad/s:200ms --save-capture".split(), tmp_path / "c.sr"]

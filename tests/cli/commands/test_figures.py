@@ -61,25 +61,6 @@ def test_a_mismatch_of_the_hardware_is_told(
     assert " mismatches in " in told
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--only", "tsuji1"], "--only must be of tsuji5, tsuji6, "),
-        (["--only", ""], "or all, not ''"),
-        (["--nothing"], "No such option"),
-    ],
-)
-def test_what_cannot_be_is_told_in_one_line(
-    options: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run(*options, "-o", tmp_path / "new") == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.count("\n") == 1
-    assert message in captured.err
-    assert not list(tmp_path.iterdir())
-
-
 def test_help_names_all_figures(capsys: pytest.CaptureFixture[str]) -> None:
     assert command.run("help", "figures", "--only") == 0
     told = capsys.readouterr().out.replace(",", " ").split()

@@ -58,22 +58,10 @@ def test_it_writes_and_lists_the_files_of_export(
         assert rows.split("registers")[-1].strip() == said
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ("--for litex --bus spi", "--bus must be wishbone for litex, not spi"),
-        ("--for rio --bus uart", "--bus must be none for rio, not uart"),
-        (
-            "--method s --for rio --position-width 33",
-            "--position-width must be at most 32 for RIO, whose numbers have no more, not 33",
-        ),
-    ],
-)
-def test_a_core_that_does_not_fit_its_target_is_refused(
-    options: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run("generate", "--ppr", "500", *options.split(), "-o", tmp_path / "new") == 2
-    assert capsys.readouterr().err == f"tachometry: error: {message}\n"
+def test_rio_has_no_wide_numbers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("generate", *"--method s --ppr 500 --for rio --position-width 33".split(), "-o", tmp_path / "new") == 2
+    told = "--position-width must be at most 32 for RIO, whose numbers have no more, not 33"
+    assert capsys.readouterr().err == f"tachometry: error: {told}\n"
     assert not (tmp_path / "new").exists()
 
 

@@ -109,53 +109,6 @@ def test_a_controller_in_gates(tmp_path: Path) -> None:
     assert away["double"] > 0.1
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ("--kv -1", "--kv must be greater than 0, not -1"),
-        ("--observer 0Hz", "--observer must be greater than 0, not 0"),
-        ("--velocity-filter 0Hz", "--velocity-filter must be greater than 0, not 0"),
-        ("--velocity-filter some", "--velocity-filter must be a number with one of the units rad/s"),
-        ("--delay 30us", "--delay must be at most a control tick, 20us, not 30us"),
-        ("--control-period 1ns", "--control-period must be a whole number of clocks"),
-        ("--control-period 2s", "--control-period must be from 1 to 16777216 clocks, not "),
-        ("--measured-acceleration", "--measured-acceleration must not be given with method s"),
-        ("--load 1Nm:2s", "--load must be TORQUE:FROM:TIME, such as 0.2Nm:7s:500ms, not '1Nm:2s'"),
-        ("--load 1Nm:41ms:1s", "--load must begin 2ms or more after --from, and within --motion"),
-        ("--from 79ms", "--from must be from 0 to 2ms before the end of --motion, not 79ms"),
-        ("--motion stop:101s", "--motion must last from 10ms to 100s in a loop, not 101s"),
-        ("--torque-noise -1Nm", "--torque-noise must be at least 0 Nm, not -1"),
-        ("--inertia 0", "--inertia must be greater than 0, not 0"),
-        ("--friction -1Nm", "--friction must be at least 0, not -1"),
-        ("--gates --delay 1us", "--delay must not be given together with --gates"),
-        ("--gates --kv 0", "--kv must be greater than 0, not 0"),
-        ("--seeds 0", "--seeds must be from 1 to 1000, not 0"),
-        ("--jobs 0", "--jobs must be at least 1, not 0"),
-        ("--jobs 1 --scheduler tcp://nobody:1", "--jobs must not be given together with --scheduler"),
-        ("--vary kv=1,2 --log log.csv", "--log must be of one loop on this machine"),
-        ("--methods s,m --plot plot.png", "--vary must be given together with --plot of several loops"),
-        ("--vary speed=1,2", "--vary must be of ppr, lines, cpr, pole-pairs, decoding, sensor, reverse, "),
-        ("--vary kv=1,-2", "--kv must be greater than 0, not -2 (method s, kv=-2)"),
-        ("--min-time 1ms", "--min-time must be given with a method that has it: mt"),
-        ("--methods s,x", "--methods must be of auto, s, m, t, mt, rairan, track, or all, not 'x'"),
-        ("--bounce 3:1ms", "No such option '--bounce'"),
-    ],
-)
-def test_what_cannot_be_is_told_in_one_line(
-    options: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    words = options.split()
-    fixed = [*CORE, "--motion", "stop:80ms", "--from", "40ms"]
-    given = [word for k, word in enumerate(fixed) if not {fixed[k], fixed[k - 1]} & {*words} & {"--motion", "--from"}]
-    assert run(*given, *words, "--csv", "all.csv") == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.count("\n") == 1
-    assert message in captured.err
-    assert not list(tmp_path.iterdir())
-
-
 def test_nothing_is_half_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The files that were there stay, whether there is no compiler or no extra `sweep`."""
     for name in ("log.csv", "all.csv"):

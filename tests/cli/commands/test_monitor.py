@@ -282,27 +282,6 @@ def test_manifests_of_something_else(
     assert message in error(capsys, "/dev/null", "--manifest", manifest)
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["/dev/null"], "--manifest must be given with a serial port: "),
-        (["sim:none", "--ppr", "5"], "PORT must be a serial port or one of sim:tang-nano-9k, sim:icebreaker, "),
-        ([SIM], "--ppr must be given"),
-        ([SIM, "--ppr", "500", "--clock", "1MHz"], "--clock must be that of the board, 12000000 Hz, not 1MHz"),
-        ([SIM, *WORDS, "--every", "0us"], "--every must be from 1 to 65535 ticks of 4e-05 s, not 0us"),
-        ([SIM, *WORDS, "--every", "3s"], "--every must be from 1 to 65535 ticks of 4e-05 s, not 3s"),
-        ([SIM, *WORDS, "--duration", "0ms"], "--duration must be longer than 0, not 0ms"),
-        ([SIM, *WORDS, "--set", "speed=1e9"], "--set speed must be from -18849.5 to 18849.5 rad/s with this clock"),
-        ([SIM, *WORDS, "--record", "a.txt"], "Invalid value for '--record': file must end in .csv or .parquet"),
-        ([SIM, *WORDS, "--selftest", "--record", "a.csv"], "--record must not be given together with --selftest"),
-        ([SIM, *WORDS, "--selftest", "--set", "speed=1"], "--set must not be given together with --selftest"),
-        ([SIM, *WORDS, "--serve", "x.json", "--set", "drop=1%"], "--set must not be given together with --serve"),
-    ],
-)
-def test_what_is_refused(words: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert error(capsys, *words).startswith(message)
-
-
 def test_options_of_a_core_at_a_serial_port(manifest: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for words in (["--ppr", "500"], ["--method", "s"], ["--index"]):
         told = error(capsys, "/dev/null", "--manifest", manifest, *words)

@@ -202,54 +202,6 @@ def test_equal_options_give_equal_files(tmp_path: Path, capsys: pytest.CaptureFi
     assert (tmp_path / "one" / "p.pdf").read_bytes().startswith(b"%PDF-")
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (
-            "--speeds 5",
-            "--speeds must be LO:HI, both greater than 0, in rad/s, rev/s or rpm such as 10:3000rpm,",
-        ),
-        ("--speeds :", "--speeds must be LO:HI, both greater than 0"),
-        (
-            "--speeds 1:2:3",
-            "--speeds must be LO:HI, both greater than 0, in rad/s, rev/s or rpm such as",
-        ),
-        ("--speeds 0:5rpm", "--speeds must be LO:HI, both greater than 0"),
-        ("--speeds -1:5rpm", "--speeds must be LO:HI, both greater than 0"),
-        ("--speeds 1m/s:5rpm", "--speeds must be LO:HI, both greater than 0"),
-        ("--speeds nan:inf", "--speeds must be LO:HI, both greater than 0"),
-        ("--speeds 5:5rad/s", "--speeds must be LO:HI with LO less than HI, not '5:5rad/s'"),
-        ("--speeds 50:5rpm", "--speeds must be LO:HI with LO less than HI, not '50:5rpm'"),
-        ("--speeds 1:75.01rev/s", "--speeds must be at most 3 counts per tick (75rev/s), the most that this core"),
-        ("--speeds 1:1e29rad/s", "--speeds must be at most 3 counts per tick (471.239rad/s)"),
-        ("--speeds 1:1e999", "--speeds must be LO:HI, both greater than 0"),
-        ("--speeds 1e999:1", "--speeds must be LO:HI, both greater than 0"),
-        ("--speeds 1e-29:1rad/s", "--speeds must be at least 1.5708e-07rad/s, not '1e-29:1rad/s'"),
-        ("--speeds 1e-9:1rpm", "--speeds must be at least 1.5e-06rpm, not '1e-9:1rpm'"),
-        ("--max-speed 1e999rpm", "--max-speed must be of a size from 1e-30 to 1e30, not '1e999rpm'"),
-        ("--max-time 1us", "--max-time must be a whole number of ticks"),
-        ("--plot {new}/p.gif", "Invalid value for '--plot': file must end in .png, .pdf or .svg, not '{new}/p.gif'"),
-        ("--plot {new}/p.png --csv {new}/p.png", "--plot and --csv must be different files, not both {new}/p.png"),
-        ("--csv {new}/..", "--csv must be a file, which"),
-        ("--plot {new}/p.png --csv {new}/../file/p.csv", "file/p.csv: Not a directory"),
-        ("--csv {new}/p.csv --speeds 2:1rad/s", "--speeds must be LO:HI with LO less than HI"),
-        ("--motion stop:1s", "No such option '--motion'"),
-    ],
-)
-def test_what_cannot_be_is_told_in_one_line(
-    options: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "file").write_text("before")
-    new = str(tmp_path / "new")
-    assert run("plan", *OPTIONS, *options.replace("{new}", new).split()) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.startswith("tachometry: error: ")
-    assert captured.err.count("\n") == 1
-    assert message.replace("{new}", new) in captured.err
-    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"file": "before"}
-
-
 def test_nothing_is_left_when_the_figure_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt

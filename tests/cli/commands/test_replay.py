@@ -163,60 +163,6 @@ def test_samplerate(tmp_path: Path) -> None:
     assert run("replay", tmp_path / "c.sr", *CORE, "--samplerate", "20kHz") == 0
 
 
-@pytest.mark.parametrize(
-    ("name", "options", "message"),
-    [
-        ("none.sr", "", "none.sr does not exist"),
-        ("c.bin", "", "a capture must be a .sr, .vcd, .fst, .csv, .txt, .tsv or .teeth file, or .csv.gz, not"),
-        ("empty.csv", "", "header of"),
-        ("text.sr", "", "must be a whole sigrok session (a zip file), but is cut or damaged"),
-        ("cut.sr", "", "must be a whole sigrok session (a zip file), but is cut or damaged"),
-        ("cut.csv", "", "a row must have 3 fields (time,a,b), not 2"),
-        ("folder.sr", "", "cannot read"),
-        ("c.sr", "--a X", "must be one of A (0), B (1), not 'X'"),
-        ("c.sr", "--a B", "must be two of A (0), B (1), not both B"),
-        ("c.sr", "--b 7", "must be one of A (0), B (1), not '7'"),
-        ("c.sr", "--samplerate 1MHz", "must be 20000 Hz as the file has it, not 1000000 Hz"),
-        ("c.sr", "--samplerate 1s", "--samplerate must be a number with one of the units Hz, kHz, MHz, GHz, not '1s'"),
-        ("c.csv", "--samplerate 1MHz", "--samplerate must not be given for"),
-        ("short.csv", "", "short.csv must last at least 22 clocks of --clock (1.1ms), a tick and its latency, not 1"),
-        ("c.sr", "--trace {folder}/c.sr", "--trace must be another file than the input"),
-        ("c.sr", "--time A", "--time must not be given for"),
-        ("c.csv", "--time when", "--time of"),
-        ("c.sr", "--index", "c.sr must be one of A (0), B (1), not 'z'"),
-        ("c.sr", "--external-tick", "c.sr must be one of A (0), B (1), not 'tick_in'"),
-        ("c.sr", "--external-tick --tick-in X", "must be one of A (0), B (1), not 'X'"),
-        ("c.sr", "--motion stop:1s", "No such option '--motion'"),
-    ],
-)
-def test_what_cannot_be_is_told_in_one_line(
-    name: str, options: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    write_sr(tmp_path / "c.sr", recorded().place(20_000), 20_000)
-    write_csv(tmp_path / "c.csv", recorded())
-    (tmp_path / "cut.sr").write_bytes((tmp_path / "c.sr").read_bytes()[:-40])
-    (tmp_path / "cut.csv").write_text("time,a,b\n0.0,0,0\n0.1,1")
-    (tmp_path / "short.csv").write_text("time,a,b\n0.0,0,0\n0.00001,1,0\n0.00005,1,0\n")
-    (tmp_path / "text.sr").write_text("text")
-    for empty in ("c.bin", "empty.csv"):
-        (tmp_path / empty).write_text("")
-    (tmp_path / "folder.sr").mkdir()
-    before = sorted(tmp_path.iterdir())
-    arguments = [
-        *CORE,
-        "--save-capture",
-        tmp_path / "new" / "s.sr",
-        *options.replace("{folder}", str(tmp_path)).split(),
-    ]
-    assert run("replay", tmp_path / name, *arguments) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.startswith("tachometry: error: ")
-    assert captured.err.count("\n") == 1
-    assert message in captured.err
-    assert sorted(tmp_path.iterdir()) == before
-
-
 def test_a_real_shaft_loses_no_count(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -235,69 +235,6 @@ def test_a_mismatch_fails_but_leaves_the_outputs(
     assert len(contents(tmp_path)) == 6
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ("", "Missing option '--motion'. (see tachometry simulate --help)"),
-        ("--motion jump:1", "--motion segment must be one of constant:SPEED:TIME, ramp:FROM:TO:TIME"),
-        ("--motion constant:1rad/s:-1s", "TIME of constant must be more than 0 s, not '-1s'"),
-        ("--motion constant:1rad/s:1ms", "--motion must last at least 22 clocks of --clock (1.1ms)"),
-        ("--motion csv:{new}/none.csv", "motion file '{new}/none.csv' cannot be read: No such file or directory"),
-        ("--motion stop:1s --vibration 1", "--vibration must be AMPLITUDE:FREQUENCY, not '1'"),
-        ("--motion stop:1s --vibration 0rad:1Hz", "--vibration amplitude must be more than 0"),
-        ("--motion stop:1s --jitter 0.5", "--jitter must be from 0 to less than 0.5, not 0.5"),
-        ("--motion stop:1s --jitter nan", "--jitter must be from 0 to less than 0.5, not nan"),
-        ("--motion stop:1s --nonuniformity -1", "--nonuniformity must be from 0 to less than 0.5, not -1.0"),
-        ("--motion stop:1s --illegal 2", "--illegal must be from 0 to 1, not 2.0"),
-        ("--motion stop:1s --phase-error 90", "--phase-error must be more than -90 and less than 90, not 90.0"),
-        ("--motion stop:1s --duty-error nan", "--duty-error must be more than -90 and less than 90, not nan"),
-        ("--motion stop:1s --duty-error 50 --phase-error -50", "must be less than 90 electrical degrees, not 100"),
-        ("--motion stop:1s --phase-error 20rpm", "--phase-error must be a number in deg (default deg), not '20rpm'"),
-        ("--motion stop:1s --bounce 1ms", "--bounce must be COUNT:TIME, such as 3:500us, not '1ms'"),
-        ("--motion stop:1s --bounce 0:1ms", "--bounce count must be from 1 to 1000, not 0"),
-        ("--motion stop:1s --bounce 3:0us", "--bounce time must be more than 0 s, not 0.0 s"),
-        ("--motion stop:1s --lost 1.5", "--lost must be from 0 to 1, not 1.5"),
-        ("--motion stop:1s --lost nan", "--lost must be from 0 to 1, not nan"),
-        ("--motion stop:1s --seed -1", "--seed must be at least 0, not -1"),
-        ("--motion stop:1s --max-time 1ms", "--max-time, in ticks, must be from 2 to 1048576, not 1"),
-        ("--motion constant:1e9rad/s:1e9s", "--motion must be of at most 10000000 encoder edges"),
-        ("--motion stop:1s --plot {new}/p.jpg", "Invalid value for '--plot': file must end in .png, .pdf or .svg"),
-        ("--motion stop:1s --plot {new}/p", "file must end in .png, .pdf or .svg, not '{new}/p'"),
-        ("--motion stop:1s --vcd {new}/v.gtkw", "Invalid value for '--vcd': file must end in .vcd"),
-        ("--motion stop:1s --save-capture {new}/s.zip", "Invalid value for '--save-capture': file must end in .sr"),
-        ("--motion stop:1s --counts {new}/x --trace {new}/x", "--trace and --counts must be different files, not both"),
-        (
-            "--motion stop:1s --vcd {new}/x.vcd --trace {new}/x.gtkw",
-            "--vcd (its .gtkw) and --trace must be different files, not both {new}/x.gtkw",
-        ),
-        ("--motion stop:1s --counts {new}/../file/c.csv", "file/c.csv: Not a directory"),
-        ("--motion stop:1s --trace {new}/c.csv --counts {new}/..", "--counts must be a file, which {folder} is not"),
-        ("--motion stop:1s --trace /dev/null", "--trace must be a file, which /dev/null is not"),
-        ("--motion stop:1s --vcd {new}/v.vcd --vcd-from=-1ms", "--vcd-from must be at least 0, not -1ms"),
-        ("--motion stop:1s --vcd-from 1ms", "--vcd must be given together with --vcd-from and --vcd-to"),
-        (
-            "--motion stop:1s --vcd {new}/v.vcd --vcd-from 5ms --vcd-to 90clk",
-            "--vcd-from must be before --vcd-to and the end of the run, clock 90, not 100",
-        ),
-        ("--motion stop:1s --vcd {new}/v.vcd --vcd-to 1m", "vcd-to must be"),
-        ("--motion stop:1s --engine fast", "Invalid value for '--engine': 'fast' is not one of"),
-        ("--motion stop:1s --a A", "No such option '--a'"),
-    ],
-)
-def test_what_cannot_be_is_told_in_one_line(
-    options: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "file").write_text("before")
-    new = str(tmp_path / "new")
-    assert run("simulate", *CORE, *options.replace("{new}", new).split()) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.startswith("tachometry: error: ")
-    assert captured.err.count("\n") == 1
-    assert message.replace("{new}", new).replace("{folder}", str(tmp_path)) in captured.err
-    assert contents(tmp_path) == {"file": b"before"}
-
-
 def test_the_motion_file_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = tmp_path / "m.csv"
     table.write_text("time,angle_rad\n0,0\n0.01,0.1\n")

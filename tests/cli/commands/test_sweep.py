@@ -151,74 +151,6 @@ def test_the_hardware_in_lockstep(
     assert "FAIL: hardware and golden model differ in 6 values" in capsys.readouterr().out
 
 
-BASE = """
-ppr = 100
-clock = "1MHz"
-max-time = "20ms"
-motion = "constant:{speed}:100ms"
-[vary]
-speed = ["5rad/s", "50rad/s"]
-tick = ["100us", "1ms"]
-"""
-BAD = [
-    (["--vary", "turns=1"], "--vary must be of ppr, lines, cpr, pole-pairs, decoding, "),
-    (["--vary", "turns=1"], "or of a name in braces within --motion, such as {speed}, not 'turns'"),
-    (["--motion", "stop:1s"], "not 'speed'"),
-    (["--motion", "constant:{speed}:{tick}"], "--motion must have names in braces that are no option or column, not "),
-    (["--motion", "constant:{speed}:{v}"], "--vary must have values for {v} of --motion, such as --vary v=1,2,5"),
-    (["--vary", "speed=1m"], "{speed} must be a number in rad/s, rev/s, rpm, s, ms, us, ns, Hz, kHz, MHz, GHz"),
-    (["--vary", "speed=none"], "{speed} must be a number in"),
-    (["--vary", "tick=33us"], "--max-time must be a whole number of ticks, not 20ms"),
-    (["--vary", "tick=33us"], "(method auto, speed=5rad/s, tick=33us)"),
-    (["--vary", "jitter=x"], "must be a number or one in %, not 'x'"),
-    (["--vary", "jitter=0,0.7"], "--jitter must be "),
-    (["--vary", "average=1,2", "--methods", "s"], "--average must be given with a method that has it: m"),
-    (["--average", "2", "--methods", "s,t"], "--average must be given with a method that has it: m"),
-    (["--methods", "s,x"], "--methods must be of auto, s, m, t, mt, rairan, track, or all, not 'x'"),
-    (["--methods", "m:average=900"], "--average must be from 1 to 256, not 900 (method m:average=900, "),
-    (["--vary", "seed=1..2000:2000", "--vary", "ppr=1..1000:1000"], "--vary must give at most 1000000 points, not "),
-    (["--vary", "seed=1", "--seed", "2"], "--seed must be given or varied, not both"),
-    (["--motion", "constant:{speed}:1us"], "--motion must last at least 102 clocks of --clock (102us)"),
-    (["--frobnicate"], "No such option"),
-    (["--vary", "speed=1rad/s", "--tick", "1ms", "--plot", "x.png"], "--vary must be given together with --plot"),
-    (["--axes", "speed,seed", "--plot", "x.png"], "--axes must be one or two of speed, tick, not 'speed,seed'"),
-    (
-        ["--from", "1s"],
-        "--motion must last two ticks or more beyond --from, longer than 100ms (method auto, speed=5rad/s",
-    ),
-    (["--vary", "speed=1..1e999:3log"], "a range of speed must be of numbers, and factors between, below 1e308, not "),
-    (["--vary", "speed=1..1e999:3"], "a range of speed must be of numbers, and factors between, below 1e308, not "),
-    (["--vary", "speed=1e-200..1e200:3log"], "numbers, and factors between, below 1e308, not '1e-200..1e200:3log'"),
-    (["--from", "-1s"], "--from must be at least 0, not -1s"),
-    (["--jobs", "0"], "--jobs must be at least 1, not 0"),
-    (["--jobs", "2", "--scheduler", "tcp://x:1"], "--jobs must not be given together with --scheduler"),
-    (["--results", "x.csv"], "file must end in .parquet"),
-    (["--results", "x.parquet", "--plot", "s.toml"], "file must end in .png, .pdf or .svg"),
-    (["--scheduler", "tcp://127.0.0.1:1"], "--scheduler tcp://127.0.0.1:1 does not answer: "),
-    (["--scheduler", "here"], "--scheduler here does not answer: "),
-]
-
-
-@pytest.mark.parametrize(("options", "message"), BAD)
-def test_what_cannot_be_is_told_in_one_line(
-    options: list[str],
-    message: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("tachometry.sim.studies.sweeping.cluster._PATIENCE", 0.2)
-    Path("s.toml").write_text(BASE)
-    assert run("s.toml", *options) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.startswith("tachometry: error: ")
-    assert captured.err.count("\n") == 1
-    assert message in captured.err
-    assert [path.name for path in tmp_path.iterdir()] == ["s.toml"]
-
-
 def test_a_scheduler_that_says_nothing(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tachometry.sim.studies.sweeping.cluster._PATIENCE", 0.2)
     with socket.create_server(("127.0.0.1", 0)) as server:
@@ -227,6 +159,9 @@ def test_a_scheduler_that_says_nothing(capsys: pytest.CaptureFixture[str], monke
     assert capsys.readouterr().err == (
         f"tachometry: error: --scheduler {address} does not answer: nothing within 0.2 s\n"
     )
+    for address in ("tcp://127.0.0.1:1", "here"):  # where nobody is
+        assert run(*CORE, *MOTION, *AXES, "--scheduler", address) == 2
+        assert f"--scheduler {address} does not answer: " in capsys.readouterr().err
 
 
 def test_an_interrupt_before_there_is_a_row(

@@ -193,21 +193,3 @@ def test_a_compiler_ends_with_its_worker(tmp_path: Path) -> None:
     os.set_blocking(alive, True)
     assert os.read(alive, 1) == b""  # until the last of those who have its other end is gone
     os.close(alive)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--methods", "s,x"], "--methods must be of s, m, t, mt, rairan, track, or all, not 'x'"),
-        (["--engines", "x"], "--engines must be of pysim, cxxrtl, verilator, cxxrtl-every-clock, or all, not 'x'"),
-        (["--clocks", "-1"], "'--clocks': -1 is not in the range x>=0"),
-    ],
-)
-def test_what_cannot_be_is_told_in_one_line(
-    options: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run("verify", *options) == 2
-    told = capsys.readouterr().err
-    assert told.startswith("tachometry: error: ")
-    assert message in told
-    assert told.count("\n") == 1

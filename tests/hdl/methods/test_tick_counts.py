@@ -30,7 +30,6 @@ FORM = Tracking(
     quality_bits=8,
 )
 NAMES = ["number", "times", "places", "last", "moved", "kind", "down", "end", "length"]
-OF_COUNT = {"last", "kind", "down"}  # of an empty tick they say nothing
 
 
 def expected(counts: Mapping[int, int], lengths: list[int]) -> list[dict[str, int]]:
