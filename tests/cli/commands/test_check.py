@@ -165,7 +165,8 @@ def test_a_core_that_a_framework_cannot_have_is_checked(generated: Generated) ->
     assert check(folder / "core.json", Make(export, targets_for, ci_files), simulation=False).right
 
 
-def test_the_names_of_the_files_of_a_target_are_those_that_it_makes() -> None:
+def test_the_names_of_the_files_of_a_target_are_those_that_it_makes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tachometry.hdl.export.files.verilog_of", lambda top, described: "")  # which takes seconds
     spec = of_texts("s", {"ppr": "500"})
     for target, about in TARGETS.items():
         bus = about.buses[0]

@@ -58,13 +58,6 @@ def test_it_writes_and_lists_the_files_of_export(
         assert rows.split("registers")[-1].strip() == said
 
 
-def test_rio_has_no_wide_numbers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("generate", *"--method s --ppr 500 --for rio --position-width 33".split(), "-o", tmp_path / "new") == 2
-    told = "--position-width must be at most 32 for RIO, whose numbers have no more, not 33"
-    assert capsys.readouterr().err == f"tachometry: error: {told}\n"
-    assert not (tmp_path / "new").exists()
-
-
 def test_defaults(tmp_path: Path) -> None:
     assert run("generate", "--method", "s", "--ppr", "500", "-o", tmp_path) == 0
     assert json.loads((tmp_path / "tachometer.json").read_text())["parameters"] == {

@@ -18,7 +18,7 @@ LEAST = 0.95  # of the mutants that are not equivalent
 # Tests of what the mutated files decide; those of engines, pages and processes run them, too, but take long. The gates
 # are what the golden models are held against.
 TESTS = (
-    "spec sim hdl/export hdl/output hdl/methods hdl/bus hdl/axes hdl/control hdl/core "
+    "spec sim hdl/export hdl/front_end hdl/output hdl/methods hdl/bus hdl/axes hdl/control hdl/core "
     "cli/options independent test_ports.py test_matrix.py"
 ).split()
 # Imported once, and shared by all forks.
