@@ -53,7 +53,7 @@ _INTERRUPT = """
 ## An interrupt
 
 With `--irq` a core on a bus has the output `irq`, active high, and these registers behind all others. The table is of
-`--index --irq`; an event has the same bit in each of the three.
+`--index --health --over-speed 3000rpm --irq`; an event has the same bit in each of the three.
 
 - An event waits in INTERRUPTS until 1 is written to its bit of INTERRUPT_CLEAR. One that comes in the clock of the
   write waits on, so none is lost.
@@ -333,7 +333,7 @@ def registers() -> str:
     added = [one for one in commanded if one.name not in known]
     known |= {one.name for one in added if not one.name.startswith(("COMMAND", "LOOP"))}
     instead = [one for one in generating if one.name not in known]
-    with_irq = RegisterMap(of_texts("s", SPEED | {"index": "yes"}), irq=True)
+    with_irq = RegisterMap(of_texts("s", SPEED | {"index": "yes", "health": "yes", "over-speed": "3000rpm"}), irq=True)
     interrupting = [one for one in with_irq if one.name.startswith("INTERRUPT")]
     of_all, of_irq, of_loop, of_generator = (
         re.sub("^## ", "### ", tables(each), flags=re.MULTILINE)

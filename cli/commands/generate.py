@@ -150,7 +150,7 @@ ASKED = Group(
             "--irq",
             is_flag=True,
             help="With a --bus: an interrupt, the output irq, with registers that enable and clear its events: index, "
-            "overflow (faster than --max-speed), stall, error.",
+            "overflow (faster than --max-speed), stall, error, and with --health and --over-speed what they watch.",
         ),
         option(
             "Files",

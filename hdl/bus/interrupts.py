@@ -22,8 +22,8 @@ class Interrupts(wiring.Component):
     -------
     ticks, stalled : In(axes)
         The axis ticks; its shaft rests.
-    index, overflow, error : In(1)
-        The event is in this clock; `index` only where the core has one.
+    index, overflow, error, fault, over_speed : In(1)
+        The event is in this clock; only those that the core has.
     irq_enable_… : In(1)
         An event raises `irq`.
     irq_clear_… : In(1)

@@ -100,7 +100,9 @@ class EncoderEmulator(wiring.Component):
         m.d.comb += [target.eq(self.speed << RATE_SHIFT), goes_down.eq(target < speed)]
         passed = Mux(down, turned <= target, turned >= target)
         m.d.sync += second.eq(~second)
-        with m.If(second):
+        with m.If(second & (goes_down != down) & self.rate.any()):
+            pass  # the target has gone to the other side between the two clocks
+        with m.Elif(second):
             m.d.sync += speed.eq(Mux((self.rate == 0) | passed, target, turned))
         with m.Else():
             m.d.sync += [down.eq(goes_down), turned.eq(speed + Mux(goes_down, -self.rate, self.rate))]

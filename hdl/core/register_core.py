@@ -75,6 +75,10 @@ class RegisterCore(wiring.Component):
             box = Interrupts(self._map)
             connect(m, box, bank, whole)
             m.d.comb += [box.ticks.eq(whole.tick), box.stalled.eq(whole.stalled), self.irq.eq(box.irq)]
+            if core.watch is not None:
+                m.d.comb += box.fault.eq(core.watch.seen)
+            if core.trip is not None:
+                m.d.comb += box.over_speed.eq(core.trip.beyond)
         if open_sum is not None:
             m.d.comb += [position.next.eq(core.position_counter.next), position.open_sum.eq(open_sum)]
         return m

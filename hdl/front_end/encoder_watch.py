@@ -39,7 +39,9 @@ class EncoderWatch(wiring.Component):
     index_position : In(signed(position_width))
         Only with an index.
     clear : In(1)
-        All outputs are 0 in the next clock.
+        All that is kept is 0 in the next clock.
+    seen : Out(1)
+        There is a fault in this clock.
     health : Out(FAULT_WIDTH)
         The first fault since `clear`, as `spec.core.health.Fault` numbers them.
     faults : Out(FAULTS_WIDTH)
@@ -70,6 +72,7 @@ class EncoderWatch(wiring.Component):
                 **dict.fromkeys(("level_a", "level_b", "ready", "decode_error", "clear"), In(1)),
                 "step": In(signed(2)),
                 **(index if position_width else {}),
+                "seen": Out(1),
                 "health": Out(FAULT_WIDTH),
                 "faults": Out(FAULTS_WIDTH),
             }
@@ -90,7 +93,8 @@ class EncoderWatch(wiring.Component):
         code: Value = Value.cast(0)
         for fault in sorted(seen, reverse=True):
             code = Mux(seen[fault], fault, code)
-        with m.If(Cat(seen.values()).any()):
+        m.d.comb += self.seen.eq(Cat(seen.values()).any())
+        with m.If(self.seen):
             with m.If(self.health == 0):
                 m.d.sync += self.health.eq(code)
             with m.If(~self.faults.all()):

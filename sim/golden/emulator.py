@@ -149,7 +149,8 @@ class GoldenEmulator:
         speed = self._speed
         if len(first):
             passed = self._turned <= target if self._down else self._turned >= target
-            speed = target if passed or not rate else self._turned
+            moved = self._down != (target < speed)  # to the other side of the speed, since the first clock
+            speed = target if not rate else speed if moved else target if passed else self._turned
         step = -rate if target < speed else rate
         ramp = speed + step * np.arange(n // 2 + 2, dtype=np.int64)
         if rate == 0:

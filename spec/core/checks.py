@@ -10,7 +10,7 @@ from tachometry.spec.core.timing import MAX_TICK_CYCLES
 from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS
 from tachometry.spec.language.option import ParameterError
-from tachometry.spec.language.units import PI, format_time, rounded, signed_width
+from tachometry.spec.language.units import PI, SpeedUnit, format_time, rounded, signed_width
 
 if TYPE_CHECKING:
     from tachometry.spec.core.tachometer import TachometerSpec
@@ -43,8 +43,11 @@ def check(spec: TachometerSpec) -> None:
     if spec.compare is not None:
         spec.compare.check(spec.timing.clock_hz, spec.position_width)
     if spec.over_speed is not None and spec.scale.over_speed >= spec.scale.full_scale:
-        greatest = f"{spec.scale.full_scale * spec.scale.rad_per_s_per_lsb:.6g} rad/s, the greatest velocity"
-        raise ParameterError("over_speed", f"must be less than {greatest}, not {spec.over_speed}")
+        unit = SpeedUnit(spec.over_speed.unit)
+        greatest = f"{unit.of(spec.scale.full_scale * spec.scale.rad_per_s_per_lsb):.6g} {unit.name}"
+        raise ParameterError(
+            "over_speed", f"must be less than {greatest}, the greatest velocity, not {spec.over_speed}"
+        )
     if spec.facts.bounds:
         _check_edge_error(spec)
     if spec.lowpass is not None:

@@ -196,7 +196,12 @@ class RegisterMap:
         found["overflow"] = "A tick at more than the maximum speed: its pulse_count was saturated."
         found["stall"] = "The shaft has come to rest: stalled rises."
         late = ", or an external tick was missing or came too early" if self.spec.external_tick else ""
-        return found | {"error": f"Both lines changed at once{late}."}
+        found["error"] = f"Both lines changed at once{late}."
+        if self.spec.health:
+            found["fault"] = "A fault of the encoder was seen, see health."
+        if self.spec.over_speed is not None:
+            found["over_speed"] = f"A velocity was beyond {self.spec.over_speed}."
+        return found
 
     @property
     def quantities(self) -> tuple[tuple[str, float, str], ...]:

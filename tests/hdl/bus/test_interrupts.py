@@ -30,7 +30,7 @@ from tachometry.spec.registers.map import RegisterMap
 
 BASE = {"ppr": "25", "clock": "1MHz", "tick": "40clk", "max-time": "160clk", "max-speed": "500rev/s"}
 CORES: dict[str, AnySpec] = {
-    "s": of_texts("s", BASE | {"index": "yes"}),
+    "s": of_texts("s", BASE | {"index": "yes", "health": "yes", "health-errors": "0", "over-speed": "200rev/s"}),
     "external ticks": of_texts("m", BASE | {"external-tick": "yes", "max-speed": "200rev/s"}),
     "rairan": of_texts("rairan", BASE | {"tick": "20clk"}),
     "axes": small(2, parallel=True, index=True),
@@ -84,9 +84,9 @@ def case(core: str) -> tuple[RegisterMap, PinTrace | AxesTrace, list[Access], Ro
     accesses = []
     for clock in range(CLOCKS - 1):
         if clock in coming:
-            accesses.append(Access(clock, clears, 15))
+            accesses.append(Access(clock, clears, 63))
         elif rng.random() < 0.1:
-            data = int(rng.integers(16)) | int(rng.integers(1 << 20)) << 12 if rng.random() < 0.5 else None
+            data = int(rng.integers(64)) | int(rng.integers(1 << 20)) << 12 if rng.random() < 0.5 else None
             accesses.append(Access(clock, int(rng.choice(ours)), data))
     rows: Rows = [{"capture": 0, "read": 0, "write": 0} for _ in range(CLOCKS)]
     pins = [pin.name for pin in spec.ports.pins if pin.name in trace.lines]
@@ -113,7 +113,8 @@ def compare(core: str, seen: Sequence[tuple[int, int, int]]) -> None:
     assert wrong == [], (core, wrong[0])
     assert 100 < sum(levels) < CLOCKS - 100
     enabled = [index for index, one in enumerate(registers) if one.name == "INTERRUPT_ENABLE"]
-    assert {data for access, (data, _) in zip(accesses, answers, strict=True) if access.address == enabled[0]} > {0, 1}
+    read = {data for access, (data, _) in zip(accesses, answers, strict=True) if access.address == enabled[0]}
+    assert len(read) > 4
 
 
 def simulated(core: str) -> list[tuple[int, int, int]]:

@@ -115,6 +115,16 @@ def test_the_speed_changes_at_the_rate() -> None:
     assert abs(len(a) / 2 - periods) <= 1
 
 
+@pytest.mark.parametrize("clock", [1 << 16, (1 << 16) + 1])
+def test_a_ramp_turns_round_without_a_jump(clock: int) -> None:
+    ramp = EmulatorSettings(speed=1 << 28, rate=1 << 27)
+    changes = [Change(-1, ramp), Change(clock, replace(ramp, speed=-ramp.speed))]
+    trace = GoldenEmulator().trace(changes, 5 << 14)
+    # The speed is 2^26 where the ramp turns, and 3·2^24 at the end.
+    periods = (2**26 * 2**16 / 2 + 7 * 2**23 * 2**14) / 2**32
+    assert abs(len(trace.clock) / 4 - periods) <= 1
+
+
 def test_a_jump_changes_both_lines_at_once() -> None:
     trace = GoldenEmulator().trace([Change(10, EmulatorSettings(), jump=True)], 100)
     assert trace.clock.tolist() == [0, 11 + LATENCY]
