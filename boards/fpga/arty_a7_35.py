@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from tachometry.boards.fpga.board import Board, Header
+from tachometry.boards.fpga.board import Board, Header, pins
 
 
 def _platform() -> Any:
@@ -20,21 +20,12 @@ ARTY_A7_35 = Board(
         # Of JA and JD the lines have resistors of 200 Ω. The emulator is below the encoder: three jumpers join them.
         Header(
             "JA",
-            {
-                "a": "1",
-                "b": "2",
-                "z": "3",
-                "tick_in": "4",
-                "emulated_a": "7",
-                "emulated_b": "8",
-                "emulated_z": "9",
-                "capture": "10",
-            },
+            pins("a:1 b:2 z:3 tick_in:4 emulated_a:7 emulated_b:8 emulated_z:9 capture:10"),
             ("pmod", 0),
         ),
         Header(
             "JD",
-            {"spi_cs_n": "1", "spi_mosi": "2", "spi_miso": "3", "spi_sck": "4", "drive": "7", "enable": "8"},
+            pins("spi_cs_n:1 spi_mosi:2 spi_miso:3 spi_sck:4 drive:7 enable:8"),
             ("pmod", 3),
         ),
     ),

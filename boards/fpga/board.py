@@ -7,6 +7,11 @@ from typing import Any
 from tachometry.boards.fpga.flow import Flow
 
 
+def pins(text: str) -> dict[str, str]:
+    """Return pins by the ports that are on them, of words such as `a:25`."""
+    return {port: pin for port, pin in (word.split(":") for word in text.split())}
+
+
 @dataclass(frozen=True)
 class Header:
     """Is a connector of a board.

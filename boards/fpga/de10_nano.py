@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from tachometry.boards.fpga.board import Board, Header
+from tachometry.boards.fpga.board import Board, Header, pins
 
 
 def _platform() -> Any:
@@ -20,22 +20,10 @@ DE10_NANO = Board(
         # The emulator is beside the encoder: three jumpers join them.
         Header(
             "JP1",
-            {
-                "a": "1",
-                "b": "3",
-                "z": "5",
-                "tick_in": "7",
-                "emulated_a": "2",
-                "emulated_b": "4",
-                "emulated_z": "6",
-                "capture": "8",
-                "spi_cs_n": "13",
-                "spi_mosi": "14",
-                "spi_miso": "15",
-                "spi_sck": "16",
-                "drive": "17",
-                "enable": "18",
-            },
+            pins(
+                "a:1 b:3 z:5 tick_in:7 emulated_a:2 emulated_b:4 emulated_z:6 capture:8 spi_cs_n:13 spi_mosi:14 "
+                "spi_miso:15 spi_sck:16 drive:17 enable:18"
+            ),
             ("gpio", 0),
         ),
     ),

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from tachometry.boards.fpga.board import Board, Header
+from tachometry.boards.fpga.board import Board, Header, pins
 from tachometry.boards.fpga.flow import ice40
 
 
@@ -21,21 +21,12 @@ ICEBREAKER = Board(
         # The emulator is below the encoder: three jumpers join them.
         Header(
             "PMOD1A",
-            {
-                "a": "1",
-                "b": "2",
-                "z": "3",
-                "tick_in": "4",
-                "emulated_a": "7",
-                "emulated_b": "8",
-                "emulated_z": "9",
-                "capture": "10",
-            },
+            pins("a:1 b:2 z:3 tick_in:4 emulated_a:7 emulated_b:8 emulated_z:9 capture:10"),
             ("pmod", 0),
         ),
         Header(
             "PMOD1B",
-            {"spi_cs_n": "1", "spi_mosi": "2", "spi_miso": "3", "spi_sck": "4", "drive": "7", "enable": "8"},
+            pins("spi_cs_n:1 spi_mosi:2 spi_miso:3 spi_sck:4 drive:7 enable:8"),
             ("pmod", 1),
         ),
     ),

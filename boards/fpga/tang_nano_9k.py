@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from tachometry.boards.fpga.board import Board, Header
+from tachometry.boards.fpga.board import Board, Header, pins
 from tachometry.boards.fpga.flow import gowin
 
 _PART = "GW1NR-LV9QN88PC6/I5"
@@ -23,22 +23,10 @@ TANG_NANO_9K = Board(
         # Pins with 3.3 V: those from 79 on have 1.8 V.
         Header(
             "pin",
-            {
-                "a": "25",
-                "b": "26",
-                "z": "27",
-                "tick_in": "28",
-                "capture": "29",
-                "emulated_a": "30",
-                "emulated_b": "33",
-                "emulated_z": "34",
-                "spi_cs_n": "40",
-                "spi_mosi": "35",
-                "spi_miso": "41",
-                "spi_sck": "42",
-                "drive": "51",
-                "enable": "53",
-            },
+            pins(
+                "a:25 b:26 z:27 tick_in:28 capture:29 emulated_a:30 emulated_b:33 emulated_z:34 spi_cs_n:40 "
+                "spi_mosi:35 spi_miso:41 spi_sck:42 drive:51 enable:53"
+            ),
         ),
     ),
     attributes={"IO_TYPE": "LVCMOS33"},

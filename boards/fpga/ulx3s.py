@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from tachometry.boards.fpga.board import Board, Header
+from tachometry.boards.fpga.board import Board, Header, pins
 from tachometry.boards.fpga.flow import ecp5
 
 
@@ -21,22 +21,10 @@ def _board(size: int, die: int) -> Board:
             # The emulator is beside the encoder: three jumpers join them.
             Header(
                 "J1",
-                {
-                    "a": "0+",
-                    "b": "1+",
-                    "z": "2+",
-                    "tick_in": "3+",
-                    "emulated_a": "0-",
-                    "emulated_b": "1-",
-                    "emulated_z": "2-",
-                    "capture": "3-",
-                    "spi_cs_n": "4+",
-                    "spi_mosi": "4-",
-                    "spi_miso": "5+",
-                    "spi_sck": "5-",
-                    "drive": "6+",
-                    "enable": "6-",
-                },
+                pins(
+                    "a:0+ b:1+ z:2+ tick_in:3+ emulated_a:0- emulated_b:1- emulated_z:2- capture:3- spi_cs_n:4+ "
+                    "spi_mosi:4- spi_miso:5+ spi_sck:5- drive:6+ enable:6-"
+                ),
                 ("gpio", 0),
             ),
         ),
