@@ -122,7 +122,7 @@ class GoldenBank:
     def interrupts(self) -> dict[str, np.ndarray]:
         """Return clocks of the events that raise the interrupt."""
         errors = [self._tables[strobe].clock for strobe in ("decode_error", "tick_error") if strobe in self._tables]
-        found = {
+        found: dict[str, np.ndarray] = {
             "index": self._tables[INDEX].clock if INDEX in self._tables else np.array([], dtype=np.int64),
             "overflow": self._events["overflows"],
             "stall": self._stalls,
