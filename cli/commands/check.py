@@ -12,7 +12,7 @@ from tachometry.cli.reports.terminal import activity
 from tachometry.hdl.export import export
 from tachometry.hdl.export.ci import ci_files
 from tachometry.hdl.export.targets.target import targets_for
-from tachometry.sim.testbench.check import Make, manifests
+from tachometry.sim.testbench.check import NO_COCOTB, Make, manifests
 from tachometry.sim.testbench.check import check as check_core
 
 
@@ -65,4 +65,7 @@ def check(places: tuple[Path, ...], simulation: bool, netlists: tuple[Path, ...]
         for number, path in enumerate(found, 1):
             say(f"core {number} of {len(found)}: {path}")
             results.append(check_core(path, make, simulation=simulation, netlists=netlists, waves=waves))
-    return print_checked(results)
+    status = print_checked(results)
+    if not status and any(result.why_not == NO_COCOTB for result in results):
+        raise OSError(NO_COCOTB)  # what was asked for was not done
+    return status

@@ -18,7 +18,8 @@ KIT = {
     "NAME.sdc": "constraints for Quartus and others",
 }
 _STEPS_PER_TICK, _LONGEST_HOLD = 4, 5000
-_STEPS, _MOVED = 40 + 16, 40 - 16  # quarter periods that the smoke test turns the encoder
+# Quarter periods that the smoke test turns the encoder forward and back, and with a filter that is long.
+_TURNS, _FEW_TURNS = (40, 16), (8, 4)
 
 
 def kit(spec: AnySpec, name: str, bus: Bus | None = None) -> dict[str, str]:
@@ -70,25 +71,25 @@ def _first_levels(spec: AnySpec) -> dict[str, int]:
     return {line: all_ones for line, level in first.items() if level ^ (line in encoder.inverted)}
 
 
-def _turned(encoder: Encoder) -> tuple[dict[str, str], int]:
+def _turned(encoder: Encoder, turns: tuple[int, int]) -> tuple[dict[str, str], int]:
     """Return levels of the lines after a step of the smoke test, as Verilog, and the counts of all its steps."""
-    kind = encoder.kind
+    kind, moved = encoder.kind, turns[0] - turns[1]
     levels = {"a": "quarter[1] ^ quarter[0]", "b": "quarter[1]"}
-    counts = _MOVED * encoder.decoding // 4
+    counts = moved * encoder.decoding // 4
     if encoder.sensor == "hall":
         by_place = zip(*kind.cycle, strict=True)
         each = (sum(level << number for number, level in enumerate(of_line)) for of_line in by_place)
         levels = {line: f"6'd{bits} >> quarter" for line, bits in zip(kind.lines, each, strict=True)}
-        counts = _MOVED
+        counts = moved
     elif encoder.sensor == "pulses":
         levels = {"a": levels["a"]}
-        counts = _STEPS * encoder.decoding // 4 * (-1 if encoder.reverse else 1)
+        counts = sum(turns) * encoder.decoding // 4 * (-1 if encoder.reverse else 1)
     elif not kind.cycle:
         levels = {
             "a": "1'b1" if encoder.sensor == "step-dir" else "forward",
             "b": "forward" if encoder.sensor == "step-dir" else "!forward",
         }
-        counts = _MOVED
+        counts = moved
     return levels, counts
 
 
@@ -102,13 +103,16 @@ def _bench(spec: AnySpec) -> dict[str, object]:
     """Return how the smoke test turns one encoder, or many, and the position that must follow."""
     tacho = spec.tachometer
     encoder = tacho.encoder
-    levels, expected = _turned(encoder)
+    hold = max(_hold(tacho), min(2 * (tacho.filter_clocks + 8), tacho.filter_clocks + 300))
+    turns = _turns(hold)
+    levels, expected = _turned(encoder, turns)
     low = {line: f"1'b{int(line in encoder.inverted)}" for line in ("a", "b")}
     if encoder.sensor == "step-dir":
         del low["b"]
     return {
         "axes": None,
-        "hold": max(_hold(tacho), min(2 * (tacho.filter_clocks + 8), tacho.filter_clocks + 300)),
+        "hold": hold,
+        "turns": turns,
         "levels": _wired(encoder, levels),
         "ends": {} if encoder.kind.cycle else low,
         "places": 6 if encoder.sensor == "hall" else 4,
@@ -127,14 +131,17 @@ def _bench(spec: AnySpec) -> dict[str, object]:
 def _(tacho: AxesSpec) -> dict[str, object]:
     # Every other one goes backward, its lines exchanged.
     encoder = tacho.axis.encoder
-    every, expected = _turned(encoder)
+    # Before the first edge there are rounds in which no axis is counted.
+    hold = max(_hold(tacho), (4 + tacho.axis.filter_clocks) * tacho.slots)
+    turns = _turns(hold)
+    every, expected = _turned(encoder, turns)
     lines = [every["a"], every["b"]]
     turned = ([lines[(axis + line + encoder.reverse) % 2] for axis in reversed(range(tacho.axes))] for line in range(2))
     stores = " ".join(f"positions[{axis}] <= position_{axis};" for axis in range(tacho.axes))
     return {
         "axes": tacho,
-        # Before the first edge there are rounds in which no axis is counted.
-        "hold": max(_hold(tacho), (4 + tacho.axis.filter_clocks) * tacho.slots),
+        "hold": hold,
+        "turns": turns,
         "levels": _wired(encoder, {line: f"{{{', '.join(each)}}}" for line, each in zip("ab", turned, strict=True)}),
         "ends": {},
         "places": 4,
@@ -145,6 +152,10 @@ def _(tacho: AxesSpec) -> dict[str, object]:
         "mirrored": False,
         "steps": "quarter periods",
     }
+
+
+def _turns(hold: int) -> tuple[int, int]:
+    return _TURNS if hold <= 2 * _LONGEST_HOLD else _FEW_TURNS
 
 
 def _hold(tacho: TachometerSpec | AxesSpec) -> int:

@@ -26,7 +26,7 @@ NONUNIFORMITY, JITTER, ILLEGAL, LOST, BOUNCE = range(5)
 
 MAX_BOUNCES = 1000
 
-_BIT = {"a": np.uint8(1), "b": np.uint8(2), "z": np.uint8(4)}
+_FAULTY = ("a", "b", "c", "z")
 _CHUNK = 1 << 16
 _LN2 = 0.6931471805599453
 _CLIP = 0.49  # of the gap to a neighbour: two edges that move towards each other still keep their order
@@ -67,7 +67,7 @@ class LineFault:
     Parameters
     ----------
     line : str
-        `a`, `b` or `z`.
+        `a`, `b`, `c` of halls, or `z`.
     time_s : float, seconds
     """
 
@@ -75,8 +75,8 @@ class LineFault:
     time_s: float
 
     def __post_init__(self) -> None:
-        if self.line not in _BIT:
-            raise ParameterError("line", f"must be a, b or z, not {self.line!r}")
+        if self.line not in _FAULTY:
+            raise ParameterError("line", f"must be a, b, c or z, not {self.line!r}")
         if not 0 <= self.time_s < math.inf:
             raise ParameterError("time", f"must be 0 s or more, not {self.time_s} s")
 
@@ -84,15 +84,14 @@ class LineFault:
     def parse(what: str, text: str) -> "LineFault":
         """Read LINE:TIME, such as b:200ms (s, ms, us or ns)."""
         line, _, time = text.strip().partition(":")
-        if line.lower() not in _BIT or not time:
-            raise ParameterError(what, f"must be LINE:TIME, such as b:200ms, with line a, b or z, not {text!r}")
+        if line.lower() not in _FAULTY or not time:
+            raise ParameterError(what, f"must be LINE:TIME, such as b:200ms, with line a, b, c or z, not {text!r}")
         if (begins := read_nearest(what, time, TIME, "s")) < 0:
             raise ParameterError(what, f"must begin at 0 s or later, not at {time}")
         return LineFault(line.lower(), begins)
 
-    def applied(self, time: FloatArray, level: Levels, *, high: bool) -> tuple[FloatArray, Levels]:
-        """Return times and levels with the line high from then on, as an open input is, or as it is then."""
-        bit = _BIT[self.line]
+    def applied(self, time: FloatArray, level: Levels, bit: np.uint8, *, high: bool) -> tuple[FloatArray, Levels]:
+        """Return times and levels with the line of this bit high from then on, as an open input, or as it is then."""
         begins = int(np.searchsorted(time, self.time_s, side="right"))
         time = np.insert(time, begins, self.time_s)
         level = np.insert(level, begins, level[begins - 1])

@@ -28,8 +28,8 @@ _EDGES = {"step-dir": 1, "up-down": 1, "hall": 6}
 _FAULTS_OF = {
     "phase_error_deg": ("quadrature",),
     "illegal": ("quadrature",),
-    "broken": ("quadrature",),
-    "stuck": ("quadrature",),
+    "broken": ("quadrature", "hall"),
+    "stuck": ("quadrature", "hall"),
     "duty_error_deg": ("quadrature", "pulses"),
     "bounce": ("quadrature", "pulses", "hall"),
     "lost": ("quadrature", "pulses"),
@@ -143,6 +143,10 @@ class VirtualEncoder(EncoderOptions):
         for name, sensors in _FAULTS_OF.items():
             if getattr(self, name) and self.sensor not in sensors:
                 raise ParameterError(name, f"must not be given with --sensor {self.sensor}")
+        for name, fault in (("broken", self.broken), ("stuck", self.stuck)):
+            lines = SENSORS[self.sensor].lines
+            if fault is not None and fault.line not in (*lines, "z"):
+                raise ParameterError(name, f"must be of line {', '.join(lines)} or z, not {fault.line}")
         if not math.isfinite(self.start_angle_rad):
             raise ValueError(f"start_angle_rad must be finite, not {self.start_angle_rad}")
 
@@ -237,7 +241,8 @@ class VirtualEncoder(EncoderOptions):
         level = level ^ np.uint8(sum(1 << place for place, line in enumerate(lines) if line in inverted))
         for fault, high in ((self.broken, True), (self.stuck, False)):
             if fault is not None and fault.time_s < duration:
-                times, level = fault.applied(times, level, high=high)
+                bit = np.uint8(1 << lines.index(fault.line)) if fault.line in lines else np.uint8(0)
+                times, level = fault.applied(times, level, bit, high=high)
         return Recording.of_level(times, level, duration, lines)
 
     def _stream(self, which: int) -> np.random.PCG64:

@@ -72,9 +72,7 @@ class LoopSpec(Law):
         encoder = self.tachometer.encoder
         if not encoder.plain:
             named = "reverse" if encoder.reverse else "invert" if encoder.invert else "sensor"
-            raise ParameterError(
-                named, "must not be given together with a control loop, which takes A and B as they come"
-            )
+            raise ParameterError(named, "must not be given together with --loop, which takes A and B as they come")
         if not 8 <= self.current_width <= 24:
             raise ParameterError("current_width", f"must be from 8 to 24, not {self.current_width}")
         if self.multiplier not in MULTIPLIERS:

@@ -33,7 +33,7 @@ def check(spec: TachometerSpec) -> None:
         longest = format_time(Fraction(most) / spec.timing.clock_hz)
         raise ParameterError("filter_clocks", f"must be from 0 to {most} clocks, {longest}, not {spec.filter_clocks}")
     if spec.index_reset and not spec.index:
-        raise ParameterError("index_reset", "must be given together with an index")
+        raise ParameterError("index_reset", "must be given together with --index")
     if "z" in spec.encoder.inverted and "z" not in spec.lines:
         raise ParameterError("invert", "must not have z without --index, which makes the line z")
     if spec.encoder.missing and spec.bounds:
@@ -59,7 +59,7 @@ def _check_index_state(spec: TachometerSpec) -> None:
         return
     kind = spec.encoder.kind
     if not spec.index:
-        raise ParameterError("index_at", "must be given together with an index")
+        raise ParameterError("index_at", "must be given together with --index")
     if not kind.cycle:
         raise ParameterError("index_at", f"must be edge for {kind.name}, whose levels are no place")
     if spec.encoder.missing:
@@ -88,7 +88,7 @@ def _check_edge_error(spec: TachometerSpec) -> None:
     if not 0 <= spec.edge_error <= 1:
         raise ParameterError("edge_error", f"must be from 0 to 1, not {float(spec.edge_error):.9g}")
     if spec.edge_error and not spec.bounds:
-        raise ParameterError("edge_error", "must be given together with bounds")
+        raise ParameterError("edge_error", "must be given together with --bounds")
 
 
 def _check_lowpass(spec: TachometerSpec, bandwidth: Fraction) -> None:
@@ -105,7 +105,7 @@ def _check_lowpass(spec: TachometerSpec, bandwidth: Fraction) -> None:
 def _check_ticks(spec: TachometerSpec) -> None:
     if not spec.external_tick:
         if spec.max_tick_cycles is not None:
-            raise ParameterError("max_tick_cycles", "must be given together with an external tick")
+            raise ParameterError("max_tick_cycles", "must be given together with --external-tick")
         return
     if spec.facts.own_ticks:
         raise ParameterError(

@@ -43,9 +43,12 @@ def _factor(what: str, text: str) -> int:
 
 
 def _inverted(what: str, text: str) -> str:
-    names = {name.strip().lower() for name in text.split(",")}
+    listed = [name.strip().lower() for name in text.split(",")]
+    names = {*listed}
     if wrong := sorted(names - {*_INVERTIBLE}):
         raise ParameterError(what, f"must be of {', '.join(_INVERTIBLE)}, with commas between, not {wrong[0]!r}")
+    if len(names) < len(listed):
+        raise ParameterError(what, f"must have each line once, not {text!r}")
     return ",".join(name for name in _INVERTIBLE if name in names)
 
 

@@ -202,10 +202,10 @@ class AxesSpec:
         spec = self.tachometer
         for name, value, why in _LEFT_OUT:
             if getattr(spec, name) != value:
-                raise ParameterError(name, f"must not be given together with axes: {why}")
+                raise ParameterError(name, f"must not be given together with --axes: {why}")
         if spec.encoder.sensor != "quadrature":
             why = f"the decoder of {spec.encoder.sensor} {_FOR_ONE}"
-            raise ParameterError("sensor", f"must not be given together with axes: {why}")
+            raise ParameterError("sensor", f"must not be given together with --axes: {why}")
         self._check_tick()
 
     def _check_tick(self) -> None:

@@ -32,7 +32,7 @@ class AxesMap(RegisterMap):
     def __post_init__(self) -> None:
         if not self.axes.parallel:
             raise ParameterError(
-                "parallel", "must be given together with axes and a bus: registers show what is held for each axis"
+                "parallel", "must be given together with --axes and --bus: registers show what is held for each axis"
             )
 
     @property

@@ -84,6 +84,20 @@ def test_a_manifest_of_other_tools_is_said_to_be_one(generated: Generated) -> No
     assert found.files["core.json"][0] == EQUIVALENT
 
 
+def test_files_are_compared_without_cocotb(
+    generated: Generated, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = generated("core", *CORES["s"].split())
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert run("check", folder) == 2
+    said = capsys.readouterr()
+    assert re.search(r"core\.v +as the manifest says", said.out)
+    assert (
+        said.err
+        == "tachometry: error: to simulate, cocotb must be there: pip install cocotb; or take --no-simulation\n"
+    )
+
+
 # Yosys from PyPI compiles itself for a minute when it is first run on a machine.
 @nightly
 def test_what_other_versions_wrote_is_proved(

@@ -10,6 +10,7 @@ from support.options import had_by
 from tachometry.hdl.export import export
 from tachometry.hdl.front_end import decoder
 from tachometry.sim import golden
+from tachometry.sim.encoder.imperfections import LineFault
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.encoder.virtual import VirtualEncoder
@@ -96,3 +97,16 @@ def test_options_of_a_manifest_make_the_core_again(sensor: str) -> None:
     spec = of_texts("s", BASE | {"sensor": sensor})
     assert of_options(spec.options) == spec
     assert ("sensor" in spec.options) == ("sensor" in spec.parameters) == (sensor != "quadrature")
+
+
+def test_a_line_of_halls_is_broken() -> None:
+    """It is high, as an open input is, or stays as it is."""
+    c = LineFault("c", 0.05)
+    for encoder in (VirtualEncoder(4, sensor="hall", broken=c), VirtualEncoder(4, sensor="hall", stuck=c)):
+        recording = encoder.record(parse_motion("constant:50rad/s:100ms")).recording
+        assert recording.c is not None
+        later = recording.c[recording.time >= 0.05]
+        assert len(later) > 5
+        assert {*later.tolist()} == ({1} if encoder.broken else {int(later[0])})
+    with pytest.raises(ValueError, match=r"^broken must be of line a, b or z, not c$"):
+        VirtualEncoder(4, broken=LineFault("c", 0.05))

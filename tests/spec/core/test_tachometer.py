@@ -70,7 +70,7 @@ def test_the_edge_error_is_rounded_up_to_eighths() -> None:
     for wrong in (Fraction(-1, 100), Fraction(101, 100)):
         with pytest.raises(ValueError, match=f"^edge_error must be from 0 to 1, not {float(wrong)}$"):
             spec_of(bounds=True, edge_error=wrong)
-    with pytest.raises(ValueError, match=r"^edge_error must be given together with bounds$"):
+    with pytest.raises(ValueError, match=r"^edge_error must be given together with --bounds$"):
         spec_of(edge_error=Fraction(1, 8))
 
 
