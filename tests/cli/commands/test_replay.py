@@ -160,7 +160,6 @@ def test_the_guide(
 def test_samplerate(tmp_path: Path) -> None:
     write_sr(tmp_path / "c.sr", recorded().place(20_000), 20_000)
     assert run("replay", tmp_path / "c.sr", *CORE, "--samplerate", "20kHz") == 0
-    assert run("replay", tmp_path / "c.sr", *CORE, "--samplerate", "20kHz") == 0
 
 
 def test_a_real_shaft_loses_no_count(

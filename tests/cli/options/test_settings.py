@@ -57,25 +57,6 @@ def test_a_range_of_a_loop_need_not_be_whole(name: str) -> None:
     assert of_command_line({"vary": [f"{name}=1..2:3"]}, loop_options()).vary == {name: ["1", "1.5", "2"]}
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("tick", "--vary must be NAME=VALUES, not 'tick'"),
-        ("tick=1us,,2us", "values of tick must be separated by one comma, and none may be empty"),
-        ("tick=", "values of tick must be separated by one comma, and none may be empty"),
-        ("tick=1us..2us", "a range of tick must be LO..HI:N, or LO..HI:Nlog, not '1us..2us'"),
-        ("tick=1us..2us:5exp", "a range of tick must be LO..HI:N, or LO..HI:Nlog, not '1us..2us:5exp'"),
-        ("tick=1us..2Hz:5", "a range of tick must have one unit, not '1us..2Hz:5'"),
-        ("tick=1us..2us:1", "a range of tick must have 2 to 100000 values, not '1us..2us:1'"),
-        ("tick=3us..2us:5", "a range of tick must go up, not '3us..2us:5'"),
-        ("speed=0..2:5log", "a range of speed must go up, from more than 0, not '0..2:5log'"),
-    ],
-)
-def test_what_is_no_axis(text: str, message: str) -> None:
-    with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
-        vary(text)
-
-
 def test_an_axis_twice() -> None:
     with pytest.raises(ValueError, match=r"^--vary must be given once for tick$"):
         vary("tick=1us", "tick=2us")
