@@ -68,7 +68,7 @@ lattice of ticks S is the best.""",
 M/T while its windows are short. With windows of 1 ms it is as good as LinuxCNC's timestamps. Methods that
 average over more keep their errors and their delays. The memory of the tracking method grows on a ramp
 as it does at constant speed, and it learns where the edges of the disc are. So its error is as small as with an ideal
-encoder, and less than a fiftieth of theirs.""",
+encoder, and a fiftieth of theirs.""",
         f"--methods {WITH_LONG_MT} "
         "--motion ramp:0:100rad/s:400ms --from 40ms --jitter 0.05 --nonuniformity 0.1 --phase-error 10 --seed 1",
     ),

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from reference.tracker import Tracker
 from support.nightly import nightly, only
+from support.script import load
 from support.tracking import core
 
 from tachometry.sim import golden
@@ -16,15 +17,7 @@ from tachometry.sim.studies.comparing.situations import SITUATIONS, Situation
 
 SPEC = core(tick="100us", max_time="100ms", max_speed="1000rad/s")
 ROWS = {situation.name: situation for situation in SITUATIONS}
-# RMS in rad/s of ten seeds by a model in floating point, at this tick.
-PROMISED = {
-    "ramp": 5.1e-4, "ramp, real": 2.1e-3, "ramp, bad": 4.1e-3, "very slow, real": 7.5e-5,
-    "slow, jitter": 3.9e-5, "slow, real": 7e-5, "fast, jitter": 2.5e-5, "fast, real": 2.4e-5, "fast, bad": 4.3e-5,
-    "unit velocity, vibration": 0.157, "unit velocity, vibration, real": 0.157,
-    "reversals, jitter": 0.114, "reversals, real": 0.137, "reversals, bad": 0.198,
-    "slow sine": 0.0116, "slow sine, real": 0.0447, "fast sine": 0.277, "fast sine, real": 1.31,
-    "trapezoid": 0.18, "trapezoid, real": 0.261, "stop": 0.702, "stop, real": 0.828,
-}  # fmt: skip
+PROMISED = load("tracking").IN_FLOAT["100us"]
 
 
 def errors(situation: Situation, seed: int, beside: bool = False) -> tuple[float, float]:
@@ -93,7 +86,7 @@ def test_lines_at_fault(faults: dict[str, str]) -> None:
 @nightly
 @pytest.mark.parametrize("name", PROMISED)
 def test_the_errors_are_those_that_are_promised(name: str) -> None:
-    """The median of twenty seeds, as one of them may have a false alarm."""
+    """In the median of twenty seeds, as one of them may have a false alarm."""
     seeds = range(401, 421) if ROWS[name].random else (1,)
     assert np.median([errors(ROWS[name], seed)[0] for seed in seeds]) < 1.1 * PROMISED[name]
 

@@ -1,0 +1,42 @@
+"""docs/measured/track.md: its rows are what is measured now, and what is promised of them holds."""
+
+from pathlib import Path
+
+import pytest
+from support.script import load
+
+tracking = load("tracking")
+PAGE = Path(__file__).parents[2] / "docs" / "measured" / "track.md"
+ROWS = {
+    name: cells
+    for name, *cells in (
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in PAGE.read_text(encoding="utf-8").splitlines()
+        if line.startswith("| ")
+    )
+}
+# RMS in rad/s with ticks of 20 us and a real disc.
+LIMITS = {
+    "ramp, real": 0.004, "slow, real": 2e-4, "fast, real": 6e-4, "reversals, real": 0.17, "slow sine, real": 0.06,
+    "fast sine, real": 1.7, "gentle S-curve": 0.2,
+}  # fmt: skip
+
+
+def error(name: str, column: int) -> float:
+    return float(ROWS[name][column].split(" ")[0])
+
+
+@pytest.mark.parametrize("name", [one.name for one in tracking.SITUATIONS if not one.random])
+def test_rows_are_those_of_today(name: str) -> None:
+    (situation,) = [one for one in tracking.SITUATIONS if one.name == name]
+    assert tracking.row(situation, 1)[1:] == ROWS[name]
+
+
+@pytest.mark.parametrize(("column", "tick"), [(0, "100us"), (3, "20us")])
+def test_errors_are_at_most_a_tenth_above_those_in_float(column: int, tick: str) -> None:
+    promised = tracking.IN_FLOAT[tick]
+    assert [name for name, of in promised.items() if error(name, column) > 1.1 * of] == []
+
+
+def test_errors_with_a_real_disc_are_within_their_limits() -> None:
+    assert [name for name, limit in LIMITS.items() if error(name, 3) > limit] == []
