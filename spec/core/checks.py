@@ -108,9 +108,7 @@ def _check_ticks(spec: TachometerSpec) -> None:
             raise ParameterError("max_tick_cycles", "must be given together with --external-tick")
         return
     if spec.facts.own_ticks:
-        raise ParameterError(
-            "method", f"must be another than {spec.method} for an external tick: it makes its own ticks"
-        )
+        raise ParameterError("method", f"must not be {spec.method} with an external tick: it makes its own ticks")
     shortest = spec.timing.tick_cycles
     if shortest < 2:
         raise ParameterError("tick_cycles", "must be at least 2 with an external tick, not 1")

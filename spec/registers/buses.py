@@ -66,7 +66,8 @@ class Bus:
         words = 1 << self.address_bits
         if self.address_bits and len(registers.registers) >= words:
             raise ParameterError(
-                "bus", f"must be another than {self.name} for {len(registers.registers)} registers: it has {words - 1}"
+                "bus",
+                f"must not be {self.name} for {len(registers.registers)} registers: it reaches {words - 1} of them",
             )
         width = registers.address_width - (WORD // 8 - 1).bit_length() * self.words
         return tuple(

@@ -111,7 +111,7 @@ def test_what_cannot_be_of_all_methods_is_left_out(scheduler: list[str], capsys:
         == 0
     )
     told = " ".join(capsys.readouterr().out.split())
-    assert "rairan: left out: method must be another than rairan for an external tick" in told
+    assert "rairan: left out: method must not be rairan with an external tick" in told
     assert "(method rairan, tick=1ms)" in told
     assert "10 points" in told
 

@@ -325,7 +325,7 @@ def test_a_burst_after_standstill() -> None:
         ({"estimate": "n4"}, "estimate must be one of n1, n2, n3, not 'n4'"),
         (
             {"external_tick": True, "max_tick_cycles": 100},
-            "method must be another than rairan for an external tick: it makes its own ticks",
+            "method must not be rairan with an external tick: it makes its own ticks",
         ),
     ],
 )
