@@ -208,6 +208,19 @@ CONFIGURATIONS = (
     Configuration("lowpass", "low-pass filter, 200 rad/s", replace(REFERENCE, lowpass=Fraction(200))),
     *(
         Configuration(
+            name,
+            what,
+            replace(REFERENCE, encoder=Encoder(60, 1, "pulses", missing_teeth=wheel)),
+            is_option=False,
+            targets=("ECP5",),
+        )
+        for name, what, wheel in (
+            ("pulses", "tooth wheel, 60 teeth", None),
+            ("missing-teeth", "crank wheel, 60-2", "60-2"),
+        )
+    ),
+    *(
+        Configuration(
             f"bus-{bus.name}",
             f"registers on {bus.name}",
             REFERENCE,

@@ -123,6 +123,8 @@ class MTTachometer(TimedTachometer):
                 "min_time",
                 f"must be a multiple of {self.form.timer_cycles} clocks with times in ticks, not {self.min_time}",
             )
+        if self.whole_cycles and self.encoder.sensor == "hall":
+            raise ParameterError("whole_cycles", "must not be given with --sensor hall: a period of halls has 6 counts")
         if self.whole_cycles and self.form.on_lattice:
             raise ParameterError(
                 "whole_cycles", "must not be given with times in ticks, which are coarser than the errors that cancel"
