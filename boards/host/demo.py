@@ -10,7 +10,7 @@ from tachometry.boards.host.snapshot import Snapshot
 from tachometry.spec.registers.demo import PERIOD_WIDTH
 
 # In the order in which they are written: what is measured, and what happens once, after all that it depends on.
-SETTINGS = ("RATE", "ERRORS", "NOISE", "SPEED", "DEMO")
+SETTINGS = ("RATE", "ERRORS", "NOISE", "WIRES", "SPEED", "DEMO")
 
 
 class DemoBoard:

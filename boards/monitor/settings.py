@@ -6,12 +6,14 @@ from fractions import Fraction
 
 from tachometry.spec import ParameterError, TachometerSpec
 from tachometry.spec.language.units import FRACTION, SPEED, TIME, Unit, read_exactly, read_nearest, rounded
+from tachometry.spec.registers.demo import ENCODER_LINES
 from tachometry.spec.registers.emulator import (
     BOUNCE_WIDTH,
     DROP_WIDTH,
     ERROR_WIDTH,
     FINE_WIDTH,
     JITTER_WIDTH,
+    NOISE_WIDTH,
     fastest,
     rate_of,
     speed_of,
@@ -111,8 +113,24 @@ def _drop(spec: TachometerSpec, text: str) -> Fields:
     return {"drop": _steps("drop", text, 1 << DROP_WIDTH, 0, (1 << DROP_WIDTH) - 1)}
 
 
+def _glitches(spec: TachometerSpec, text: str) -> Fields:
+    return {"glitches": _steps("glitches", text, 1 << 2 * NOISE_WIDTH, 0, (1 << NOISE_WIDTH) - 1)}
+
+
+def _wires(name: str) -> Callable[[TachometerSpec, str], Fields]:
+    """Tell which lines are at fault."""
+
+    def read(spec: TachometerSpec, text: str) -> Fields:
+        words = {word.strip() for word in text.lower().split(",")} - {"none"}
+        if wrong := sorted(words - {*ENCODER_LINES}):
+            raise ParameterError(name, f"must be none, or of a, b, z, with commas between, not {wrong[0]!r}")
+        return {name: sum(1 << place for place, line in enumerate(ENCODER_LINES) if line in words)}
+
+    return read
+
+
 def _steps(name: str, text: str, per_one: int, least: int, most: int) -> int:
-    units = FRACTION if name == "drop" else _OF_PERIOD
+    units = FRACTION if name in ("drop", "glitches") else _OF_PERIOD
     steps = math.floor(read_exactly(name, text, units) * per_one + Fraction(1, 2))
     if not least <= steps <= most:
         raise ParameterError(
@@ -128,5 +146,7 @@ _READERS: dict[str, Callable[[TachometerSpec, str], Fields]] = {
     "jitter": _jitter,
     "bounce": _bounce,
     "drop": _drop,
+    "glitches": _glitches,
+    **{name: _wires(name) for name in ("broken", "stuck")},
     "source": _source,
 }

@@ -52,6 +52,9 @@ Settings of the emulated encoder, for --set:
   jitter=1%              edges move at random by up to this
   bounce=5us             lines bounce after each edge
   drop=1%                so many edges are left out
+  glitches=0.01%         in so many clocks A and B have the wrong level
+  broken=b               lines that are high, as open inputs are; none
+  stuck=a,z              lines that stay as they are; none
   source=pins            what is measured: pins or emulator
 
 \b

@@ -13,11 +13,14 @@ from tachometry.spec.registers.emulator import (
     ERROR_WIDTH,
     FINE_WIDTH,
     JITTER_WIDTH,
+    NOISE_BIT,
+    NOISE_WIDTH,
     PHASE_WIDTH,
     RANDOM_TAP,
     RANDOM_WIDTH,
     RATE_SHIFT,
     START,
+    WIRES_WIDTH,
 )
 
 _HALF = 1 << FINE_WIDTH - 1
@@ -50,6 +53,10 @@ class EncoderEmulator(wiring.Component):
         Clocks for which a line bounces after an edge.
     drop : In(8)
         So many of 256 edges are left out.
+    glitches : In(8)
+        In so many of 65536 clocks both A and B have the wrong level.
+    broken, stuck : In(3)
+        Of A, B and Z: the line is high; it stays as it is.
     jump : In(1)
         Turns by half a period.
     a, b : Out(1)
@@ -67,6 +74,9 @@ class EncoderEmulator(wiring.Component):
                 "jitter": In(JITTER_WIDTH),
                 "bounce": In(BOUNCE_WIDTH),
                 "drop": In(DROP_WIDTH),
+                "glitches": In(NOISE_WIDTH),
+                "broken": In(WIRES_WIDTH),
+                "stuck": In(WIRES_WIDTH),
                 "jump": In(1),
                 "a": Out(1),
                 "b": Out(1),
@@ -124,13 +134,17 @@ class EncoderEmulator(wiring.Component):
         """Drive A and B, each high for half a period from its start on, less its errors."""
         starts = {"a": _QUARTER, "b": _HALF + self.phase_error}
         ends = {"a": self.duty_a, "b": self.duty_b}
+        low, high = NOISE_BIT + NOISE_WIDTH, NOISE_BIT + 2 * NOISE_WIDTH
+        noise = ~random[low:high].any() & (random[NOISE_BIT:low] < self.glitches)
         for k, name in enumerate(starts):
             m.submodules[f"line_{name}"] = line = EmulatedLine()
             since = Signal(FINE_WIDTH, name=f"since_{name}")
             m.d.comb += [
                 since.eq(fine - moved - starts[name]),
                 line.random.eq(random[BOUNCE_BITS[k]]),
-                line.drop.eq(random[DROP_BITS[k] : DROP_BITS[k] + DROP_WIDTH] < self.drop),
+                line.drop.eq((random[DROP_BITS[k] : DROP_BITS[k] + DROP_WIDTH] < self.drop) | self.stuck[k]),
+                line.noise.eq(noise),
+                line.broken.eq(self.broken[k]),
                 line.bounce.eq(self.bounce),
                 getattr(self, name).eq(line.line),
             ]
@@ -145,4 +159,8 @@ class EncoderEmulator(wiring.Component):
         with m.Elif(turns != 0):
             m.d.sync += period.eq(Mux(period == 0, last, period - 1))
         index = Signal()
-        m.d.sync += [index.eq((period == 0) & (fine < _QUARTER)), self.z.eq(index)]
+        m.d.sync += index.eq((period == 0) & (fine < _QUARTER))
+        z = Signal()
+        with m.If(~self.stuck[2]):
+            m.d.sync += z.eq(index)
+        m.d.comb += self.z.eq(z | self.broken[2])

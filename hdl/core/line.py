@@ -22,11 +22,25 @@ class EmulatedLine(wiring.Component):
         Clocks for which the line bounces.
     random : In(1)
         Whether a line that bounces has the wrong level.
+    noise : In(1)
+        The line has the wrong level.
+    broken : In(1)
+        The line is high.
     line : Out(1)
     """
 
     def __init__(self) -> None:
-        super().__init__({"ideal": In(1), "drop": In(1), "bounce": In(BOUNCE_WIDTH), "random": In(1), "line": Out(1)})
+        super().__init__(
+            {
+                "ideal": In(1),
+                "drop": In(1),
+                "bounce": In(BOUNCE_WIDTH),
+                "random": In(1),
+                "noise": In(1),
+                "broken": In(1),
+                "line": Out(1),
+            }
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
@@ -36,7 +50,7 @@ class EmulatedLine(wiring.Component):
         m.d.sync += [
             before.eq(self.ideal),
             left.eq(Mux(left == 0, 0, left - 1)),
-            self.line.eq(level ^ (left.any() & self.random)),
+            self.line.eq(level ^ (left.any() & self.random) ^ self.noise | self.broken),
         ]
         with m.If((self.ideal ^ before) & ~self.drop):
             m.d.sync += [level.eq(self.ideal), left.eq(self.bounce)]

@@ -13,6 +13,8 @@ from tachometry.spec.registers.emulator import (
     DROP_WIDTH,
     FINE_WIDTH,
     JITTER_WIDTH,
+    NOISE_BIT,
+    NOISE_WIDTH,
     PHASE_WIDTH,
     RANDOM_TAP,
     RANDOM_WIDTH,
@@ -83,7 +85,7 @@ class _Line:
         seen = np.append(np.uint8(self._ideal), ideal)
         edges = np.flatnonzero(seen[:-1] != np.append(np.uint8(self._before), seen[:-2]))
         dropped = self._random.number(clock[edges], DROP_BITS[self._k], DROP_WIDTH) < settings.drop
-        kept = edges[~dropped]
+        kept = edges[~dropped & (settings.stuck >> self._k & 1 == 0)]
         # What holds in the clocks after each kept edge, the one carried over first.
         which = np.zeros(len(clock) + 1, dtype=np.int64)
         which[kept + 1] = 1
@@ -92,6 +94,10 @@ class _Line:
         until = np.append(self._until, clock[kept] + 1 + settings.bounce)[which]
         bounces = (clock < until[:-1]) & (self._random.bit(clock, BOUNCE_BITS[self._k]) == 1)
         after = level[:-1] ^ bounces.astype(np.uint8)
+        if settings.glitches:
+            noise = self._random.number(clock, NOISE_BIT, 2 * NOISE_WIDTH) < settings.glitches
+            after ^= noise.astype(np.uint8)
+        after |= np.uint8(settings.broken >> self._k & 1)
         found = np.append(np.uint8(self._line), after[:-1])
         self._ideal, self._before = int(seen[-1]), int(seen[-2])
         self._level, self._until, self._line = int(level[-1]), int(until[-1]), int(after[-1])
@@ -191,6 +197,8 @@ class GoldenEmulator:
         if self._lines_per_rev is not None:
             index = ((total[:n] >> PHASE_WIDTH) % self._lines_per_rev == 0) & (fine < _TURN // 4)
             z = np.append(np.array(self._z, dtype=np.uint8), index.astype(np.uint8))
+            if settings.stuck & 4:
+                z[:-1] = z[0]
             self._z = z[-2:].tolist()
-            level |= z[:-2] << np.uint8(2)
+            level |= (z[:-2] | np.uint8(settings.broken >> 2)) << np.uint8(2)
         return level

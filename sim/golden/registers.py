@@ -127,9 +127,9 @@ class GoldenBank:
             "overflow": self._events["overflows"],
             "stall": self._stalls,
             "error": np.unique(np.concatenate(errors)),
-            # They are seen in the clock before the first in which they are shown.
-            **{name: self._tables[name].clock - 1 for name in ("fault", "over_speed") if name in self._tables},
         }
+        # They are seen in the clock before the first in which they are shown.
+        found |= {name: self._tables[name].clock - 1 for name in ("fault", "over_speed") if name in self._tables}
         return {event: found[event] for event in self._map.interrupts}
 
     def irq(self, accesses: Iterable[Access], n_clocks: int) -> list[bool]:

@@ -10,7 +10,15 @@ from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import TICK, Port, held
 from tachometry.spec.registers.buses import Bus, manifest_on
-from tachometry.spec.registers.emulator import BOUNCE_WIDTH, DROP_WIDTH, ERROR_WIDTH, JITTER_WIDTH, RATE_SHIFT
+from tachometry.spec.registers.emulator import (
+    BOUNCE_WIDTH,
+    DROP_WIDTH,
+    ERROR_WIDTH,
+    JITTER_WIDTH,
+    NOISE_WIDTH,
+    RATE_SHIFT,
+    WIRES_WIDTH,
+)
 from tachometry.spec.registers.loop import LoopMap
 from tachometry.spec.registers.manifest import described_port
 from tachometry.spec.registers.map import WORD, Draft, Field, RegisterMap
@@ -78,8 +86,14 @@ class DemoMap(RegisterMap):
             _setting("jitter", JITTER_WIDTH, 0, f"Edges move by up to this to either side, in 2^-10 periods; {bits}"),
             _setting("bounce", BOUNCE_WIDTH, 8, "Clocks for which a line bounces after each of its edges."),
             _setting("drop", DROP_WIDTH, 16, "So many of 256 edges of each line are left out."),
+            _setting("glitches", NOISE_WIDTH, 24, "In so many of 65536 clocks both A and B have the wrong level."),
         )
         yield "NOISE", "Where the emulated edges are wrong, at random.", fields, {}
+        fields = (
+            _setting("broken", WIRES_WIDTH, 0, "Lines A, B, Z (bits 0 to 2) that are high, as open inputs are."),
+            _setting("stuck", WIRES_WIDTH, 8, "Lines A, B, Z (bits 0 to 2) that stay as they are."),
+        )
+        yield "WIRES", "Lines of the emulated encoder that are at fault.", fields, {}
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,8 @@ ERROR_WIDTH = 8
 JITTER_WIDTH = 6
 BOUNCE_WIDTH = 8
 DROP_WIDTH = 8
+WIRES_WIDTH = 3  # a bit for each of A, B and Z
+NOISE_WIDTH = 8
 START = 1 << PHASE_WIDTH - 3  # phase after reset: an eighth of a period from the edges at either side
 
 # Random bits: x^31 + x^28 + 1, of which the newest bit is the lowest, one bit a clock.
@@ -19,6 +21,7 @@ RANDOM_WIDTH, RANDOM_TAP = 31, 28
 # Lowest of the random bits that decide for line A and line B whether an edge is left out, and how it bounces.
 DROP_BITS = (14, 22)
 BOUNCE_BITS = (3, 17)
+NOISE_BIT = 7  # there is noise while this one and more are below the setting, with as many zeros above them
 
 # Clocks after which the emulated lines follow the phase.
 LATENCY = 3
@@ -42,6 +45,10 @@ class EmulatorSettings:
         Clocks.
     drop : int
         So many of 256 edges of each line are left out.
+    glitches : int
+        In so many of 65536 clocks both A and B have the wrong level.
+    broken, stuck : int
+        Bits of A, B and Z: the line is high, as an open input is; it stays as it is.
     """
 
     speed: int = 0
@@ -52,6 +59,9 @@ class EmulatorSettings:
     jitter: int = 0
     bounce: int = 0
     drop: int = 0
+    glitches: int = 0
+    broken: int = 0
+    stuck: int = 0
 
 
 def speed_of(spec: TachometerSpec, rad_per_s: float) -> int:

@@ -26,6 +26,7 @@ SPEC = of_texts("m", {"ppr": "500", "clock": "12MHz"})
         (["bounce=5us"], {"bounce": 60}),
         (["bounce=7"], {"bounce": 7}),
         (["drop=1%"], {"drop": 3}),
+        (["glitches=0.1%", "broken=b,z", "stuck=none"], {"glitches": 66, "broken": 6, "stuck": 0}),
     ],
 )
 def test_values(words: list[str], fields: dict[str, int]) -> None:
@@ -67,6 +68,8 @@ def test_the_fastest_speed_is_taken() -> None:
         ("jitter=-1%", "--set jitter must be from 0% to 6.152%, not -1%"),
         ("bounce=1ms", "--set bounce must be from 0 to 255 clocks, 21.25us, not 1ms"),
         ("drop=100%", "--set drop must be from 0% to 99.61%, not 100%"),
+        ("glitches=1%", "--set glitches must be from 0% to 0.3891%, not 1%"),
+        ("broken=c", "--set broken must be none, or of a, b, z, with commas between, not 'c'"),
         ("source=motor", "--set source must be pins or emulator, not 'motor'"),
     ],
 )

@@ -37,6 +37,9 @@ def random_steps(registers: DemoMap, seed: int) -> list[Step]:
             jitter=int(rng.choice([0, 7, 15])),
             bounce=int(rng.choice([0, 1, 9])),
             drop=int(rng.choice([0, 5])),
+            glitches=int(rng.choice([0, 9])),
+            broken=int(rng.choice([0, 0, 0, 1, 2])),
+            stuck=int(rng.choice([0, 0, 0, 1, 2, 4])),
         )
 
     def changes() -> dict[str, int]:

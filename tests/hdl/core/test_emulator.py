@@ -7,7 +7,10 @@ import pytest
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.core import emulator
+from tachometry.sim.golden import tables
 from tachometry.sim.golden.emulator import Change, GoldenEmulator
+from tachometry.spec import of_texts
+from tachometry.spec.core.health import Fault
 from tachometry.spec.registers.emulator import LATENCY, EmulatorSettings
 
 CLOCKS, SEEDS = 3000, range(8)
@@ -26,6 +29,8 @@ def random_changes(seed: int) -> list[Change]:
             jitter=(1 << int(rng.integers(0, 7))) - 1,
             bounce=int(rng.integers(256)) >> int(rng.integers(0, 9)),
             drop=int(rng.integers(256)) >> int(rng.integers(0, 9)),
+            glitches=int(rng.integers(256)),
+            **{name: int(rng.integers(8)) * int(rng.random() < 0.3) for name in ("broken", "stuck")},
         )
         changes.append(Change(clock, settings, bool(clock >= 0 and rng.random() < 0.3)))
     return changes
@@ -106,6 +111,33 @@ def test_lines_bounce_for_as_long_as_asked() -> None:
     since = a - ideal[np.searchsorted(ideal, a, side="right") - 1]
     assert since.max() in (99, 100)
     assert len(a) > 20 * len(ideal)
+
+
+def test_lines_at_fault() -> None:
+    """A broken line is high, one that is stuck stays, and noise turns both round in a part of all clocks."""
+    at_fault = replace(STEADY, broken=1 | 4, stuck=2)
+    trace = GoldenEmulator(1).trace([Change(-1, STEADY), Change(10 * PERIOD, at_fault)], 100 * PERIOD)
+    late = trace.clock > 10 * PERIOD + LATENCY
+    assert trace.clock[late].tolist() == []
+    assert trace.z is not None
+    assert (trace.a[-1], trace.z[-1]) == (1, 1)
+    noisy = GoldenEmulator().trace([Change(-1, replace(STEADY, glitches=255))], 1000 * PERIOD)
+    turned = np.flatnonzero((np.diff(noisy.a.astype(int)) != 0) & (np.diff(noisy.b.astype(int)) != 0))
+    assert 0.5 < len(turned) / 2 / (1000 * PERIOD * 255 / 65536) < 1.2
+
+
+@pytest.mark.parametrize(
+    ("fault", "code"),
+    [({"broken": 1}, Fault.A_STANDS), ({"stuck": 2}, Fault.B_STANDS), ({"glitches": 99}, Fault.ILLEGAL)],
+)
+def test_a_core_tells_them(fault: dict[str, int], code: Fault) -> None:
+    """Within twice as many edges of the line that still works as make a fault, as docs/guides/encoder.md has it."""
+    words = {"ppr": "25", "clock": "1MHz", "tick": "100us", "health": "yes", "health-edges": "5", "health-errors": "3"}
+    begins = 20 * PERIOD
+    changes = [Change(-1, STEADY), Change(begins, replace(STEADY, **fault))]
+    found = tables(of_texts("m", words), GoldenEmulator().trace(changes, 60 * PERIOD))["fault"]
+    assert found["code"][0] == code
+    assert 0 < found.clock[0] - begins < 10 * PERIOD // 2
 
 
 def test_the_speed_changes_at_the_rate() -> None:

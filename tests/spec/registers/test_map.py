@@ -142,7 +142,8 @@ def test_bits_of_a_demo() -> None:
     assert bits(demo, "DEMO") == [("emulated", 0, 1), ("restart", 1, 1), ("jump", 2, 1)]
     assert [field.single for field in demo["DEMO"].fields] == [False, True, True]
     assert bits(demo, "ERRORS") == [("phase_error", 0, 8), ("duty_a", 8, 8), ("duty_b", 16, 8)]
-    assert bits(demo, "NOISE") == [("jitter", 0, 6), ("bounce", 8, 8), ("drop", 16, 8)]
+    assert bits(demo, "NOISE") == [("jitter", 0, 6), ("bounce", 8, 8), ("drop", 16, 8), ("glitches", 24, 8)]
+    assert bits(demo, "WIRES") == [("broken", 0, 3), ("stuck", 8, 3)]
     assert bits(demo, "TELEMETRY") == [("telemetry_period", 0, 16)]
 
 
