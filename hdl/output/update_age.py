@@ -45,7 +45,7 @@ class UpdateAge(wiring.Component):
         fresh: Value | int = 0
         if self._fresh_width:
             most = self._max_age
-            fresh = self.fresh if most >> self._fresh_width else Mux(self.fresh > most, most, self.fresh)
+            fresh = self.fresh if (most + 1) >> self._fresh_width else Mux(self.fresh > most, most, self.fresh)
         age = Signal.like(self.age)  # without a tick in this clock
         m.d.comb += age.eq(Mux(self.update, fresh, self.before))
         m.d.comb += self.age.eq(age + (self.tick & (age != self._max_age)))

@@ -1,10 +1,14 @@
 """Ticks since the update, clock by clock."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from support.compiled import lint
 from support.nightly import only_rows
 from support.simulate import clock_by_clock
 
+from tachometry.hdl.export import export
 from tachometry.hdl.output import update_age
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.engines.pysim import PySim
@@ -69,3 +73,9 @@ def test_with_a_filter_that_is_slower_than_a_tick() -> None:
     found = lockstep(spec, stress(spec, 1, 40), PySim())
     assert found.n_mismatches == 0, found.first
     assert found.actual.ticks["age"].max() > spec.latency.low_pass // 4
+
+
+def test_verilator_has_no_warning_where_the_greatest_age_fills_its_bits(tmp_path: Path) -> None:
+    spec = of_texts("rairan", {"ppr": "500", "clock": "48MHz", "tick": "1clk", "max-time": "3clk", "age": "yes"})
+    (tmp_path / "core.v").write_text(export(spec, "core")["core.v"])
+    lint(["core.v"], "core", tmp_path)
