@@ -187,6 +187,9 @@ CONFIGURATIONS = (
     Configuration("filter-4", "glitch filter, 4 clocks", replace(REFERENCE, filter_clocks=4)),
     Configuration("index", "index captures the position", replace(REFERENCE, index=True)),
     Configuration("index-reset", "and resets it", replace(REFERENCE, index=True, index_reset=True)),
+    Configuration("index-once", "and is taken once", replace(REFERENCE, index=True, index_once=True)),
+    Configuration("preset", "position is set by an input", replace(REFERENCE, preset=0)),
+    Configuration("position-modulo", "position within a revolution", replace(REFERENCE, position_modulo="rev")),
     Configuration(
         "external-tick",
         "external tick, up to 40 us",

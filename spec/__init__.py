@@ -7,8 +7,9 @@ from functools import cache
 from pathlib import Path
 
 from tachometry.spec.control import AnySpec, LoopSpec
+from tachometry.spec.core.described import CHOSEN
 from tachometry.spec.core.encoder import Encoder
-from tachometry.spec.core.tachometer import CHOSEN, TachometerSpec
+from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.core.timing import Timing
 from tachometry.spec.language.files import MOST_JSON, read_text
 from tachometry.spec.language.option import Option, ParameterError, options_of, parse_flag, parse_whole, read_options

@@ -18,7 +18,7 @@ from tachometry.spec.registers.emulator import (
     rate_of,
     speed_of,
 )
-from tachometry.spec.registers.map import WORD
+from tachometry.spec.registers.field import WORD
 
 _ACCELERATION = {name: SPEED[speed] for name, speed in {"rad/s/s": "rad/s", "rev/s/s": "rev/s", "rpm/s": "rpm"}.items()}
 _OF_PERIOD = {"": Unit(), "%": Unit(Fraction(1, 100)), "deg": Unit(Fraction(1, 360))}

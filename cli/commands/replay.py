@@ -17,7 +17,7 @@ from tachometry.cli.options.outputs import OUTPUT_OPTIONS, refuse_plot, write_ou
 from tachometry.cli.reports.run import print_simulation
 from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim.signals.recording import Recording
-from tachometry.sim.studies.simulation import Window
+from tachometry.sim.studies.simulation import Pulses, Window
 from tachometry.sim.studies.simulation import simulate as simulation_of
 from tachometry.spec import CoreSpec
 
@@ -39,7 +39,13 @@ a --clock that is a few times the edge rate then. Edges closer than a clock are 
 @OUTPUT_OPTIONS
 @ENGINE_OPTIONS
 def replay(
-    spec: CoreSpec, capture: Path, read: Callable[..., Recording], targets: dict[str, Path], engine: str, window: Window
+    spec: CoreSpec,
+    capture: Path,
+    read: Callable[..., Recording],
+    targets: dict[str, Path],
+    engine: str,
+    window: Window,
+    pulses: Pulses,
 ) -> int:
     """Run a core on captured encoder signals, against the golden model.
 
@@ -56,7 +62,15 @@ def replay(
     recordings = [read(capture, spec, axis) for axis in range(spec.axes or 1)]
     with outputs:
         simulation = simulation_of(
-            spec, str(capture), recordings, None, engine, window=window, vcd=outputs.get("--vcd"), bar=progress_bar
+            spec,
+            str(capture),
+            recordings,
+            None,
+            engine,
+            window=window,
+            vcd=outputs.get("--vcd"),
+            bar=progress_bar,
+            pulses=pulses,
         )
         write_outputs(simulation, outputs.get)
     return print_simulation(simulation)

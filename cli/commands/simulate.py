@@ -17,7 +17,7 @@ from tachometry.cli.options.outputs import OUTPUT_OPTIONS, refuse_plot, write_ou
 from tachometry.cli.reports.run import print_simulation
 from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim.encoder.virtual import Encoding
-from tachometry.sim.studies.simulation import Window
+from tachometry.sim.studies.simulation import Pulses, Window
 from tachometry.sim.studies.simulation import simulate as simulation_of
 from tachometry.spec import CoreSpec
 
@@ -50,6 +50,7 @@ def simulate(
     targets: dict[str, Path],
     engine: str,
     window: Window,
+    pulses: Pulses,
 ) -> int:
     """Run a core on a virtual encoder, against the golden model and the truth.
 
@@ -65,7 +66,15 @@ def simulate(
     recordings = [truth.recording for truth in truths]
     with outputs:
         simulation = simulation_of(
-            spec, "--motion", recordings, truths, engine, window=window, vcd=outputs.get("--vcd"), bar=progress_bar
+            spec,
+            "--motion",
+            recordings,
+            truths,
+            engine,
+            window=window,
+            vcd=outputs.get("--vcd"),
+            bar=progress_bar,
+            pulses=pulses,
         )
         write_outputs(simulation, outputs.get)
     return print_simulation(simulation)

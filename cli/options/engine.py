@@ -3,8 +3,10 @@
 from typing import Any
 
 import click
+import numpy as np
 
 from tachometry.cli.options.option import Group, option
+from tachometry.sim.signals.arrays import Ints
 from tachometry.spec import ParameterError, TachometerSpec
 from tachometry.spec.core.timing import time_or_clocks
 
@@ -23,6 +25,14 @@ _OPTIONS = [
     ),
     option(
         _SIMULATION,
+        "--pulse",
+        metavar="INPUT:TIME,TIME…",
+        multiple=True,
+        help="Input preset (with --preset) or home (with --index-once) rises at these times, such as "
+        "preset:20ms,35ms or home:960clk. It can be given for each input.",
+    ),
+    option(
+        _SIMULATION,
         "--vcd-from",
         metavar="TIME",
         help="Time at which the waveform of --vcd begins, such as 20us or 960clk.",
@@ -36,7 +46,7 @@ _OPTIONS = [
 ]
 
 
-def _read(*, vcd_from: str | None, vcd_to: str | None, **others: Any) -> dict[str, Any]:
+def _read(*, vcd_from: str | None, vcd_to: str | None, pulse: tuple[str, ...], **others: Any) -> dict[str, Any]:
     def window(spec: TachometerSpec, n_clocks: int) -> tuple[int, int]:
         begin = 0 if vcd_from is None else _clock("vcd_from", vcd_from, spec)
         end = n_clocks if vcd_to is None else min(_clock("vcd_to", vcd_to, spec), n_clocks)
@@ -44,16 +54,40 @@ def _read(*, vcd_from: str | None, vcd_to: str | None, **others: Any) -> dict[st
             raise ValueError(f"--vcd-from must be before --vcd-to and the end of the run, clock {end}, not {begin}")
         return begin, end
 
+    def pulses(spec: TachometerSpec) -> dict[str, Ints]:
+        return _pulses(spec, pulse)
+
     if (vcd_from is not None or vcd_to is not None) and "--vcd" not in others["targets"]:
         raise ValueError("--vcd must be given together with --vcd-from and --vcd-to")
-    return dict(window=window, **others)
+    return dict(window=window, pulses=pulses, **others)
 
 
 ENGINE_OPTIONS = Group(_OPTIONS, _read)
-"""Handed over as `engine`, a name, and `window`, a function of spec and number of clocks.
+"""Handed over as `engine`, a name, `window`, a function of spec and number of clocks, and `pulses`, one of a spec.
 
 The function gives the first clock of the waveform and the one after the last; ValueError if there is none.
 """
+
+
+def _pulses(spec: TachometerSpec, texts: tuple[str, ...]) -> dict[str, Ints]:
+    """Return clocks in which inputs rise, by their names."""
+    found: dict[str, Ints] = {}
+    apart = 2 * (spec.filter_clocks + 1)  # high and low as long as the filter asks for
+    for text in texts:
+        name, colon, times = text.partition(":")
+        if name not in spec.controls or name in found or not colon:
+            if not spec.controls:
+                raise ParameterError("pulse", "must be given together with --preset or --index-once, whose inputs rise")
+            inputs = " or ".join(spec.controls)
+            raise ParameterError("pulse", f"must be INPUT:TIME,TIME…, once for each input, {inputs}, not {text!r}")
+        clocks = np.sort([_clock("pulse", time, spec) for time in times.split(",")])
+        if len(near := np.flatnonzero(np.diff(clocks) < apart)):
+            raise ParameterError(
+                "pulse",
+                f"must have times at least {apart} clocks apart, not {clocks[near[0]]} and {clocks[near[0] + 1]}",
+            )
+        found[name] = clocks
+    return found
 
 
 def _clock(what: str, text: str, spec: TachometerSpec) -> int:

@@ -9,8 +9,8 @@ from tachometry.spec.control import AnySpec
 from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.language.units import SpeedUnit, plural, short_time
 from tachometry.spec.registers.buses import Bus, registers_on
+from tachometry.spec.registers.field import WORD
 from tachometry.spec.registers.manifest import manifest
-from tachometry.spec.registers.map import WORD
 
 
 def core_rows(spec: TachometerSpec, bus: Bus | None = None) -> list[tuple[str, str]]:

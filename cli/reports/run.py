@@ -121,6 +121,12 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         when = format_time(spec.times.seconds(int(run.ticks.clock[synced[0]]))) if len(synced) else ""
         lost = "" if run.ticks.synced[-1] or not when else ", and lost"
         rows.append(("gap of the wheel", f"found within {when}{lost}" if when else "not found"))
+    if spec.index_once:
+        rows.append(("homed", "yes" if run.ticks.homed[-1] else "no"))
+    if spec.preset is not None:
+        rows.append(("position", f"{run.ticks.position[-1]} at the end; counts out are without presets"))
+    if spec.modulus is not None:
+        rows.append(("position modulo", f"{run.ticks.position_modulo[-1]} of {spec.modulus} at the end"))
     if spec.health:
         code, faults = run.ticks.health[-1], plural(int(run.ticks.faults[-1]), "fault")
         rows.append(("health", f"{faults}, first: {FAULT_TEXTS[code]}" if code else "no fault"))

@@ -10,7 +10,8 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.bus.counter import SaturatingCounter
 from tachometry.hdl.bus.native import native_port
-from tachometry.spec.registers.map import COUNTER_WIDTH, WORD, Field, Register, RegisterMap
+from tachometry.spec.registers.field import WORD, Field, Register
+from tachometry.spec.registers.map import COUNTER_WIDTH, RegisterMap
 
 
 class RegisterBank(wiring.Component):

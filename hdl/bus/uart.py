@@ -5,6 +5,7 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.bus.bridge import Bridge, next_number
 from tachometry.hdl.wires.synchronizer import Synchronizer
+from tachometry.spec.registers.field import WORD
 from tachometry.spec.registers.frames import (
     COUNT_WIDTH,
     CRC_POLYNOMIAL,
@@ -15,7 +16,7 @@ from tachometry.spec.registers.frames import (
     TYPE_LOW,
     UART_ADDRESS_WIDTH,
 )
-from tachometry.spec.registers.map import WORD, RegisterMap
+from tachometry.spec.registers.map import RegisterMap
 
 _STOP = 9  # place of the stop bit; that of the start bit is 0
 # Parts of a frame. In place of the address an answer has its status.

@@ -12,7 +12,7 @@ from tachometry.hdl.wires.ports import follow, hand_through, members
 from tachometry.hdl.wires.synchronizer import Synchronizer
 from tachometry.spec.registers.buses import CAPTURE, Bus
 from tachometry.spec.registers.demo import ENCODER_LINES, PERIOD_WIDTH, DemoMap, demo_ports
-from tachometry.spec.registers.map import WORD
+from tachometry.spec.registers.field import WORD
 
 
 class Demo(wiring.Component):
@@ -87,6 +87,8 @@ class Demo(wiring.Component):
         follow(m, emulator, bank, (field.port for field in self._map.emulated))
         for pin in self._map.spec.ports.pins:
             emulated = getattr(emulator, pin.name) if pin.name in self._lines else period  # the external tick
+            if pin.name in self._map.spec.controls:
+                emulated = getattr(self, pin.name)
             if pin.name in self._lines:
                 m.d.comb += getattr(self, f"emulated_{pin.name}").eq(emulated)
             m.d.comb += getattr(core, pin.name).eq(Mux(bank.emulated, emulated, getattr(self, pin.name)))

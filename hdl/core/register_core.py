@@ -14,6 +14,9 @@ from tachometry.hdl.wires.ports import follow, members
 from tachometry.spec.registers.loop import LoopMap
 from tachometry.spec.registers.map import RegisterMap
 
+_MODULO = "position_modulo"
+_AT_TICK = {"position", _MODULO}
+
 
 class RegisterCore(wiring.Component):
     """Joins a tachometer, maybe with a control loop, and its registers.
@@ -45,21 +48,21 @@ class RegisterCore(wiring.Component):
         spec = self._map.spec
         core, bank = self.tachometer, self.bank
         whole = core if self.loop is None else self.loop
-        # Long windows saturate what has been counted since the tick, and an index that resets is not in it.
-        counted = not (spec.facts.own_ticks or spec.index_reset)
+        # Long windows saturate what has been counted since the tick, and what sets the position is not in it.
+        counted = not (spec.facts.own_ticks or spec.moves_position)
         open_sum = core.pulse_counter.open_sum if counted else None
         position = TickPosition(spec.position_width, 0 if open_sum is None else len(open_sum))
         restarts = ResetInserter(bank.restart) if hasattr(bank, "restart") else lambda box: box
         m.submodules.tachometer, m.submodules.tick_position = restarts(whole), restarts(position)
         m.submodules.bank = bank
-        names = {port.name for port in self._map.ports} - {"position"}  # that of the latest tick is captured
+        names = {port.name for port in self._map.ports} - _AT_TICK  # that of the latest tick is captured
         wiring.connect(m, wiring.flipped(self.bus), bank.bus)
         written = {field.port for field in self._map.settings}
         for pin in self._map.core.ports.pins:
             given = getattr(bank if pin.name in written else self, pin.name)
             switched = given & bank.loop_enable if pin.name == "enable" else given
             m.d.comb += getattr(whole, pin.name).eq(switched)
-        follow(m, self, whole, (port.name for port in self._map.core.ports.outputs))
+        follow(m, self, whole, (port.name for port in self._map.core.ports.outputs if port.name != _MODULO))
         follow(m, bank, whole, (port.name for port in spec.ports.outputs if port.name in names))
         follow(m, bank, whole, spec.ports.strobes)
         m.d.comb += [
@@ -69,6 +72,7 @@ class RegisterCore(wiring.Component):
             position.position.eq(core.position),
             bank.position.eq(position.latest),
         ]
+        self._place(m)
         if self.loop is not None:
             self._keep(m, self.loop)
         if self._map.irq:
@@ -82,6 +86,24 @@ class RegisterCore(wiring.Component):
         if open_sum is not None:
             m.d.comb += [position.next.eq(core.position_counter.next), position.open_sum.eq(open_sum)]
         return m
+
+    def _place(self, m: Module) -> None:
+        """Let a program set the position, arm the index, and move the place within a modulus."""
+        core, bank, modulus = self.tachometer, self.bank, self._map.spec.modulus
+        for name, box in core.controls.items():
+            m.d.comb += box.asked.eq(getattr(bank, f"{name}_now"))
+        if "preset" in core.controls:
+            m.d.comb += core.position_counter.value.eq(bank.preset_value)
+        if modulus is not None:
+            total = core.position_modulo + bank.modulo_offset
+            latest = Signal.like(self.position_modulo)
+            kept = Signal.like(self.position_modulo)
+            m.d.comb += [
+                self.position_modulo.eq(Mux(total >= modulus, total - modulus, total)),
+                latest.eq(Mux(core.tick, self.position_modulo, kept)),
+                bank.position_modulo.eq(latest),
+            ]
+            m.d.sync += kept.eq(latest)
 
     def _keep(self, m: Module, loop: LoopCore) -> None:
         """Keep what a program changes as it was with its strobe, whenever it is captured."""

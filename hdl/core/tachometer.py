@@ -13,6 +13,8 @@ from tachometry.hdl.front_end.encoder_watch import EncoderWatch
 from tachometry.hdl.front_end.external_tick import ExternalTick
 from tachometry.hdl.front_end.index_capture import IndexCapture
 from tachometry.hdl.front_end.index_state import IndexState
+from tachometry.hdl.front_end.modulo_counter import ModuloCounter
+from tachometry.hdl.front_end.pin_rise import PinRise
 from tachometry.hdl.front_end.position_counter import PositionCounter
 from tachometry.hdl.front_end.pulse_counter import PulseCounter
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
@@ -59,8 +61,12 @@ class Tachometer(wiring.Component):
             stretched=spec.facts.own_ticks,
             staged=spec.latency.tick - spec.latency.registers_steps > 2,
         )
-        self.position_counter = PositionCounter(spec.position_width, spec.latency.tick)
-        self.index_capture = IndexCapture(spec.position_width, spec.latency.tick) if spec.index else None
+        self.position_counter = PositionCounter(spec.position_width, spec.latency.tick, spec.preset)
+        self.controls = {name: PinRise(spec.latency.tick) for name in spec.controls}
+        self.modulo_counter = None if spec.modulus is None else ModuloCounter(spec.modulus, spec.latency.tick)
+        self.index_capture: IndexCapture | None = None
+        if spec.index:
+            self.index_capture = IndexCapture(spec.position_width, spec.latency.tick, once=spec.index_once)
         self.index_state: IndexState | None = None
         if spec.index_state is not None:
             after = spec.encoder.kind.after(spec.index_state)
@@ -71,9 +77,10 @@ class Tachometer(wiring.Component):
                 second=spec.timing.clock_hz,
                 edges=spec.health_edges,
                 errors=spec.health_errors,
-                counts_per_rev=spec.encoder.counts_per_rev if spec.index else 0,
-                position_width=spec.position_width if spec.index else 0,
+                counts_per_rev=spec.encoder.counts_per_rev if spec.index_watched else 0,
+                position_width=spec.position_width if spec.index_watched else 0,
                 index_reset=spec.index_reset,
+                presets=spec.index_watched and spec.preset is not None,
             )
         self.datapath = DATAPATHS[spec.method](spec)
         self.sampling_clock: TickSource
@@ -132,6 +139,7 @@ class Tachometer(wiring.Component):
         self._rest(m)
         updates = self._output(m)
         self._age(m, ticks, updates)
+        self._place(m)
         self._index(m)
         self._watch(m)
         self._compare(m)
@@ -232,6 +240,25 @@ class Tachometer(wiring.Component):
             m.d.sync += before.eq(ticks)
             m.d.comb += [ticks.eq(before + self.tick), age.fresh.eq(before - updates.p.stamp)]
 
+    def _place(self, m: Module) -> None:
+        """Let inputs set the position and arm the index, and count modulo a number, if they are asked for."""
+        for name, box in self.controls.items():
+            m.submodules[f"{name}_rise"] = box
+            m.d.comb += [
+                getattr(self.conditioner, name).eq(getattr(self, name)),
+                box.level.eq(getattr(self.conditioner, f"level_{name}")),
+                box.ready.eq(getattr(self.conditioner, f"ready_{name}")),
+            ]
+        if "preset" in self.controls:
+            m.d.comb += self.position_counter.load.eq(self.controls["preset"].rises)
+        if self.modulo_counter is not None:
+            m.submodules.modulo_counter = counter = self.modulo_counter
+            m.d.comb += [
+                counter.step.eq(self.decoder.step),
+                counter.clear.eq(self.position_counter.clear),
+                self.position_modulo.eq(counter.count),
+            ]
+
     def _index(self, m: Module) -> None:
         """Capture the position at the index, if the encoder has one."""
         if self.index_capture is None:
@@ -246,6 +273,8 @@ class Tachometer(wiring.Component):
             self.index_position.eq(index.index_position),
             self.index_valid.eq(index.index_valid),
         ]
+        if self._spec.index_once:
+            m.d.comb += [index.arm.eq(self.controls["home"].rises), self.homed.eq(index.homed)]
 
     def _index_level(self, m: Module) -> tuple[Value, Value]:
         """Return Z as it is, in its state alone, or of a gap, and whether it is real, as is the level before."""
@@ -275,7 +304,9 @@ class Tachometer(wiring.Component):
         follow(m, watch, self.decoder, ("level_a", "level_b", "ready", "step", "decode_error"))
         follow(m, self, watch, ("health", "faults"))
         m.d.comb += self.fault.eq(watch.health.any())
-        if self.index_capture is not None:
+        if self.index_capture is not None and self._spec.index_watched:
+            if self._spec.preset is not None:
+                m.d.comb += watch.preset.eq(self.controls["preset"].rises)
             follow(m, watch, self.index_capture, ("index_valid", "index_position"))
             follow(m, self, watch, ("index_error",))
 

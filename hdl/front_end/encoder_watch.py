@@ -27,6 +27,8 @@ class EncoderWatch(wiring.Component):
         Counts from index to index, and bits of a position; 0: there is no index.
     index_reset : bool
         The index sets the position to 0.
+    presets : bool
+        Something else sets the position.
 
     Members
     -------
@@ -38,6 +40,8 @@ class EncoderWatch(wiring.Component):
     index_valid : In(1)
     index_position : In(signed(position_width))
         Only with an index.
+    preset : In(1)
+        The position is being set; a turn in which it is, is not checked. Only if there are presets.
     clear : In(1)
         All that is kept is 0 in the next clock.
     seen : Out(1)
@@ -59,11 +63,13 @@ class EncoderWatch(wiring.Component):
         counts_per_rev: int = 0,
         position_width: int = 0,
         index_reset: bool = False,
+        presets: bool = False,
     ) -> None:
         self._edges = edges
         self._errors = errors
         self._turn = counts_per_rev
         self._index_reset = index_reset
+        self._presets = presets
         self.window = SamplingClock(second)
         position = signed(max(position_width, 1))
         index = {"index_valid": In(1), "index_position": In(position), "index_error": Out(position)}
@@ -73,6 +79,7 @@ class EncoderWatch(wiring.Component):
                 "step": In(signed(2)),
                 **(index if position_width else {}),
                 "seen": Out(1),
+                **({"preset": In(1)} if presets else {}),
                 "health": Out(FAULT_WIDTH),
                 "faults": Out(FAULTS_WIDTH),
             }
@@ -139,12 +146,18 @@ class EncoderWatch(wiring.Component):
         origin = Signal.like(position)
         way = Signal.like(position)
         m.d.sync += checks.eq(self.index_valid)
+        since = known
+        if self._presets:
+            moved = Signal()  # in the clock of what is taken at the same time as `index_valid`
+            m.d.sync += moved.eq(self.preset)
+            since = known & ~moved
+            m.d.sync += known.eq(since)
         with m.If(self.step[0]):
             m.d.sync += backward.eq(self.step[1])
         with m.If(self.index_valid):
             m.d.sync += [
                 way.eq(position - (0 if self._index_reset else origin)),
-                same.eq(known & (backward == was_backward)),
+                same.eq(since & (backward == was_backward)),
                 was_backward.eq(backward),
                 known.eq(1),
             ]

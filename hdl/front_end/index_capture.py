@@ -19,6 +19,8 @@ class IndexCapture(wiring.Component):
         Bits of the position.
     latency : int
         That of the position, at least 2.
+    once : bool
+        An index is taken only if `arm` was high since the one before.
 
     Members
     -------
@@ -27,6 +29,10 @@ class IndexCapture(wiring.Component):
         The level before the present one is real.
     position : In(signed(width))
         The position of the next clock.
+    arm : In(1)
+        The next index is taken; as late as a rise. Only if once, as is `homed`.
+    homed : Out(1)
+        The index was taken, since `arm`.
     rises : Out(1)
         High a clock before `index_valid`.
     index_position : Out(signed(width))
@@ -35,13 +41,15 @@ class IndexCapture(wiring.Component):
         One clock per index.
     """
 
-    def __init__(self, width: int, latency: int = 2) -> None:
+    def __init__(self, width: int, latency: int = 2, *, once: bool = False) -> None:
         self._latency = latency
+        self._once = once
         super().__init__(
             {
                 "level_z": In(1),
                 "ready": In(1),
                 "position": In(signed(width)),
+                **({"arm": In(1), "homed": Out(1)} if once else {}),
                 "rises": Out(1),
                 "index_position": Out(signed(width)),
                 "index_valid": Out(1),
@@ -52,7 +60,19 @@ class IndexCapture(wiring.Component):
         m = Module()
         level, ready = delay(m, self.level_z, self.ready, clocks=self._latency - 2)
         past_z = Signal()
-        m.d.sync += [past_z.eq(level), self.rises.eq(level & ~past_z & ready), self.index_valid.eq(self.rises)]
+        seen = Signal() if self._once else self.rises
+        m.d.sync += [
+            past_z.eq(level),
+            seen.eq(level & ~past_z & ready),
+            self.index_valid.eq(self.rises),
+        ]
+        if self._once:
+            armed = Signal()
+            m.d.comb += self.rises.eq(seen & armed)
+            with m.If(self.arm):
+                m.d.sync += [armed.eq(1), self.homed.eq(0)]
+            with m.Elif(self.rises):
+                m.d.sync += [armed.eq(0), self.homed.eq(1)]
         with m.If(self.rises):
             m.d.sync += self.index_position.eq(self.position)
         return m

@@ -39,7 +39,6 @@ CHUNK = 4 << 20  # bytes, as sigrok cuts its own
 _MOST_LISTED = 16 << 20
 _MOST_METADATA = 1 << 20
 _MOST_SAMPLES = 1 << 36
-_CHANNELS = {"a": "A", "b": "B", "z": "Z", "tick_in": "TICK_IN"}
 UNIT_HZ = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9}
 # What zipfile raises for a damaged file: besides its own error, those of the layers below, by what is damaged.
 ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, NotImplementedError, RuntimeError, ValueError)
@@ -117,7 +116,7 @@ def write_sr(path: str | os.PathLike[str], trace: Trace, clock_hz: int, *, _chun
     if isinstance(trace, AxesTrace):
         level, channels = trace.levels, [_channel(axis, name) for axis, name in trace.names]
     else:
-        level, channels = trace.level.reshape(-1, 1), [_CHANNELS[name] for name in trace.lines]
+        level, channels = trace.level.reshape(-1, 1), [name.upper() for name in trace.lines]
     with writing(Path(path)) as beside, zipfile.ZipFile(beside, "w") as archive:
         archive.writestr(_member("version"), "2")
         archive.writestr(_member("metadata"), _metadata(clock_hz, channels))
@@ -353,4 +352,4 @@ def _halves(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.flo
 
 def _channel(axis: int, name: str) -> str:
     """Return the channel of a line of one of many axes; all have the external tick together."""
-    return _CHANNELS[name] if name == "tick_in" else f"{_CHANNELS[name]}{axis}"
+    return name.upper() if name == "tick_in" else f"{name.upper()}{axis}"

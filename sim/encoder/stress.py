@@ -59,6 +59,11 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     n_clocks = int(clock[-1]) + spec.facts.rest_tenths * longest // 10 + 40 * cycles + 300
     a, b, c = (level >> np.uint8(line) & np.uint8(1) for line in range(3))
     trace = PinTrace(clock, a, b, n_clocks, z, c=c if "c" in sensor.lines else None)
+    for name in spec.controls:
+        few = 30 if name == "preset" else 6
+        high = spec.filter_clocks + int(rng.integers(1, 30))
+        apart = rng.integers(high + spec.filter_clocks + 1, n_clocks // few + high + spec.filter_clocks + 2, few)
+        trace = trace.with_pulses(name, np.cumsum(apart), high)
     if not spec.external_tick:
         return trace
     apart = np.full(trace.n_clocks // cycles + 1, cycles)

@@ -7,7 +7,7 @@ import numpy as np
 
 from tachometry.sim.golden import compare, health
 from tachometry.sim.golden.axes import run_axes
-from tachometry.sim.golden.front_end import count, decoded
+from tachometry.sim.golden.front_end import Steps, count, decoded
 from tachometry.sim.golden.low_pass import filtered
 from tachometry.sim.golden.methods import MODELS
 from tachometry.sim.golden.output import in_unit, trips, with_age, with_trip
@@ -36,9 +36,11 @@ def _(spec: AxesSpec, trace: AxesTrace) -> Run:
     return run_axes(spec, trace, tables)
 
 
-def tables(spec: TachometerSpec, trace: PinTrace) -> dict[str, Table]:
-    """Return the same by strobes, and with each update the clock of its cause, as the column `cause`."""
-    steps = decoded(spec, trace)
+def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) -> dict[str, Table]:
+    """Return the same by strobes, and with each update the clock of its cause, as the column `cause`; of other steps
+    than those of the trace if they are given.
+    """
+    steps = decoded(spec, trace) if steps is None else steps
     golden = model(spec)
     if spec.facts.own_ticks:
         last, beyond, nominal = golden.windows(steps, trace.n_clocks - spec.latency.tick)

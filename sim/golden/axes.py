@@ -65,7 +65,7 @@ def seen(spec: AxesSpec, pins: PinTrace, axis: int) -> PinTrace:
         lines = {name: line[np.searchsorted(at, merged_clock, side="right") - 1] for name, line in lines.items()}
         lines["tick_in"] = level[np.searchsorted(clock, merged_clock, side="right") - 1]
         at = merged_clock
-    return PinTrace(at, n_clocks=n_clocks, **lines)
+    return PinTrace.of_lines(at, n_clocks, lines)
 
 
 def _ticks(spec: AxesSpec, pins: PinTrace) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:

@@ -122,6 +122,10 @@ def changes(trace: PinTrace, name: str) -> tuple[NDArray[np.int64], NDArray[np.u
     return trace.clock[changed], level[changed]
 
 
+def _none() -> NDArray[np.int64]:
+    return np.empty(0, dtype=np.int64)
+
+
 @dataclass(frozen=True)
 class Steps:
     """Holds the steps that the decoder sees, on the core's clock.
@@ -135,7 +139,7 @@ class Steps:
     errors : int64 array
         Clocks in which `decode_error` is high.
     index : int64 array
-        Clocks in which Z rises, or of the first teeth after a gap; none without an index.
+        Clocks in which the index is taken, or of the first teeth after a gap; none without an index.
     swallowed : int64 array
         Clocks in which the glitch filter has counted a glitch.
     changed : uint8 array, shape (n,)
@@ -144,6 +148,12 @@ class Steps:
         Clocks in which Z meets its state a second time.
     wheel : Teeth or None
         Of a wheel with missing teeth, the teeth.
+    z : int64 array
+        Clocks in which Z rises, or would be taken in its state.
+    presets, values : int64 arrays
+        Clocks in which the position is set, before the step in them, and to what.
+    arms : int64 array
+        Clocks in which the next index is let through.
     """
 
     clock: NDArray[np.int64]
@@ -152,8 +162,22 @@ class Steps:
     index: NDArray[np.int64]
     swallowed: NDArray[np.int64]
     changed: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, dtype=np.uint8))
-    wide: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    wide: NDArray[np.int64] = field(default_factory=_none)
+    z: NDArray[np.int64] = field(default_factory=_none)
+    presets: NDArray[np.int64] = field(default_factory=_none)
+    values: NDArray[np.int64] = field(default_factory=_none)
+    arms: NDArray[np.int64] = field(default_factory=_none)
     wheel: Teeth | None = None
+
+    def asked(
+        self, spec: TachometerSpec, presets: NDArray[np.int64], values: NDArray[np.int64], arms: NDArray[np.int64]
+    ) -> "Steps":
+        """Return the same steps with presets, and with the indices that are taken."""
+        index = self.z
+        if spec.index_once:
+            after = np.unique(np.searchsorted(index, arms, side="right"))
+            index = index[after[after < len(index)]]
+        return replace(self, index=index, presets=presets, values=values, arms=arms)
 
 
 def together(
@@ -194,8 +218,13 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
             z, again = in_state(spec, levels_z)
             wide = at_z[again] + spec.latency.pin_to_count
         rises = at_z[1:][z[1:] > z[:-1]] + spec.latency.pin_to_count
+    asked = {"preset": rises[:0], "home": rises[:0]}
+    for name in spec.controls:
+        at_pin, level = conditioned(name)
+        asked[name] = at_pin[1:][level[1:] > level[:-1]] + spec.latency.pin_to_count
     # Two clocks for the synchroniser, one for the counter of glitches.
-    return Steps(at[1:], step[1:], at[wrong], rises, np.sort(np.concatenate(returned)) + 3, changed, wide)
+    found = Steps(at[1:], step[1:], at[wrong], rises, np.sort(np.concatenate(returned)) + 3, changed, wide, rises)
+    return found.asked(spec, asked["preset"], np.full(len(asked["preset"]), spec.preset or 0), asked["home"])
 
 
 def _without_gaps(spec: TachometerSpec, steps: Steps, trace: PinTrace) -> Steps:
@@ -257,16 +286,54 @@ def wrapped(spec: TachometerSpec, position: NDArray[np.int64]) -> NDArray[np.int
     return ((position + half) & (2 * half - 1)) - half
 
 
-def _origins(spec: TachometerSpec, steps: Steps) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return sums of all steps at each index, and what is taken off the position: before any index, and after each."""
-    captured = np.append(0, np.cumsum(steps.step))[np.searchsorted(steps.clock, steps.index, side="right")]
-    return captured, np.append(0, captured) if spec.index_reset else np.zeros(len(captured) + 1, dtype=np.int64)
+@dataclass(frozen=True)
+class _Origins:
+    """Says what is taken off the sum of all steps: at each index, and from what clock on.
+
+    Parameters
+    ----------
+    captured, at_index : int64 arrays
+        The sum at each index, and what is taken off it there.
+    clock : int64 array, shape (n,)
+    off : int64 array, shape (n + 1,)
+        What is taken off before any of these clocks, and after each.
+    """
+
+    captured: NDArray[np.int64]
+    at_index: NDArray[np.int64]
+    clock: NDArray[np.int64]
+    off: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, spec: TachometerSpec, steps: Steps) -> "_Origins":
+        """Find them; of a preset and an index in one clock the preset is first."""
+        sums = np.append(0, np.cumsum(steps.step))
+        captured = sums[np.searchsorted(steps.clock, steps.index, side="right")]
+        preset = sums[np.searchsorted(steps.clock, steps.presets, side="left")] - steps.values
+        resets = len(steps.index) * spec.index_reset
+        clock = np.concatenate([steps.presets, steps.index[:resets]])
+        order = np.argsort(clock, kind="stable")
+        clock = clock[order]
+        off = np.append(0, np.concatenate([preset, captured[:resets]])[order])
+        before = np.searchsorted(clock, steps.index, side="left") + np.isin(steps.index, steps.presets)
+        return cls(captured, off[before], clock, off)
+
+    def after(self, clock: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return what is taken off the sum of the steps up to each of these clocks."""
+        found: NDArray[np.int64] = self.off[np.searchsorted(self.clock, clock, side="right")]
+        return found
 
 
 def positions(spec: TachometerSpec, steps: Steps) -> NDArray[np.int64]:
     """Return the position after each step."""
-    origin = _origins(spec, steps)[1][np.searchsorted(steps.index, steps.clock, side="right")]
-    return wrapped(spec, np.cumsum(steps.step) - origin)
+    return wrapped(spec, np.cumsum(steps.step) - _Origins.of(spec, steps).after(steps.clock))
+
+
+def homed(spec: TachometerSpec, steps: Steps, clock: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Tell in which clocks `homed` is high: the index was taken since it was let through."""
+    known = np.searchsorted(steps.index + spec.latency.tick, clock, side="right")
+    armed = np.searchsorted(steps.arms + spec.latency.tick, clock, side="right")
+    return np.append(-1, steps.index)[known] > np.append(-1, steps.arms)[armed]
 
 
 def count(
@@ -294,17 +361,21 @@ def count(
         left = first_beyond(steps, last, spec.widths.max_pulse_count)
         sums = np.where(left != 0, left * spec.widths.max_pulse_count, sums)
         overflow = (left != 0) | beyond
-    captured, origin = _origins(spec, steps)
-    shown = reached - origin[np.searchsorted(steps.index, last, side="right")] if spec.index_reset else reached
+    origins = _Origins.of(spec, steps)
+    shaft = reached
+    if spec.index_reset:
+        shaft = reached - np.append(0, origins.captured)[np.searchsorted(steps.index, last, side="right")]
     strobe = last + spec.latency.tick
     glitches = places(steps.swallowed, strobe, "right")
     columns = {
         "pulse_count": np.clip(sums, -spec.widths.max_pulse_count, spec.widths.max_pulse_count),
-        "position": wrapped(spec, shown),
+        "position": wrapped(spec, reached - origins.after(last)),
+        "position_modulo": shaft % (spec.modulus or 1),
+        "homed": homed(spec, steps, strobe),
         "overflow": overflow,
         "swallowed_edges": 2 * np.minimum(glitches, (1 << 15) - 1),
     }
     if steps.wheel is not None:
         columns["synced"] = steps.wheel.synced(strobe - 1)
-    index = {"index_position": wrapped(spec, captured - origin[:-1])}
+    index = {"index_position": wrapped(spec, origins.captured - origins.at_index)}
     return Table(strobe, columns), Table(steps.index + spec.latency.tick, index)

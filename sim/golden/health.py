@@ -39,7 +39,8 @@ def _index(spec: TachometerSpec, steps: Steps, index: Table) -> tuple[Ints, Ints
     size = 1 << spec.position_width
     turn = np.where(back[1:], -spec.encoder.counts_per_rev, spec.encoder.counts_per_rev)
     off = (way - turn + size // 2) % size - size // 2
-    wrong = (back[1:] == back[:-1]) & (way % size != 0) & (off != 0)
+    presets = places(steps.presets, steps.index, "right")  # a turn with one of them is not checked
+    wrong = (presets[1:] == presets[:-1]) & (back[1:] == back[:-1]) & (way % size != 0) & (off != 0)
     return index.clock[1:][wrong] + 1, off[wrong]
 
 
@@ -49,7 +50,7 @@ def faults(spec: TachometerSpec, steps: Steps, index: Table) -> Table:
         return Table(np.empty(0, dtype=np.int64), {})
     standing, codes = _standing(spec, steps)
     illegal = _illegal(spec, steps.errors)
-    wrong, off = _index(spec, steps, index) if spec.index else (standing[:0], standing[:0])
+    wrong, off = _index(spec, steps, index) if spec.index_watched else (standing[:0], standing[:0])
     clock = np.concatenate([standing, illegal, wrong])
     code = np.concatenate(
         [codes, np.full(len(illegal), int(Fault.ILLEGAL)), np.full(len(wrong), int(Fault.INDEX_COUNTS))]

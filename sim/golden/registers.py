@@ -7,10 +7,11 @@ import numpy as np
 
 from tachometry.sim import golden
 from tachometry.sim.golden import compare, health
-from tachometry.sim.golden.front_end import decoded
+from tachometry.sim.golden.front_end import decoded, homed
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec.language.port import COMPARE, INDEX, TICK, UPDATE, WIDE
-from tachometry.spec.registers.map import COUNTER_WIDTH, WORD, Field, Register, RegisterMap
+from tachometry.spec.registers.field import WORD, Field, Register
+from tachometry.spec.registers.map import COUNTER_WIDTH, RegisterMap
 
 
 @dataclass(frozen=True)
@@ -68,9 +69,10 @@ class GoldenBank:
         self._of_updates = {
             port.name for port in registers.ports if port.held_by == UPDATE and port.unit and port.name != "velocity"
         }
-        self._tables = golden.tables(registers.spec, trace)
+        self._trace = trace
+        self._pins = self._steps = decoded(registers.spec, trace)
+        self._tables = golden.tables(registers.spec, trace, self._steps)
         self._strobes: tuple[str, ...] = (TICK, UPDATE, INDEX) + (COMPARE,) * (registers.spec.compare is not None)
-        self._swallowed = decoded(registers.spec, trace).swallowed
         self._happened = {"updated": self._tables[UPDATE].clock, "indexed": self._tables[INDEX].clock}
         self._happened[WIDE] = self._tables[WIDE].clock
         self._follow(self._tables[TICK].overflow)
@@ -101,6 +103,7 @@ class GoldenBank:
         self._changed = 0
         self._irq = {event: [0] for event in self._map.interrupts}  # since which clocks events count
         left = sorted(captures)
+        self._ask(accesses)
         found: list[tuple[int | None, bool]] = []
         for access in accesses:
             while left and left[0] <= access.clock:
@@ -117,6 +120,49 @@ class GoldenBank:
             if access.address == capturing and not hold:
                 self._capture(access.clock)
             found.append((0 if register is None else self._read(access, hold), register is None))
+        return found
+
+    def _ask(self, accesses: Sequence[Access]) -> None:
+        """Find what the core shows if a program sets the position, lets the index through, and writes offsets."""
+        spec = self._map.spec
+        if not spec.controls and spec.modulus is None:
+            return
+        written_at = self._written(accesses)
+        ahead = spec.latency.tick - 1
+        clocks = {
+            name: np.union1d(pins, np.array([at for at, _ in written_at[f"{name}_now"]], dtype=np.int64) - ahead)
+            for name, pins in (("preset", self._pins.presets), ("home", self._pins.arms))
+        }
+        values = self._held("preset_value", spec.preset or 0, clocks["preset"] + ahead)
+        self._steps = self._pins.asked(spec, clocks["preset"], values, clocks["home"])
+        self._tables = golden.tables(spec, self._trace, self._steps)
+        if spec.modulus is not None:
+            ticks = self._tables[TICK]
+            moved = (ticks.position_modulo + self._held("modulo_offset", 0, ticks.clock)) % spec.modulus
+            self._tables[TICK] = ticks.having(position_modulo=moved)
+        self._happened["indexed"] = self._tables[INDEX].clock
+
+    def _written(self, accesses: Sequence[Access]) -> dict[str, list[tuple[int, int]]]:
+        """Return the clocks of writes of what moves the position, by ports, and what the ports were then."""
+        found: dict[str, list[tuple[int, int]]] = {
+            name: [] for name in ("preset_now", "home_now", "preset_value", "modulo_offset")
+        }
+        self._writes = found
+        settings = initial(self._map)
+        for access in accesses:
+            if access.data is None or access.address >= len(self._map.registers):
+                continue
+            for field in self._map.registers[access.address].fields:
+                if field.port not in found or (field.single and not access.data >> field.low & 1):
+                    continue
+                settings[field.port] = written(field, access.data, settings[field.port])
+                found[field.port].append((access.clock, settings[field.port]))
+        return found
+
+    def _held(self, port: str, first: int, clock: np.ndarray) -> np.ndarray:
+        """Return what a setting was in these clocks: a write is seen in the next one."""
+        at, values = zip(*((-1, first), *self._writes[port]), strict=True)
+        found: np.ndarray = np.array(values, dtype=np.int64)[np.searchsorted(at, clock, side="left") - 1]
         return found
 
     def interrupts(self) -> dict[str, np.ndarray]:
@@ -182,12 +228,13 @@ class GoldenBank:
         caused = updates.cause[updates.clock <= clock]
         age = self._count(ticks, int(caused[-1]) if len(caused) else -1, clock)
         # The core is cleared in the clock after.
-        glitches = self._count(self._swallowed, self._cleared + 1, clock)
+        glitches = self._count(self._pins.swallowed, self._cleared + 1, clock)
         return {
             "time": clock % (1 << WORD),
             "age": min(age, self._map.spec.timing.max_ticks),
             "swallowed_edges": 2 * min(glitches, (1 << 15) - 1),
             "over_speed": int(self._count(self._tables["over_speed"].clock, self._cleared + 1, clock) > 0),
+            "homed": int(homed(self._map.spec, self._steps, np.array([clock]))[0]),
             **(self._pulses(clock) if self._map.spec.compare is not None else {}),
             **(self._faults(clock) if self._map.spec.health else {}),
         }

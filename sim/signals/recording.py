@@ -6,8 +6,9 @@ and every golden model takes. Both grow with the number of edges, never with the
 the external tick may be absent from both; where they are there, a row may change them alone.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,9 +35,9 @@ def quadrature(quarter: NDArray[np.int64]) -> NDArray[np.uint8]:
 
 def packed(lines: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
     """Return a number for each row, with a bit for each line, the first lowest."""
-    level = np.zeros_like(lines[0])
+    level = np.zeros(len(lines[0]), dtype=np.min_scalar_type((1 << len(lines)) - 1))
     for bit, line in enumerate(lines):
-        level |= line << np.uint8(bit)
+        level |= line.astype(level.dtype) << level.dtype.type(bit)
     return level
 
 
@@ -57,7 +58,7 @@ class _Lines:
     def lines(self) -> dict[str, NDArray[np.uint8]]:
         """The lines that are there, by name."""
         every = {name: getattr(self, name) for name in LINES}
-        return {name: line for name, line in every.items() if line is not None}
+        return {name: line for name, line in every.items() if line is not None} | getattr(self, "more", {})
 
     @property
     def level(self) -> NDArray[np.uint8]:
@@ -136,7 +137,7 @@ class Recording(_Lines):
         level = self.level[row]
         changed = np.append(True, level[1:] != level[:-1])
         lines = _split(level[changed], list(self.lines))
-        return PinTrace(clock[row[changed]], n_clocks=max(n_clocks, 1), **lines)
+        return PinTrace.of_lines(clock[row[changed]], max(n_clocks, 1), lines)
 
     def _clock(self, clock_hz: int) -> NDArray[np.int64]:
         """Return the clock edge at which each row is seen."""
@@ -180,6 +181,8 @@ class PinTrace(_Lines):
         Index line and external tick; None if it is absent.
     c : uint8 array, shape (n,), 0 or 1, or None
         A third line.
+    more : mapping of str to uint8 array, shape (n,), 0 or 1
+        Further inputs by name, such as `preset`.
     """
 
     clock: NDArray[np.int64]
@@ -189,6 +192,7 @@ class PinTrace(_Lines):
     z: NDArray[np.uint8] | None = None
     tick_in: NDArray[np.uint8] | None = None
     c: NDArray[np.uint8] | None = None
+    more: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not (len(self.clock) and _same_length(self.clock, *self.lines.values())):
@@ -207,31 +211,47 @@ class PinTrace(_Lines):
             If there are too many clocks to be told apart, or more than `MAX_TICKS` ticks.
         """
         check_ticks(recording.duration, spec)
-        return recording.place(spec.timing.clock_hz).with_nominal_ticks(spec)
+        return recording.place(spec.timing.clock_hz).completed(spec)
+
+    @classmethod
+    def of_lines(cls, clock: NDArray[np.int64], n_clocks: int, lines: Mapping[str, NDArray[np.uint8]]) -> "PinTrace":
+        """Return the trace with these lines, whatever their names."""
+        known: dict[str, Any] = {name: line for name, line in lines.items() if name in LINES}
+        return cls(clock, n_clocks=n_clocks, **known, more={name: lines[name] for name in lines if name not in LINES})
 
     def until(self, n_clocks: int) -> "PinTrace":
         """Return the first clocks of the trace."""
         inside = self.clock < n_clocks
-        lines = {name: line[inside] for name, line in self.lines.items()}
-        return PinTrace(self.clock[inside], n_clocks=n_clocks, **lines)
+        return PinTrace.of_lines(
+            self.clock[inside], n_clocks, {name: line[inside] for name, line in self.lines.items()}
+        )
 
-    def with_tick_in(self, rises: NDArray[np.int64]) -> "PinTrace":
-        """Return the same trace with an external tick that is high for one clock from each of the clocks `rises`.
+    def with_pulses(self, name: str, rises: NDArray[np.int64], width: int = 1) -> "PinTrace":
+        """Return the same trace with a line that is high for `width` clocks from each of the clocks `rises`.
 
-        They increase by at least 2; those from `n_clocks` on are left out.
+        They increase by more than `width`; those from `n_clocks` on are left out.
         """
         rises = rises[rises < self.n_clocks]
-        clock = merged(self.clock, rises, rises + 1)
+        clock = merged(self.clock, rises, rises + width)
+        clock = clock[clock < self.n_clocks]
         held = np.searchsorted(self.clock, clock, side="right") - 1
         lines = {name: line[held] for name, line in self.lines.items()}
-        lines["tick_in"] = np.isin(clock, rises).astype(np.uint8)
-        return PinTrace(clock, n_clocks=self.n_clocks, **lines)
+        ends = np.searchsorted(rises + width, clock, side="right")
+        lines[name] = (np.searchsorted(rises, clock, side="right") > ends).astype(np.uint8)
+        return PinTrace.of_lines(clock, self.n_clocks, lines)
 
-    def with_nominal_ticks(self, spec: TachometerSpec) -> "PinTrace":
-        """Return the same trace, with nominal external ticks if the core takes them and there are none."""
-        if not spec.external_tick or self.tick_in is not None:
-            return self
-        return self.with_tick_in(nominal_ticks(spec, self.n_clocks))
+    def with_tick_in(self, rises: NDArray[np.int64]) -> "PinTrace":
+        """Return the same trace with an external tick that is high for one clock from each of the clocks `rises`."""
+        return self.with_pulses("tick_in", rises)
+
+    def completed(self, spec: TachometerSpec) -> "PinTrace":
+        """Return the same trace with all inputs of a core: with nominal external ticks if it takes them, and all else
+        that is missing low.
+        """
+        if spec.external_tick and self.tick_in is None:
+            return self.with_tick_in(nominal_ticks(spec, self.n_clocks)).completed(spec)
+        low = {name: np.zeros_like(self.a) for name in spec.controls if name not in self.lines}
+        return PinTrace.of_lines(self.clock, self.n_clocks, self.lines | low) if low else self
 
 
 def check_ticks(duration: float, spec: TachometerSpec, most: int = MAX_TICKS, of: str = "") -> None:

@@ -23,6 +23,7 @@ from tachometry.spec.language.units import format_time
 from tachometry.spec.methods.axis import WARM_UP
 
 Window = Callable[[CoreSpec, int], tuple[int, int]]
+Pulses = Callable[[TachometerSpec], dict[str, Ints]]
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,8 @@ class Axis:
     @property
     def index_distances(self) -> Ints:
         """Counts from each index to the next; the position may have wrapped, or each index resets it."""
+        if self.spec.index_once or self.spec.preset is not None:
+            return self.run.index.clock[:0]  # they tell of no turn
         position, half = self.run.index.index_position, 1 << (self.spec.position_width - 1)
         distance = position[1:] if self.spec.index_reset else np.diff(position)
         return (distance + half) % (2 * half) - half
@@ -98,6 +101,7 @@ def simulate(
     window: Window,
     vcd: Path | None,
     bar: Bar,
+    pulses: Pulses | None = None,
 ) -> Simulation:
     """Run hardware and golden model on a recording for each axis.
 
@@ -109,6 +113,8 @@ def simulate(
         What the shaft of each axis truly did.
     window : callable
         Gives the clocks that the waveform `vcd` shows.
+    pulses : callable or None
+        Gives clocks in which other inputs than those of the encoder rise, by their names.
 
     Raises
     ------
@@ -116,6 +122,9 @@ def simulate(
         If the recordings do not last a tick, or have too many.
     """
     trace = _placed(spec, recordings)
+    if pulses is not None and isinstance(trace, PinTrace):
+        for name, rises in pulses(spec.tachometer).items():
+            trace = trace.with_pulses(name, rises, spec.tachometer.filter_clocks + 1)
     fewest = spec.times.longest_tick + spec.latency.tick  # after which there is something to report
     if trace.n_clocks < fewest:
         raise ValueError(
@@ -168,8 +177,8 @@ def _axis(core: CoreSpec, run: Run, number: int, recording: Recording, truth: En
         sampled = _sampled(max(clock, 0), spec.timing.clock_hz)
         counts_in = int(truth.true_position(sampled, spec.encoder.decoding))
         error = velocity_error(held, truth.true_speed)
-    # An index that resets the position does not undo what has been counted.
-    counts_out = int(run.ticks.pulse_count.sum() if spec.index_reset else run.ticks.position[-1])
+    # What sets the position does not undo what has been counted.
+    counts_out = int(run.ticks.pulse_count.sum() if spec.moves_position else run.ticks.position[-1])
     n_merged = recording.n_merged(spec.timing.clock_hz, run.n_clocks)
     return Axis(spec, run, recording, truth, n_merged, counts_in, counts_out, held, error)
 

@@ -189,12 +189,13 @@ def _again(spec: AnySpec, name: str, vectors: Path) -> dict[str, str]:
         if there["inputs"] != digest_of(there):
             return cocotb_bench(spec, name)
         clock, *levels = np.array(there["changes"], dtype=np.int64).T
-        lines = {pin: row for pin, row in zip(there["pins"], levels, strict=True) if pin in LINES}
+        lines = {pin: row for pin, row in zip(there["pins"], levels, strict=True)}
+        lines = {pin: lines[pin] for pin in lines if pin in LINES or pin in spec.tachometer.controls}
         traces = []
         for axis in range(spec.axes or 1):
             of_axis = {pin: (row >> axis * (pin != "tick_in") & 1).astype(np.uint8) for pin, row in lines.items()}
             of_axis.setdefault("b", np.zeros(len(clock), dtype=np.uint8))  # of a sensor of one line
-            traces.append(PinTrace(clock, n_clocks=int(there["clocks"]), **of_axis))
+            traces.append(PinTrace.of_lines(clock, int(there["clocks"]), of_axis))
         return bench_of(spec, name, traces)
     except (ValueError, KeyError, TypeError, IndexError, OverflowError, MemoryError):
         return cocotb_bench(spec, name)  # it is none that was made for this core

@@ -57,6 +57,9 @@ def cocotb_bench(core: AnySpec, name: str, recordings: Sequence[Recording] | Non
         trace = recording.place(spec.timing.clock_hz)
         if spec.external_tick:
             trace = trace.with_tick_in(_external_ticks(spec, trace.n_clocks))
+        for number, control in enumerate(spec.controls):
+            rises = np.arange(1, 8) * trace.n_clocks // (9 + number)
+            trace = trace.with_pulses(control, rises, spec.filter_clocks + 1)
         traces.append(trace)
     return bench_of(core, name, traces)
 

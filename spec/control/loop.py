@@ -13,8 +13,8 @@ from tachometry.spec.control.generator import GeneratorForm, generator_clocks, g
 from tachometry.spec.control.law import Law
 from tachometry.spec.control.ports import loop_entries, loop_ports
 from tachometry.spec.control.units import Units
+from tachometry.spec.core.described import written
 from tachometry.spec.core.scale import Scale
-from tachometry.spec.core.tachometer import written
 from tachometry.spec.language.option import ParameterError, option, options_of
 from tachometry.spec.language.port import Port, Ports
 from tachometry.spec.language.units import PI, plural, rounded
@@ -73,6 +73,9 @@ class LoopSpec(Law):
         if not encoder.plain:
             named = "reverse" if encoder.reverse else "invert" if encoder.invert else "sensor"
             raise ParameterError(named, "must not be given together with --loop, which takes A and B as they come")
+        for name in ("preset", "index_once"):
+            if getattr(self.tachometer, name) not in (None, False):
+                raise ParameterError(name, "must not be given together with --loop, whose position would jump")
         if not 8 <= self.current_width <= 24:
             raise ParameterError("current_width", f"must be from 8 to 24, not {self.current_width}")
         if self.multiplier not in MULTIPLIERS:

@@ -15,6 +15,7 @@ from tachometry.spec.language.units import PI, SpeedUnit, format_time, rounded, 
 if TYPE_CHECKING:
     from tachometry.spec.core.tachometer import TachometerSpec
 
+MAX_MODULUS = 1 << 24
 _LONGEST_FILTER = Fraction(10, 1000)  # s; contacts bounce for 2 ms or so
 
 
@@ -39,6 +40,7 @@ def check(spec: TachometerSpec) -> None:
     if spec.encoder.missing and spec.bounds:
         raise ParameterError("bounds", "must not be given with --missing-teeth: teeth that are not there have no edges")
     _check_index_state(spec)
+    _check_place(spec)
     _check_health(spec)
     if spec.compare is not None:
         spec.compare.check(spec.timing.clock_hz, spec.position_width)
@@ -71,6 +73,26 @@ def _check_index_state(spec: TachometerSpec) -> None:
             for levels in sorted(kind.cycle)
         )
         raise ParameterError("index_at", f"must be edge, {states} for {kind.name}, not {spec.index_at}")
+
+
+def _check_place(spec: TachometerSpec) -> None:
+    if spec.index_once and not spec.index:
+        raise ParameterError("index_once", "must be given together with an index")
+    if spec.wheel is not None and spec.controls:
+        name = {"preset": "preset", "home": "index_once"}[spec.controls[0]]
+        raise ParameterError(name, "must not be given together with --missing-teeth, whose gap is the index")
+    half = 1 << spec.position_width - 1
+    if spec.preset is not None and not -half <= spec.preset < half:
+        raise ParameterError("preset", f"must be from {-half} to {half - 1}, a position, not {spec.preset}")
+    if (counts := spec.modulus) is None:
+        return
+    turn, parts = spec.encoder.counts_per_rev, (spec.position_modulo or "").partition("/")[2]
+    if parts and turn % int(parts):
+        raise ParameterError(
+            "position_modulo", f"must be of whole counts: a revolution of {turn} has no {parts} equal parts of these"
+        )
+    if not 2 <= counts <= MAX_MODULUS:
+        raise ParameterError("position_modulo", f"must be from 2 to {MAX_MODULUS} counts, not {counts}")
 
 
 def _check_health(spec: TachometerSpec) -> None:

@@ -28,6 +28,14 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
             spec.external_tick,
             pin("tick_in", "External tick, asynchronous; its rising edge ends a sampling period."),
         ),
+        *_if(
+            spec.preset is not None,
+            pin(
+                "preset",
+                f"Preset, asynchronous; its rising edge sets the position to {spec.preset}, or to register PRESET.",
+            ),
+        ),
+        *_if(spec.index_once, pin("home", "Homing, asynchronous; its rising edge lets the next index be taken.")),
         held(
             *(UPDATE, "velocity", spec.widths.velocity),
             signed=True,
@@ -115,6 +123,19 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
             ),
         ),
         *_if(
+            spec.index_once,
+            held(TICK, "homed", help="The index was taken, since home rose. It does not wait for a tick."),
+        ),
+        *_if(
+            spec.modulus,
+            held(
+                *(TICK, "position_modulo", ((spec.modulus or 2) - 1).bit_length()),
+                unit="counts",
+                help=f"Counts up to this period modulo {spec.modulus}, from 0 on, since reset or since an index that "
+                "resets. Between the ticks it counts on, and a preset leaves it as it is.",
+            ),
+        ),
+        *_if(
             spec.external_tick,
             strobe(
                 "tick_error",
@@ -164,7 +185,7 @@ def _health_ports(spec: TachometerSpec) -> Iterable[Port]:
     yield held(TICK, "health", FAULT_WIDTH, help=f"The first fault of the encoder since it was cleared; {codes}. {now}")
     yield held(TICK, "faults", FAULTS_WIDTH, help="Faults of the encoder since they were cleared; it stays at 255.")
     yield held(TICK, "fault", help="There has been a fault of the encoder: health is not 0.")
-    if spec.index:
+    if spec.index_watched:
         text = "Counts by which the latest wrong turn from index to index went too far forward: lost, or extra."
         yield held(TICK, "index_error", spec.position_width, signed=True, unit="counts", help=text)
 

@@ -131,6 +131,15 @@ def parse_state(what: str, text: str) -> str:
     return ",".join(sorted(f"{word[0]}={word[-1]}" for word in words))
 
 
+def parse_modulo(what: str, text: str) -> str:
+    """Return counts in which a position is told, a number, or parts of a revolution, `rev` or `rev/4`."""
+    word = text.replace(" ", "").lower()
+    if not re.fullmatch(r"0*[1-9]\d{0,8}|rev(/0*[1-9]\d{0,8})?", word, re.ASCII):
+        raise ParameterError(what, f"must be a number of counts, rev, or rev/P for P pole pairs, not {text!r}")
+    of, slash, parts = word.partition("/")
+    return of + slash + str(int(parts)) if slash else of if of == "rev" else str(int(of))
+
+
 @cache
 def changes(name: str, decoding: int) -> dict[tuple[Levels, Levels], tuple[int, bool]]:
     """Return what each change of legal levels counts, and whether it is wrong, see `Sensor.change`."""

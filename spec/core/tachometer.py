@@ -10,24 +10,23 @@ from typing import Any, ClassVar
 from tachometry.spec.core.bound import Bound
 from tachometry.spec.core.checks import check
 from tachometry.spec.core.compare import Compare
+from tachometry.spec.core.described import entries_of, options_as_asked, parameters_of
 from tachometry.spec.core.encoder import Encoder
 from tachometry.spec.core.facts import Facts
 from tachometry.spec.core.latency import Latency
 from tachometry.spec.core.ports import bound_ports, ports_of
 from tachometry.spec.core.recovery import Recovery
 from tachometry.spec.core.scale import Scale
-from tachometry.spec.core.sensors import EDGE, Levels, parse_state
+from tachometry.spec.core.sensors import EDGE, Levels, parse_modulo, parse_state
 from tachometry.spec.core.times import Times
 from tachometry.spec.core.timing import Timing, parse_clocks, parse_filter
 from tachometry.spec.core.tooth_wheel import ToothWheel
 from tachometry.spec.core.widths import Widths
 from tachometry.spec.core.words import Words
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS, parse_lsb
-from tachometry.spec.language.option import Option, option, options_of, parse_whole
+from tachometry.spec.language.option import Option, option, parse_whole
 from tachometry.spec.language.port import Port, Ports
-from tachometry.spec.language.units import FRACTION, Quantity, Speed, parse_bandwidth, parse_speed, written_time
-
-CHOSEN = "method-chosen"  # what `options` call why a method was taken
+from tachometry.spec.language.units import FRACTION, Quantity, Speed, parse_bandwidth, parse_speed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,6 +61,13 @@ class TachometerSpec:
         The index also sets the position to 0.
     index_at : str
         Where the index is taken: `edge`, where Z rises, or a state of the lines, `A=1,B=1`, while Z is high.
+    index_once : bool
+        The index is taken once, after the input `home` has risen; output `homed` tells that it was.
+    preset : int or None
+        Position that a rise of the input `preset` sets; with registers, that which their register begins with.
+    position_modulo : str or None
+        Output `position_modulo`, the position within so many counts: a number, `rev` for those of a revolution, or
+        `rev/4` for a quarter of them.
     external_tick : bool
         Ticks come from outside; the tick of `timing` is their nominal period.
     max_tick_cycles : int or None
@@ -162,6 +168,31 @@ class TachometerSpec:
         parse=parse_state,
         needs="index",
         tests=("A=1,B=1", "A=0,B=1"),
+        tacit=True,
+    )
+    index_once: bool = option(
+        False,
+        "The index is taken once (with --index): the first one after input home rises, or CONTROL.home is written. "
+        "Output homed tells that it was.",
+        needs="index",
+        tacit=True,
+    )
+    preset: int | None = option(
+        None,
+        "Input preset sets the position to N when it rises; no count is lost, and the velocity does not change. "
+        "With --bus, N is what register PRESET begins with, and CONTROL.preset sets the position as well.",
+        metavar="N",
+        parse=parse_whole,
+        tests=("", "-7"),
+        tacit=True,
+    )
+    position_modulo: str | None = option(
+        None,
+        "Output position_modulo, 0 to N-1: the position of the shaft within N counts, within rev (a revolution), or "
+        "within rev/4, an electrical angle of 4 pole pairs. A preset leaves it as it is, --index-reset makes it 0.",
+        metavar="[N|rev|rev/P]",
+        parse=parse_modulo,
+        tests=("", "rev", "7"),
         tacit=True,
     )
     external_tick: bool = option(
@@ -272,9 +303,9 @@ class TachometerSpec:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Lines of the sensor, the index included."""
+        """Lines of the sensor, the index and `controls` included."""
         of_index = ("z",) if self.index and not self.encoder.missing else ()  # a gap needs none
-        return (*self.encoder.kind.lines, *of_index)
+        return (*self.encoder.kind.lines, *of_index, *self.controls)
 
     @property
     def wheel(self) -> ToothWheel | None:
@@ -282,6 +313,29 @@ class TachometerSpec:
         if not (missing := self.encoder.missing):
             return None
         return ToothWheel(self.encoder.pulses_per_rev - missing, missing, (1 << self.times.longest.bit_length()) - 1)
+
+    @property
+    def controls(self) -> tuple[str, ...]:
+        """Inputs whose rises a program or a switch makes."""
+        return ("preset",) * (self.preset is not None) + ("home",) * self.index_once
+
+    @property
+    def moves_position(self) -> bool:
+        """Whether something else than counts changes the position."""
+        return self.index_reset or self.preset is not None
+
+    @property
+    def index_watched(self) -> bool:
+        """Whether a watch counts from index to index, each of which is taken."""
+        return self.index and not self.index_once
+
+    @property
+    def modulus(self) -> int | None:
+        """Counts within which `position_modulo` is; None: there is none."""
+        if self.position_modulo is None:
+            return None
+        of, _, parts = self.position_modulo.partition("/")
+        return self.encoder.counts_per_rev // int(parts or 1) if of == "rev" else int(of)
 
     @property
     def index_state(self) -> Levels | None:
@@ -325,71 +379,14 @@ class TachometerSpec:
     @property
     def entries(self) -> dict[str, Any]:
         """Entries of the manifest, beside ports and options."""
-        times, scale, frac_bits = self.times, self.scale, self.widths.frac_bits
-        found = {
-            "method": self.method,
-            "clock_hz": self.timing.clock_hz,
-            "tick_cycles": self.timing.tick_cycles,
-            "max_ticks": self.timing.max_ticks,
-            "stalled_after_ticks": times.stalled_after_ticks,
-            "counts_per_rev": self.encoder.counts_per_rev,
-            "decoding": self.encoder.decoding,
-            "velocity": {
-                "width": self.widths.velocity,
-                "frac_bits": frac_bits,
-                "unit": self.unit,
-                "rad_per_s_per_lsb": scale.rad_per_s_per_lsb,
-                "full_scale": scale.full_scale * 2.0**-frac_bits,
-                "full_scale_rad_per_s": scale.full_scale * scale.rad_per_s_per_lsb,
-            },
-            **self.method_entries,
-            "max_time_cycles": times.longest,
-            "min_time_cycles": times.shortest,
-            "bounds": {"none": self.bound.shown_absent} if self.bounds else None,
-            "interval_unit_cycles": times.interval_unit,
-            "latency_cycles": self.latency.entries,
-            "recovery_cycles": self.recovery.clocks,
-            "external_tick_cycles": (
-                {"min": times.min_tick_cycles, "max": times.longest_tick} if self.external_tick else None
-            ),
-        }
-        return {name: entry for name, entry in found.items() if entry is not None}
+        return entries_of(self)
 
     @property
     def options(self) -> dict[str, str]:
         """Texts of all options that are asked for, by their names; `of_options` makes the core of them again."""
-        found = {"method": self.method} | ({CHOSEN: self.chosen} if self.chosen else {})
-        for part in (self.encoder, self.timing, self):
-            found |= written(part, self)
-        return found
+        return options_as_asked(self)
 
     @property
     def parameters(self) -> dict[str, Any]:
         """Every option in canonical form, defaults and what follows included."""
-        found: dict[str, Any] = {"method": self.method}
-        for part in (self.encoder, self.timing, self):
-            for about in options_of(type(part)):
-                value = getattr(part, about.field)
-                if not (about.tacit and value == about.default):
-                    found[about.field] = about.canonical(value)
-        del found["external_tick"]
-        return found | {
-            "frac_bits": self.widths.frac_bits,
-            "velocity_width": self.widths.velocity,
-            "max_tick_cycles": self.times.longest_tick if self.external_tick else None,
-            "edge_error": float(self.bound.edge_error) if self.facts.bounds else found["edge_error"],
-        }
-
-
-def written(part: Any, spec: TachometerSpec) -> dict[str, str]:
-    """Return what is asked for in the fields of a part of a core, or of the core itself, as texts by option names."""
-    fitting = {about.field: about for about in reversed(options_of(type(part))) if about.fits_in(spec)}
-    found = {}
-    for about in reversed(fitting.values()):
-        value = getattr(part, about.field)
-        if value is None or ((about.needs or about.tacit) and value == about.default):
-            continue
-        clocks = spec.timing.tick_cycles if about.unit == "ticks" else 1
-        timed = about.parse_at is not None
-        found[about.name] = written_time(value * clocks, spec.timing.clock_hz) if timed else about.written(value)
-    return found
+        return parameters_of(self)

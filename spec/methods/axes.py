@@ -27,6 +27,9 @@ _LEFT_OUT: tuple[tuple[str, Any, str], ...] = (
     ("bounds", False, f"what finds them {_FOR_ONE}"),
     ("compare", None, f"what compares positions {_FOR_ONE}"),
     ("over_speed", None, f"what trips {_FOR_ONE}"),
+    ("preset", None, f"what sets the position {_FOR_ONE}"),
+    ("index_once", False, f"what waits for home {_FOR_ONE}"),
+    ("position_modulo", None, f"its counter {_FOR_ONE}"),
     ("health", False, f"what watches the lines {_FOR_ONE}"),
     ("lowpass", None, f"the filter {_FOR_ONE}"),
 )

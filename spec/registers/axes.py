@@ -7,7 +7,8 @@ from functools import cached_property
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import Port
 from tachometry.spec.methods.axes import AxesSpec
-from tachometry.spec.registers.map import Draft, RegisterMap
+from tachometry.spec.registers.field import Draft
+from tachometry.spec.registers.map import RegisterMap
 
 _WHOSE = ("axis", "index_axis")  # what is held says it by its name
 

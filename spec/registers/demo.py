@@ -19,9 +19,10 @@ from tachometry.spec.registers.emulator import (
     RATE_SHIFT,
     WIRES_WIDTH,
 )
+from tachometry.spec.registers.field import WORD, Draft, Field
 from tachometry.spec.registers.loop import LoopMap
 from tachometry.spec.registers.manifest import described_port
-from tachometry.spec.registers.map import WORD, Draft, Field, RegisterMap
+from tachometry.spec.registers.map import RegisterMap
 
 ENCODER_LINES = ("a", "b", "z")
 DRIVE = "drive"  # the current of a loop, as a stream of bits

@@ -11,7 +11,8 @@ from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import Port
 from tachometry.spec.methods.axes import AxesSpec
 from tachometry.spec.registers.axes import AxesMap
-from tachometry.spec.registers.map import WORD, Draft, Field, RegisterMap
+from tachometry.spec.registers.field import WORD, Draft, Field
+from tachometry.spec.registers.map import RegisterMap
 
 _MODE, _POSITION = "generator_mode", "command_position"
 _WORDS = ((0, "_LOW", "Lower word. "), (WORD, "_HIGH", "Upper word. "))

@@ -22,118 +22,21 @@ from typing import Any
 from tachometry.spec.control import AnySpec
 from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.language.port import COMPARE, INDEX, TICK, UPDATE, WIDE, Port
+from tachometry.spec.registers.field import WORD, Draft, Field, Register
 from tachometry.spec.registers.manifest import manifest
 
-WORD = 32  # bits
 IDENTIFICATION = int.from_bytes(b"TACH", "big")
 COUNTER_WIDTH = 8  # bits of each counter of COUNTERS
 
 # What a core has with an interrupt, besides the registers.
 IRQ = Port("irq", "output", help="Interrupt, high while an event waits that INTERRUPT_ENABLE lets through.")
 
+_CONTROLS = {
+    "preset": "Writing 1 sets the position to PRESET.",
+    "home": "Writing 1 lets the next index be taken.",
+}
 _LIVE = (TICK, UPDATE, INDEX, COMPARE)  # what is captured is new with these strobes
 _DESCRIBED = ("name", "low", "width", "access", "reset", "signed", "unit", "port", "shift")  # in the manifest
-
-
-@dataclass(frozen=True)
-class Field:
-    """Describes some bits of a register.
-
-    Parameters
-    ----------
-    width : int
-        Bits.
-    low : int
-        The lowest of them.
-    writable : bool
-        A write changes it; else a write has no effect on it.
-    single : bool
-        Writing 1 has an effect in that clock, and it reads 0.
-    reset : int
-        Its value after reset; of a constant, its value.
-    signed : bool
-        The register is in two's complement.
-    unit : str
-        What one LSB is.
-    port : str
-        The port that it shows, if it shows one. If it is writable, that which it sets.
-    shift : int
-        The bit of the port that is its lowest.
-    bits : int
-        Of a field of a whole register, so many are kept of what is written, and extended by sign or zeros; 0: all.
-    least, most : int or None
-        What is written is held within these.
-    """
-
-    name: str
-    width: int
-    low: int = 0
-    help: str = ""
-    writable: bool = False
-    single: bool = False
-    reset: int = 0
-    signed: bool = False
-    unit: str = ""
-    port: str = ""
-    shift: int = 0
-    bits: int = 0
-    least: int | None = None
-    most: int | None = None
-
-    @property
-    def kept(self) -> int:
-        """Bits that are kept."""
-        return self.bits or self.width
-
-    @property
-    def mask(self) -> int:
-        """Its bits within the register."""
-        return ((1 << self.width) - 1) << self.low
-
-    @property
-    def access(self) -> str:
-        """`ro`, `rw`, or `wo` of a bit that acts when 1 is written."""
-        return "wo" if self.single else "rw" if self.writable else "ro"
-
-
-@dataclass(frozen=True)
-class Register:
-    """Describes a word of 32 bits.
-
-    Parameters
-    ----------
-    offset : int
-        Bytes.
-    fields : tuple of Field
-        Bits of none of them read 0.
-    captured : bool
-        It keeps what it shows until the next capture.
-    captures : bool
-        Reading it captures first, unless CONTROL.hold is set.
-    constant : bool
-        It never changes.
-    """
-
-    name: str
-    offset: int
-    help: str
-    fields: tuple[Field, ...]
-    captured: bool = False
-    captures: bool = False
-    constant: bool = False
-
-    @property
-    def writable(self) -> bool:
-        """Whether a write is no error."""
-        return any(field.writable for field in self.fields)
-
-    @property
-    def reset(self) -> int:
-        """The value that is read after reset, before any capture."""
-        return sum(field.reset << field.low for field in self.fields)
-
-
-Draft = tuple[str, str, tuple[Field, ...], dict[str, bool]]  # name, help, fields, and what is true of the register
 
 
 @dataclass(frozen=True)
@@ -152,7 +55,7 @@ class RegisterMap:
     @cached_property
     def registers(self) -> tuple[Register, ...]:
         """In the order of their offsets, which follow each other without a gap."""
-        drafts = (*self._head(), *self._captured(), *self._added(), *self._interrupting())
+        drafts = (*self._head(), *self._captured(), *self._placing(), *self._added(), *self._interrupting())
         return tuple(
             Register(name, number * WORD // 8, help, fields, **more)
             for number, (name, help, fields, more) in enumerate(drafts)
@@ -278,6 +181,7 @@ class RegisterMap:
                     "fields": [
                         {
                             **{key: getattr(field, key) for key in _DESCRIBED},
+                            "reset": field.reset & (1 << field.width) - 1,
                             "port_width": widths.get(field.port, field.kept + field.shift),
                             **({} if field.most is None else {"least": field.least, "most": field.most}),
                         }
@@ -309,6 +213,11 @@ class RegisterMap:
             (
                 Field("clear", 1, 0, clear, writable=True, single=True),
                 Field("hold", 1, 1, hold, writable=True),
+                *(
+                    Field(name, 1, place, help, writable=True, single=True, port=f"{name}_now")
+                    for place, (name, help) in enumerate(_CONTROLS.items(), 2)
+                    if name in self.spec.controls
+                ),
             ),
             {},
         )
@@ -345,6 +254,39 @@ class RegisterMap:
             if port is values[0]:
                 flags = tuple(self._flags(ports, suffix))
                 yield f"STATUS{suffix}", "Flags of what was captured.", flags, more
+
+    def _placing(self) -> Iterable[Draft]:
+        """Return what the position is set to, and by how much the place within a modulus is moved."""
+        spec = self.spec
+        if spec.preset is not None:
+            words = {0: ""} if spec.position_width <= WORD else {0: "_LOW", WORD: "_HIGH"}
+            for shift, end in words.items():
+                last = spec.position_width <= shift + WORD
+                reset = spec.preset >> shift
+                field = Field(
+                    "value",
+                    WORD,
+                    help="Position that the input preset, or CONTROL.preset, sets.",
+                    writable=True,
+                    reset=reset if last else reset & (1 << WORD) - 1,
+                    signed=last,
+                    unit="counts",
+                    port="preset_value",
+                    shift=shift,
+                    bits=spec.position_width - shift if last else 0,
+                )
+                yield (
+                    f"PRESET{end}",
+                    f"{'' if last and not shift else 'Upper word. ' if shift else 'Lower word. '}{field.help}",
+                    (field,),
+                    {},
+                )
+        if spec.modulus is not None:
+            help = "Counts by which position_modulo is ahead of counts since reset, or since an index that resets."
+            width = (spec.modulus - 1).bit_length()
+            more: dict[str, Any] = {"unit": "counts", "bits": width, "least": 0, "most": spec.modulus - 1}
+            field = Field("value", WORD, help=help, writable=True, port="modulo_offset", **more)
+            yield "MODULO_OFFSET", help, (field,), {}
 
     def _added(self) -> Iterable[Draft]:
         """Return what a design around the core adds."""

@@ -34,7 +34,7 @@ def standstill(spec: TachometerSpec, n_clocks: int) -> Stimulus:
     pins = np.zeros((n_clocks, 1), dtype=np.uint64)
     pins[0] = 1
     low = {name: np.zeros(1, dtype=np.uint8) for name in ("a", "b")}
-    return Stimulus(pins, [PinTrace(np.zeros(1, dtype=np.int64), n_clocks=n_clocks - 1, **low)], [1])
+    return Stimulus(pins, [PinTrace.of_lines(np.zeros(1, dtype=np.int64), n_clocks - 1, low)], [1])
 
 
 @pytest.fixture

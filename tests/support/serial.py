@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from tachometry.sim.golden.registers import Access
 from tachometry.spec.registers import frames
+from tachometry.spec.registers.field import WORD
 from tachometry.spec.registers.frames import Answer, FrameError, Request, Type
-from tachometry.spec.registers.map import WORD
 
 Golden = Sequence[tuple[int | None, bool]]  # data and error of each access
 _MARGIN = 0.99  # clocks before sck rises in which miso is there: those of pads and board

@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from tachometry.hdl.export.registers import rdl
 from tachometry.hdl.export.registers.values import captured_values, in_unit, is_whole, sentences
 from tachometry.hdl.export.render import render, render_files
-from tachometry.spec.registers.map import Field, Register, RegisterMap
+from tachometry.spec.registers.field import Field, Register
+from tachometry.spec.registers.map import RegisterMap
 
 # The files, and what --help says of them.
 REGISTER_FILES = {

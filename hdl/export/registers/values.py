@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from tachometry.spec.registers.map import WORD, Field, Register, RegisterMap
+from tachometry.spec.registers.field import WORD, Field, Register
+from tachometry.spec.registers.map import RegisterMap
 
 
 @dataclass(frozen=True)

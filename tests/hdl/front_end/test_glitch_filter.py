@@ -90,7 +90,7 @@ def test_the_first_samples_are_filtered(line: str) -> None:
         lines = {name: np.full(60, rest, dtype=np.uint8) for name in ("a", "b", "z")}
         lines[line][: len(rattle)] = rest ^ np.array(rattle, dtype=np.uint8)
         lines["a"][40:] ^= 1  # a real one
-        found = lockstep(spec, PinTrace(np.arange(60), n_clocks=60, **lines), PySim())
+        found = lockstep(spec, PinTrace.of_lines(np.arange(60), 60, lines), PySim())
         assert found.n_mismatches == 0, found.first
         run = found.actual
         assert np.abs(run.ticks.position).tolist() == [0] * 11 + [1] * 3

@@ -39,7 +39,7 @@ def _from(trace: PinTrace, clock: int) -> PinTrace:
     row = int(np.searchsorted(trace.clock, clock, side="right")) - 1
     at = np.maximum(trace.clock[row:] - clock, 0)
     lines = {name: line[row:] for name, line in trace.lines.items()}
-    return PinTrace(at, n_clocks=trace.n_clocks - clock, **lines)
+    return PinTrace.of_lines(at, trace.n_clocks - clock, lines)
 
 
 def _columns(spec: AxesSpec) -> list[tuple[str, str]]:

@@ -110,6 +110,10 @@ def test_every_option_does_what_it_says() -> None:
         "health-edges",
         "health-errors",
         "over-speed",
+        "missing-teeth",
+        "preset",
+        "index-once",
+        "position-modulo",
         "compare",
     } == {word.split("=")[0] for word in texts.split()}
 

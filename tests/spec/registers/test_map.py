@@ -8,8 +8,9 @@ from tachometry.spec.control import LoopSpec
 from tachometry.spec.registers import frames
 from tachometry.spec.registers.buses import bus_of
 from tachometry.spec.registers.demo import DemoMap, demo_map, demo_ports
+from tachometry.spec.registers.field import Field
 from tachometry.spec.registers.loop import registers_of
-from tachometry.spec.registers.map import Field, RegisterMap
+from tachometry.spec.registers.map import RegisterMap
 
 BASE = {"ppr": "8", "clock": "1MHz", "tick": "10clk", "max-time": "100clk"}
 
