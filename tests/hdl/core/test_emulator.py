@@ -51,13 +51,15 @@ def emulated(changes: list[Change], n_clocks: int, lines_per_rev: int | None) ->
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_lines_are_those_of_the_golden_model(seed: int) -> None:
-    changes = random_changes(seed)
-    lines_per_rev = [None, 1, 5][seed % 3]
+    check(random_changes(seed), [None, 1, 5][seed % 3])
+
+
+def check(changes: list[Change], lines_per_rev: int | None) -> None:
     trace = GoldenEmulator(lines_per_rev).trace(changes, CLOCKS)
     row = np.searchsorted(trace.clock, np.arange(CLOCKS), side="right") - 1
     levels = np.stack(list(trace.lines.values()), axis=1)[row].tolist()
     for clock, (got, wanted) in enumerate(zip(emulated(changes, CLOCKS, lines_per_rev), levels, strict=True)):
-        assert got == tuple(wanted), f"seed {seed}, clock {clock}"
+        assert got == tuple(wanted), f"clock {clock}"
 
 
 def edges(settings: EmulatorSettings, n_clocks: int) -> tuple[np.ndarray, np.ndarray]:
@@ -68,6 +70,11 @@ def edges(settings: EmulatorSettings, n_clocks: int) -> tuple[np.ndarray, np.nda
 
 PERIOD = 4096
 STEADY = EmulatorSettings(speed=(1 << 32) // PERIOD)
+
+
+def test_jitter_from_the_start() -> None:
+    """No number is drawn in the first clock, which no edge is before."""
+    check([Change(-1, replace(STEADY, jitter=63))], None)
 
 
 def test_a_steady_speed_gives_even_edges_and_forward_is_a_before_b() -> None:
