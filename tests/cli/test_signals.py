@@ -12,9 +12,11 @@ import signal
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import distributed
 import pytest
 from support.nightly import nightly
 
@@ -84,6 +86,9 @@ def _child(line: str, folder: Path, moment: int, stop: int) -> None:
     os.setsid()
     os.chdir(folder / "work")
     os.environ.update(TMPDIR=str(folder / "tmp"))
+    distributed.utils._offload_executor = ThreadPoolExecutor(
+        1
+    )  # a test before may have given ours a thread, left behind
     import tempfile
 
     tempfile.tempdir = None
@@ -154,7 +159,7 @@ def imported() -> Iterator[None]:
         load(name)
     for name in ("run", "compare", "plan", "loop", "sweep"):
         importlib.import_module(f"tachometry.sim.plots.{name}")
-    for name in ("amaranth.back.verilog", "amaranth_boards", "distributed", "matplotlib.backends.backend_pdf"):
+    for name in ("amaranth.back.verilog", "amaranth_boards", "matplotlib.backends.backend_pdf"):
         importlib.import_module(name)
     with pytest.MonkeyPatch.context() as patch:
         few = configurations("m")[:1]

@@ -10,6 +10,7 @@ import sys
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any
 
 from tachometry.sim.signals.scratch import scratch
@@ -110,6 +111,7 @@ def _deaf_to_interrupts() -> Iterator[None]:
         return
     came: list[int] = []
     before = signal.signal(signal.SIGTERM, lambda number, frame: came.append(number))
+    resource_tracker.ensure_running()  # as it starts, it takes these signals out of the mask of the thread that asks
     # Threads and processes that are started have this mask, too.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGHUP))
     try:
