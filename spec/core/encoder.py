@@ -109,7 +109,7 @@ class Encoder:
         "of B down), or hall (A, B and C of a motor, 120 electrical degrees apart).",
         choices=tuple(SENSORS),
         group=_GROUP,
-        tests=(),
+        tests=("", "hall", "pulses"),
         tacit=True,
     )
     reverse: bool = option(False, "Count backward what would be forward.", group=_GROUP, tacit=True)

@@ -17,6 +17,20 @@ APART = {
     frozenset({("adaptive", "25%"), ("max-time", "2")}),
     frozenset({("adaptive", "25%"), ("max-time", "3")}),
     frozenset({("adaptive", "25%"), ("lowpass", "20kHz")}),
+    # A period of halls has six counts, and only A and B have a state for the index and edges to miss.
+    *(frozenset({("sensor", "hall"), ("decoding", value)}) for value in "12"),
+    frozenset({("sensor", "hall"), ("whole-cycles", "yes")}),
+    *(
+        frozenset({("sensor", sensor), (name, value)})
+        for sensor in ("hall", "pulses")
+        for name, value in (
+            ("health", "yes"),
+            ("health", "yes health-edges 5"),
+            ("health", "yes health-errors 0"),
+            ("index", "yes index-at A=0,B=1"),
+            ("index", "yes index-at A=1,B=1"),
+        )
+    ),
 }
 IN_WORDS = {"max-time", "min-time", "max-speed", "frac-bits", "velocity-width"}
 
@@ -87,7 +101,7 @@ def test_every_option_is_a_factor(method: str) -> None:
     assert {about.name for about in own_options(method)} <= set(found)
     without = {about.name for about in common_options() if not about.needs} - set(found)
     never = {"rairan": {"external-tick"}, "track": {"tick", "bounds"}}
-    lines = {"sensor", "pole-pairs"}  # the decoder is before every method: tests/hdl/core/test_sensors.py has all
+    lines = {"pole-pairs", "missing-teeth"}  # of one sensor: tests/hdl/front_end has the wheel
     assert without == {"ppr", "lines", "cpr", "clock", "dt", "pwm", "lsb"} | lines | never.get(method, set())
     assert "yes index-reset" in found["index"]
     assert ("yes edge-error 0.3" in found.get("bounds", ())) == METHODS[method].facts.bounds
