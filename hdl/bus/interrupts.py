@@ -3,7 +3,7 @@
 from functools import reduce
 from operator import or_
 
-from amaranth import Module, Signal, Value
+from amaranth import Cat, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -22,7 +22,7 @@ class Interrupts(wiring.Component):
     -------
     ticks, stalled : In(axes)
         The axis ticks; its shaft rests.
-    index, overflow, error, fault, over_speed : In(1)
+    index, probe, overflow, error, fault, over_speed : In(1)
         The event is in this clock; only those that the core has.
     irq_enable_… : In(1)
         An event raises `irq`.
@@ -71,5 +71,8 @@ def connect(m: Module, box: Interrupts, bank: wiring.Component, core: wiring.Com
             m.d.comb += getattr(target, name).eq(getattr(source, name))
     late = [core.tick_error] if hasattr(core, "tick_error") else []
     m.d.comb += [box.overflow.eq(core.tick & bank.overflow), box.error.eq(reduce(or_, late, core.decode_error))]
+    if hasattr(box, "probe"):
+        strobes = [name for name in core.signature.members if name.startswith("probe_valid")]
+        m.d.comb += box.probe.eq(Cat(getattr(core, name) for name in strobes).any())
     if hasattr(box, "index"):
         m.d.comb += box.index.eq(core.index_valid)

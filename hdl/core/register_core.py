@@ -73,6 +73,8 @@ class RegisterCore(wiring.Component):
             bank.position.eq(position.latest),
         ]
         self._place(m)
+        if core.probe_latch is not None:
+            m.d.comb += core.probe_latch.edges.eq(bank.probe_edges)
         if self.loop is not None:
             self._keep(m, self.loop)
         if self._map.irq:

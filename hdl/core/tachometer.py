@@ -16,6 +16,7 @@ from tachometry.hdl.front_end.index_state import IndexState
 from tachometry.hdl.front_end.modulo_counter import ModuloCounter
 from tachometry.hdl.front_end.pin_rise import PinRise
 from tachometry.hdl.front_end.position_counter import PositionCounter
+from tachometry.hdl.front_end.probe_latch import ProbeLatch
 from tachometry.hdl.front_end.pulse_counter import PulseCounter
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.methods import DATAPATHS
@@ -30,6 +31,7 @@ from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput, Seria
 from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import follow, members
 from tachometry.spec import TachometerSpec
+from tachometry.spec.core.probe import edges_of, packed_edges
 from tachometry.spec.language.port import UPDATE
 
 
@@ -53,7 +55,7 @@ class Tachometer(wiring.Component):
     def __init__(self, spec: TachometerSpec) -> None:
         self._spec = spec
         super().__init__(members(spec.ports))
-        self.conditioner = InputConditioner(spec.filter_clocks, spec.lines)
+        self.conditioner = InputConditioner(spec.filter_clocks, (*spec.lines, *self._probes(spec)))
         self.decoder = decoder_of(spec.encoder, spec.wheel)
         self.pulse_counter = PulseCounter(
             max(spec.times.longest_tick, spec.widths.max_pulse_count),
@@ -71,6 +73,11 @@ class Tachometer(wiring.Component):
         if spec.index_state is not None:
             after = spec.encoder.kind.after(spec.index_state)
             self.index_state = IndexState(spec.index_state, after, spec.latency.tick)
+        self.probe_latch: ProbeLatch | None = None
+        if spec.probe:
+            edges, probes = packed_edges(spec.probe), len(edges_of(spec.probe))
+            widths = spec.position_width, spec.times.probe_width
+            self.probe_latch = ProbeLatch(edges, probes, *widths, spec.latency.tick)
         self.watch: EncoderWatch | None = None
         if spec.health:
             self.watch = EncoderWatch(
@@ -117,7 +124,7 @@ class Tachometer(wiring.Component):
     @property
     def idle(self) -> tuple[Idle, ...]:
         """Registers that a simulation may move on."""
-        names = ("conditioner", "watch", "compare_output", "datapath")
+        names = ("conditioner", "probe_latch", "watch", "compare_output", "datapath")
         boxes: dict[str, object] = {name: getattr(self, name) for name in names}
         if not self._spec.facts.own_ticks:
             boxes["sampling_clock"] = self.sampling_clock
@@ -141,6 +148,7 @@ class Tachometer(wiring.Component):
         self._age(m, ticks, updates)
         self._place(m)
         self._index(m)
+        self._probe(m)
         self._watch(m)
         self._compare(m)
         if self.trip is not None:
@@ -309,6 +317,27 @@ class Tachometer(wiring.Component):
                 m.d.comb += watch.preset.eq(self.controls["preset"].rises)
             follow(m, watch, self.index_capture, ("index_valid", "index_position"))
             follow(m, self, watch, ("index_error",))
+
+    @staticmethod
+    def _probes(spec: TachometerSpec) -> list[str]:
+        """Return the names of the probe inputs, as lines."""
+        return [f"probe_{number}" for number in range(len(edges_of(spec.probe)))]
+
+    def _probe(self, m: Module) -> None:
+        """Latch the position at edges of probe inputs, if there are any."""
+        if self.probe_latch is None:
+            return
+        m.submodules.probe_latch = latch = self.probe_latch
+        names = self._probes(self._spec)
+        m.d.comb += [
+            *(getattr(self.conditioner, name).eq(level) for name, level in zip(names, self.probe, strict=True)),
+            latch.level.eq(Cat(getattr(self.conditioner, f"level_{name}") for name in names)),
+            latch.ready.eq(Cat(getattr(self.conditioner, f"ready_{name}") for name in names)),
+            latch.step.eq(self.decoder.step),
+            latch.position.eq(self.position_counter.next),
+            latch.arm.eq(self.probe_arm),
+        ]
+        follow(m, self, latch, latch.latched)
 
     def _compare(self, m: Module) -> None:
         """Make pulses at positions, if they are asked for."""

@@ -7,8 +7,9 @@ import numpy as np
 from tachometry.sim.encoder.imperfections import pulsed
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.axes import AxesTrace, Trace
-from tachometry.sim.signals.recording import PinTrace, quadrature
+from tachometry.sim.signals.recording import PinTrace, merged, quadrature
 from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
+from tachometry.spec.core.probe import edges_of
 from tachometry.spec.core.sensors import packed_levels
 
 _SPEEDS = (0.3, 1.01, 1.5, 2.2, 3.25, 0.1)  # counts per tick
@@ -58,7 +59,7 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
         z |= np.repeat(rng.random(len(clock) // 12 + 1) < 0.1, 12)[: len(clock)].astype(np.uint8)
     n_clocks = int(clock[-1]) + spec.facts.rest_tenths * longest // 10 + 40 * cycles + 300
     a, b, c = (level >> np.uint8(line) & np.uint8(1) for line in range(3))
-    trace = PinTrace(clock, a, b, n_clocks, z, c=c if "c" in sensor.lines else None)
+    trace = _probed(spec, PinTrace(clock, a, b, n_clocks, z, c=c if "c" in sensor.lines else None), seed)
     for name in spec.controls:
         few = 30 if name == "preset" else 6
         high = spec.filter_clocks + int(rng.integers(1, 30))
@@ -70,6 +71,21 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     apart[500:1000] += rng.integers(-cycles // 2, cycles, len(apart[500:1000]))
     apart[700:710] *= 4
     return trace.with_tick_in(np.cumsum(np.maximum(apart, 2)))
+
+
+def _probed(spec: TachometerSpec, trace: PinTrace, seed: int) -> PinTrace:
+    """Return the trace with edges of probes in clocks of edges, beside them and anywhere, armed now and then."""
+    if not spec.probe:
+        return trace
+    rng = np.random.default_rng([seed, 2])
+    near = rng.choice(trace.clock, len(trace.clock) // 2) + rng.integers(-2, 3, len(trace.clock) // 2)
+    clock = merged(trace.clock, np.clip(near, 0, trace.n_clocks - 1), rng.integers(0, trace.n_clocks, 100))
+    held = np.searchsorted(trace.clock, clock, side="right") - 1
+    lines = {name: line[held] for name, line in trace.lines.items()}
+    for name, often in (("probe", 0.4), ("probe_arm", 0.2)):
+        row = np.maximum.accumulate(np.where(rng.random(len(clock)) < often, np.arange(len(clock)), 0))
+        lines[name] = rng.integers(0, 1 << len(edges_of(spec.probe)), len(clock)).astype(np.uint8)[row]
+    return PinTrace.of_lines(clock, trace.n_clocks, lines)
 
 
 @singledispatch

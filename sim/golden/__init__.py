@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tachometry.sim.golden import compare, health
+from tachometry.sim.golden import compare, health, probe
 from tachometry.sim.golden.axes import run_axes
 from tachometry.sim.golden.front_end import Steps, count, decoded
 from tachometry.sim.golden.low_pass import filtered
@@ -54,6 +54,8 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
     measured = golden.updates(ticks, steps, trace.n_clocks)
     measured = measured.having(cause=measured.clock - spec.latency.datapath)
     updates = in_unit(spec, filtered(spec, ticks, measured))
+    probes = probe.latched(spec, steps, trace)
+    ticks = probe.with_probed(spec, ticks, probes)
     tripped, pulses = trips(spec, updates), compare.pulses(spec, steps)
     found = {
         "tick": compare.with_compare(spec, with_trip(spec, with_age(spec, ticks, updates), tripped), pulses),
@@ -65,5 +67,6 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
         "fault": wrong,
         "over_speed": tripped,
         "compare_valid": pulses,
+        **probes,
     }
     return {name: table.rows(slice(np.searchsorted(table.clock, trace.n_clocks))) for name, table in found.items()}

@@ -11,6 +11,7 @@ from tachometry.sim.golden.tooth_wheel import Teeth, filled
 from tachometry.sim.signals.recording import PinTrace, merged, packed
 from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, TachometerSpec
+from tachometry.spec.core.probe import edges_of
 from tachometry.spec.core.sensors import changes as changes_of
 from tachometry.spec.core.sensors import packed_levels
 
@@ -117,7 +118,8 @@ def filter_line(
 
 def changes(trace: PinTrace, name: str) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
     """Change list of one line: the clocks from which its levels are sampled, and the levels."""
-    level = trace.lines[name]
+    line, _, bit = name.partition("_")
+    level = trace.lines["probe"] >> np.uint8(bit) & np.uint8(1) if line == "probe" else trace.lines[name]
     changed = np.append(True, level[1:] != level[:-1])
     return trace.clock[changed], level[changed]
 
@@ -154,6 +156,8 @@ class Steps:
         Clocks in which the position is set, before the step in them, and to what.
     arms : int64 array
         Clocks in which the next index is let through.
+    probes : tuple of (int64 array, uint8 array)
+        Of each probe the clocks from which its level is seen, and the levels; the first is no edge.
     """
 
     clock: NDArray[np.int64]
@@ -168,6 +172,7 @@ class Steps:
     values: NDArray[np.int64] = field(default_factory=_none)
     arms: NDArray[np.int64] = field(default_factory=_none)
     wheel: Teeth | None = None
+    probes: tuple[tuple[NDArray[np.int64], NDArray[np.uint8]], ...] = ()
 
     def asked(
         self, spec: TachometerSpec, presets: NDArray[np.int64], values: NDArray[np.int64], arms: NDArray[np.int64]
@@ -208,8 +213,11 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     at = clock + spec.latency.pin_to_count + (np.arange(len(clock)) == 0)
     changed = packed([line[1:] ^ line[:-1] for line in levels])
     rises = wide = at[:0]
+    seen = [conditioned(f"probe_{number}") for number in range(len(edges_of(spec.probe)))]
+    probes = tuple((clock_of + spec.latency.pin_to_count, level) for clock_of, level in seen)
     if spec.wheel is not None:
-        return _without_gaps(spec, Steps(at[1:], step[1:], at[:0], rises, np.sort(np.concatenate(returned)) + 3), trace)
+        swallowed = np.sort(np.concatenate(returned)) + 3
+        return _without_gaps(spec, Steps(at[1:], step[1:], at[:0], rises, swallowed, probes=probes), trace)
     if spec.index:
         at_z, z = conditioned("z")
         z = z ^ np.uint8("z" in encoder.inverted)
@@ -222,8 +230,8 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     for name in spec.controls:
         at_pin, level = conditioned(name)
         asked[name] = at_pin[1:][level[1:] > level[:-1]] + spec.latency.pin_to_count
-    # Two clocks for the synchroniser, one for the counter of glitches.
-    found = Steps(at[1:], step[1:], at[wrong], rises, np.sort(np.concatenate(returned)) + 3, changed, wide, rises)
+    swallowed = np.sort(np.concatenate(returned)) + 3
+    found = Steps(at[1:], step[1:], at[wrong], rises, swallowed, changed, wide, rises, probes=probes)
     return found.asked(spec, asked["preset"], np.full(len(asked["preset"]), spec.preset or 0), asked["home"])
 
 
@@ -315,13 +323,24 @@ class _Origins:
         order = np.argsort(clock, kind="stable")
         clock = clock[order]
         off = np.append(0, np.concatenate([preset, captured[:resets]])[order])
-        before = np.searchsorted(clock, steps.index, side="left") + np.isin(steps.index, steps.presets)
-        return cls(captured, off[before], clock, off)
+        found = cls(captured, captured, clock, off)
+        return replace(found, at_index=found.before_reset(steps.index, steps))
+
+    def before_reset(self, clock: NDArray[np.int64], steps: Steps) -> NDArray[np.int64]:
+        """Return what is taken off the sum in each of these clocks, with a preset of the clock, but not its index."""
+        found: NDArray[np.int64] = self.off[np.searchsorted(self.clock, clock) + np.isin(clock, steps.presets)]
+        return found
 
     def after(self, clock: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return what is taken off the sum of the steps up to each of these clocks."""
         found: NDArray[np.int64] = self.off[np.searchsorted(self.clock, clock, side="right")]
         return found
+
+
+def positions_at(spec: TachometerSpec, steps: Steps, clock: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the position with all steps of each clock and before, before an index of the clock resets it."""
+    total = np.append(0, np.cumsum(steps.step))[np.searchsorted(steps.clock, clock, side="right")]
+    return wrapped(spec, total - _Origins.of(spec, steps).before_reset(clock, steps))
 
 
 def positions(spec: TachometerSpec, steps: Steps) -> NDArray[np.int64]:

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tachometry.sim import golden
-from tachometry.sim.golden import compare, health
+from tachometry.sim.golden import compare, health, probe
 from tachometry.sim.golden.front_end import decoded, homed
 from tachometry.sim.signals.recording import PinTrace
+from tachometry.spec.core.probe import edges_of
 from tachometry.spec.language.port import COMPARE, INDEX, TICK, UPDATE, WIDE
 from tachometry.spec.registers.field import WORD, Field, Register
 from tachometry.spec.registers.map import COUNTER_WIDTH, RegisterMap
@@ -69,10 +70,10 @@ class GoldenBank:
         self._of_updates = {
             port.name for port in registers.ports if port.held_by == UPDATE and port.unit and port.name != "velocity"
         }
-        self._trace = trace
-        self._pins = self._steps = decoded(registers.spec, trace)
-        self._tables = golden.tables(registers.spec, trace, self._steps)
-        self._strobes: tuple[str, ...] = (TICK, UPDATE, INDEX) + (COMPARE,) * (registers.spec.compare is not None)
+        self._trace = trace.completed(registers.spec)
+        self._pins = self._steps = decoded(registers.spec, self._trace)
+        self._tables = golden.tables(registers.spec, self._trace, self._steps)
+        self._strobes = tuple(registers.spec.ports.strobes)
         self._happened = {"updated": self._tables[UPDATE].clock, "indexed": self._tables[INDEX].clock}
         self._happened[WIDE] = self._tables[WIDE].clock
         self._follow(self._tables[TICK].overflow)
@@ -104,6 +105,7 @@ class GoldenBank:
         self._irq = {event: [0] for event in self._map.interrupts}  # since which clocks events count
         left = sorted(captures)
         self._ask(accesses)
+        self._probe(accesses)
         found: list[tuple[int | None, bool]] = []
         for access in accesses:
             while left and left[0] <= access.clock:
@@ -175,6 +177,7 @@ class GoldenBank:
             "error": np.unique(np.concatenate(errors)),
         }
         # They are seen in the clock before the first in which they are shown.
+        found["probe"] = np.unique(np.concatenate([errors[0][:0], *self._latched]))
         found |= {name: self._tables[name].clock - 1 for name in ("fault", "over_speed") if name in self._tables}
         return {event: found[event] for event in self._map.interrupts}
 
@@ -236,8 +239,37 @@ class GoldenBank:
             "over_speed": int(self._count(self._tables["over_speed"].clock, self._cleared + 1, clock) > 0),
             "homed": int(homed(self._map.spec, self._steps, np.array([clock]))[0]),
             **(self._pulses(clock) if self._map.spec.compare is not None else {}),
+            **({"probed": int(probe.shown(self._tables["probed"], np.array([clock]))[0])} if self._latched else {}),
             **(self._faults(clock) if self._map.spec.health else {}),
         }
+
+    @property
+    def _latched(self) -> list[np.ndarray]:
+        return [table.clock for name, table in self._tables.items() if name.startswith("probe_valid")]
+
+    def _probe(self, accesses: Sequence[Access]) -> None:
+        """Find what probes latch when a program arms them, and chooses their edges."""
+        spec = self._map.spec
+        if not spec.probe:
+            return
+        named = {register.name: number for number, register in enumerate(self._map)}
+        arms, edges = {0: 0}, {0: self._settings["probe_edges"]}
+        for access in accesses:
+            if access.data is None:
+                continue
+            if access.address == named["PROBE_ARM"]:
+                arms |= {access.clock: access.data & (1 << len(edges_of(spec.probe))) - 1}
+                arms |= {access.clock + 1: 0}
+            if access.address == named["PROBE_EDGES"]:
+                edges[access.clock + 1] = access.data & (1 << 2 * len(edges_of(spec.probe))) - 1
+        clock = np.unique([*arms, *edges])
+        low = np.zeros(len(clock), dtype=np.uint8)
+        arm, chosen = (
+            np.array([*of.values()])[np.searchsorted([*of], clock, side="right") - 1] for of in (arms, edges)
+        )
+        lines = {"probe_arm": arm.astype(np.uint8), "probe_edges": chosen}
+        pins = PinTrace(clock, low, low, self._trace.n_clocks, more=lines)
+        self._tables |= probe.latched(spec, self._steps, pins)
 
     def _pulses(self, clock: int) -> dict[str, int]:
         found = compare.shown(self._map.spec, self._tables[COMPARE], np.array([clock]))

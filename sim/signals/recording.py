@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from tachometry.sim.signals.source import Source
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
+from tachometry.spec.core.probe import edges_of
 from tachometry.spec.language.units import format_time
 
-LINES = ("a", "b", "c", "z", "tick_in")
+LINES = ("a", "b", "c", "z", "tick_in", "probe")
 
 # What a computer's memory holds: an edge and a tick take some 300 bytes each on their way to a report.
 MAX_EDGES = 10_000_000
@@ -53,17 +54,18 @@ class _Lines:
     c: NDArray[np.uint8] | None
     z: NDArray[np.uint8] | None
     tick_in: NDArray[np.uint8] | None
+    probe: NDArray[np.uint8] | None
 
     @property
     def lines(self) -> dict[str, NDArray[np.uint8]]:
         """The lines that are there, by name."""
-        every = {name: getattr(self, name) for name in LINES}
+        every = {name: getattr(self, name, None) for name in LINES}
         return {name: line for name, line in every.items() if line is not None} | getattr(self, "more", {})
 
     @property
     def level(self) -> NDArray[np.uint8]:
-        """A number for each row, with a bit for each of `lines`, the first lowest."""
-        return packed(list(self.lines.values()))
+        """A number for each row, with a bit for each of `lines` but of probes, the first lowest."""
+        return packed([line for name, line in self.lines.items() if not name.startswith("probe")])
 
 
 def _split(level: NDArray[np.uint8], lines: Sequence[str]) -> dict[str, NDArray[np.uint8]]:
@@ -92,6 +94,8 @@ class Recording(_Lines):
         Levels of a third line, as of halls. A sensor of one line has 0 in `b`.
     source : Source or None
         Of a capture, what it says of itself.
+    probe : uint8 array, shape (n,), or None
+        Levels of the probe inputs, with a bit for each, the first lowest.
     """
 
     time: NDArray[np.float64]
@@ -102,6 +106,7 @@ class Recording(_Lines):
     tick_in: NDArray[np.uint8] | None = None
     source: Source | None = None
     c: NDArray[np.uint8] | None = None
+    probe: NDArray[np.uint8] | None = None
 
     def __post_init__(self) -> None:
         if not (len(self.time) and _same_length(self.time, *self.lines.values())):
@@ -117,6 +122,16 @@ class Recording(_Lines):
     ) -> "Recording":
         """Return the recording with these lines whose `level` is given."""
         return Recording(time, duration=duration, source=None, **_split(level, lines))
+
+    def with_probes_at(self, times: NDArray[np.float64], spec: TachometerSpec) -> "Recording":
+        """Return the same recording with probe inputs that all rise, fall, rise … at these times, in seconds."""
+        time = np.unique(np.concatenate([self.time, times]))
+        time = time[time <= self.duration]
+        held = np.searchsorted(self.time, time, side="right") - 1
+        lines = {name: line[held] for name, line in self.lines.items()}
+        high = np.searchsorted(np.sort(times), time, side="right") & 1
+        lines["probe"] = (high * ((1 << len(edges_of(spec.probe))) - 1)).astype(np.uint8)
+        return Recording(time, duration=self.duration, source=self.source, **lines)
 
     def place(self, clock_hz: int) -> "PinTrace":
         """Sample the lines at clock edge c = time c / clock_hz; a change between two edges is seen at the later one.
@@ -134,9 +149,9 @@ class Recording(_Lines):
             clock < max(n_clocks, 1)
         )  # of changes in one clock, the last
         row = np.flatnonzero(last)
-        level = self.level[row]
-        changed = np.append(True, level[1:] != level[:-1])
-        lines = _split(level[changed], list(self.lines))
+        levels = [line[row] for line in self.lines.values()]
+        changed = np.append(True, np.any([line[1:] != line[:-1] for line in levels], axis=0))
+        lines = {name: line[changed] for name, line in zip(self.lines, levels, strict=True)}
         return PinTrace.of_lines(clock[row[changed]], max(n_clocks, 1), lines)
 
     def _clock(self, clock_hz: int) -> NDArray[np.int64]:
@@ -182,7 +197,9 @@ class PinTrace(_Lines):
     c : uint8 array, shape (n,), 0 or 1, or None
         A third line.
     more : mapping of str to uint8 array, shape (n,), 0 or 1
-        Further inputs by name, such as `preset`.
+        Further inputs by name, such as `preset`; `probe_edges` is what a program has set `ProbeLatch.edges` to.
+    probe : uint8 array, shape (n,), or None
+        Levels of the probe inputs, with a bit for each, the first lowest.
     """
 
     clock: NDArray[np.int64]
@@ -193,6 +210,7 @@ class PinTrace(_Lines):
     tick_in: NDArray[np.uint8] | None = None
     c: NDArray[np.uint8] | None = None
     more: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
+    probe: NDArray[np.uint8] | None = None
 
     def __post_init__(self) -> None:
         if not (len(self.clock) and _same_length(self.clock, *self.lines.values())):
@@ -202,8 +220,8 @@ class PinTrace(_Lines):
 
     @classmethod
     def of(cls, recording: Recording, spec: TachometerSpec) -> "PinTrace":
-        """Return what the pins of a core see of a recording; with nominal external ticks if the core takes them and
-        there are none.
+        """Return what the pins of a core see of a recording: with nominal external ticks if the core takes them and
+        there are none, and with probes that are always armed.
 
         Raises
         ------
@@ -246,12 +264,14 @@ class PinTrace(_Lines):
 
     def completed(self, spec: TachometerSpec) -> "PinTrace":
         """Return the same trace with all inputs of a core: with nominal external ticks if it takes them, and all else
-        that is missing low.
+        that is missing low, but probes armed.
         """
         if spec.external_tick and self.tick_in is None:
             return self.with_tick_in(nominal_ticks(spec, self.n_clocks)).completed(spec)
         low = {name: np.zeros_like(self.a) for name in spec.controls if name not in self.lines}
-        return PinTrace.of_lines(self.clock, self.n_clocks, self.lines | low) if low else self
+        if probes := len(edges_of(spec.probe)):
+            low |= {"probe": np.zeros_like(self.a), "probe_arm": np.full_like(self.a, (1 << probes) - 1)}
+        return PinTrace.of_lines(self.clock, self.n_clocks, low | self.lines) if low else self
 
 
 def check_ticks(duration: float, spec: TachometerSpec, most: int = MAX_TICKS, of: str = "") -> None:

@@ -190,10 +190,14 @@ def _again(spec: AnySpec, name: str, vectors: Path) -> dict[str, str]:
             return cocotb_bench(spec, name)
         clock, *levels = np.array(there["changes"], dtype=np.int64).T
         lines = {pin: row for pin, row in zip(there["pins"], levels, strict=True)}
-        lines = {pin: lines[pin] for pin in lines if pin in LINES or pin in spec.tachometer.controls}
+        of_user = (*LINES, "probe_arm", *spec.tachometer.controls)
+        lines = {pin: lines[pin] for pin in lines if pin in of_user}
         traces = []
         for axis in range(spec.axes or 1):
-            of_axis = {pin: (row >> axis * (pin != "tick_in") & 1).astype(np.uint8) for pin, row in lines.items()}
+            of_axis = {
+                pin: (row if pin.startswith("probe") else row >> axis * (pin != "tick_in") & 1).astype(np.uint8)
+                for pin, row in lines.items()
+            }
             of_axis.setdefault("b", np.zeros(len(clock), dtype=np.uint8))  # of a sensor of one line
             traces.append(PinTrace.of_lines(clock, int(there["clocks"]), of_axis))
         return bench_of(spec, name, traces)

@@ -60,7 +60,7 @@ def cocotb_bench(core: AnySpec, name: str, recordings: Sequence[Recording] | Non
         for number, control in enumerate(spec.controls):
             rises = np.arange(1, 8) * trace.n_clocks // (9 + number)
             trace = trace.with_pulses(control, rises, spec.filter_clocks + 1)
-        traces.append(trace)
+        traces.append(trace.completed(spec))
     return bench_of(core, name, traces)
 
 
@@ -142,7 +142,8 @@ def usual_motion(spec: TachometerSpec, seed: int = 1, most: int = _MOVING) -> Re
         index_state=spec.index_place,
     )
     usual = _usual_form(spec, most, backward=seed % 2 == 0)
-    return encoder.record(parse_motion("+".join([*_to_compare(spec, 5 * most), usual]))).recording
+    recording = encoder.record(parse_motion("+".join([*_to_compare(spec, 5 * most), usual]))).recording
+    return recording.with_probes_at(np.linspace(0, 0.9 * recording.duration, 60)[1:], spec) if spec.probe else recording
 
 
 def _fastest(spec: TachometerSpec) -> float:

@@ -6,6 +6,7 @@ import math
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
+from tachometry.spec.core.probe import parse_probes
 from tachometry.spec.core.timing import MAX_TICK_CYCLES
 from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS
@@ -42,6 +43,8 @@ def check(spec: TachometerSpec) -> None:
     _check_index_state(spec)
     _check_place(spec)
     _check_health(spec)
+    if spec.probe:
+        parse_probes("probe", spec.probe)
     if spec.compare is not None:
         spec.compare.check(spec.timing.clock_hz, spec.position_width)
     if spec.over_speed is not None and spec.scale.over_speed >= spec.scale.full_scale:

@@ -76,4 +76,6 @@ class Latency(Follows[S]):
         }
         if self.spec.compare is not None:
             found["pin_to_compare"] = self.pin_to_count + self.tick + 1
+        if self.spec.probe:
+            found["pin_to_probe"] = self.pin_to_count + self.tick
         return found | ({"tick_in_to_window_end": TICK_IN_TO_WINDOW_END} if self.spec.external_tick else {})

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from tachometry.spec.core.compare import COUNT_WIDTH
 from tachometry.spec.core.health import FAULT_TEXTS, FAULT_WIDTH, FAULTS_WIDTH
+from tachometry.spec.core.probe import edges_of
 from tachometry.spec.language.port import COMPARE, INDEX, TICK, UPDATE, WIDE, Port, held, pin, strobe
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
             ),
         ),
         *_if(spec.index_once, pin("home", "Homing, asynchronous; its rising edge lets the next index be taken.")),
+        *_probe_pins(spec),
         held(
             *(UPDATE, "velocity", spec.widths.velocity),
             signed=True,
@@ -143,6 +145,7 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
                 "external tick came too early and was left out.",
             ),
         ),
+        *_probe_ports(spec),
         *_compare_ports(spec),
         *_health_ports(spec),
         *_if(
@@ -165,6 +168,26 @@ def _wrong(spec: TachometerSpec) -> str:
     if spec.encoder.missing:
         return "the gap was not where it had to be, as of a tooth lost or extra; the next gap is taken."
     return spec.encoder.kind.wrong
+
+
+def _probe_pins(spec: TachometerSpec) -> Iterable[Port]:
+    if probes := len(edges_of(spec.probe)):
+        yield pin("probe", "Probe inputs, asynchronous; their edges latch the position.", probes)
+        text = "Arms probes, each while its bit is high, for the clocks after; synchronous to clk. After reset all are."
+        yield pin("probe_arm", text, probes)
+
+
+def _probe_ports(spec: TachometerSpec) -> Iterable[Port]:
+    probes = range(len(edges_of(spec.probe)))
+    if probes:
+        text = "Probes that have latched and are not armed again. It changes between the ticks as well."
+        yield held(TICK, "probed", len(probes), help=text)
+    for number in probes:
+        yield strobe(valid := f"probe_valid_{number}", f"One clock for every position that probe {number} latches.")
+        text = f"Position at the latched edge of probe {number}, with a count of the same clock."
+        yield held(valid, f"probe_position_{number}", spec.position_width, signed=True, unit="counts", help=text)
+        text = f"Clocks from the last count to the latched edge of probe {number}; it stays at its end."
+        yield held(valid, f"probe_time_{number}", spec.times.probe_width, unit="clocks", help=text)
 
 
 def _compare_ports(spec: TachometerSpec) -> Iterable[Port]:

@@ -15,6 +15,7 @@ from tachometry.spec.core.encoder import Encoder
 from tachometry.spec.core.facts import Facts
 from tachometry.spec.core.latency import Latency
 from tachometry.spec.core.ports import bound_ports, ports_of
+from tachometry.spec.core.probe import PROBE_HELP, parse_probes
 from tachometry.spec.core.recovery import Recovery
 from tachometry.spec.core.scale import Scale
 from tachometry.spec.core.sensors import EDGE, Levels, parse_modulo, parse_state
@@ -89,6 +90,8 @@ class TachometerSpec:
         More illegal transitions in a second are a fault.
     over_speed : Speed or None
         Output `over_speed` trips at a velocity beyond it, and stays so.
+    probe : str
+        Edges at which each probe input latches the position, such as `rising,both`; empty: there is no input.
     compare : Compare or None
         Output `compare` has pulses at these positions.
     chosen : str
@@ -270,6 +273,9 @@ class TachometerSpec:
         parse=parse_speed,
         tests=("", "30rad/s"),
         tacit=True,
+    )
+    probe: str = option(
+        "", PROBE_HELP, metavar="[N|EDGES]", shown="none", parse=parse_probes, tests=("", "3", "both"), tacit=True
     )
     compare: Compare | None = option(  # noqa: RUF009
         None,

@@ -3,6 +3,7 @@
 from fractions import Fraction
 
 from tachometry.spec.core.follows import Follows, S
+from tachometry.spec.core.probe import TIME_WIDTH
 from tachometry.spec.core.timing import MAX_TICK_CYCLES
 
 
@@ -62,6 +63,11 @@ class Times(Follows[S]):
     def longest(self) -> int:
         """Clocks after which an update is forced, with ticks as long as nominal."""
         return self.spec.timing.max_ticks * self.spec.timing.tick_cycles
+
+    @property
+    def probe_width(self) -> int:
+        """Bits of the time from a count to a probe."""
+        return min(self.longest.bit_length(), TIME_WIDTH)
 
     @property
     def standstill_ticks(self) -> int:

@@ -46,6 +46,9 @@ class DemoMap(RegisterMap):
         if not self.spec.encoder.plain:
             raise ParameterError("sensor", "must be quadrature with a demo, its lines as they come: it emulates these")
 
+        if self.spec.probe:
+            raise ParameterError("probe", "must be left out of a demo, which emulates an encoder and no probe")
+
     @cached_property
     def ports(self) -> tuple[Port, ...]:
         """Outputs of the core that are captured, and the time."""

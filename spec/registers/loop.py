@@ -47,12 +47,6 @@ class LoopMap(RegisterMap):
         return self.loop
 
     @cached_property
-    def core_ports(self) -> tuple[Port, ...]:
-        """Ports of the core: `enable` stays, as no program is to be needed to switch a drive off."""
-        written = {field.port for field in self.settings}
-        return (*(port for port in self.loop.ports if port.name not in written), *self.irq_ports)
-
-    @cached_property
     def ports(self) -> tuple[Port, ...]:
         """Ports with the registers, as of `RegisterMap.ports`."""
         shown = (port for port in self.loop.ports.outputs if port.held_by in (CONTROL, CURRENT) and not port.is_strobe)

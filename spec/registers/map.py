@@ -5,7 +5,8 @@ by its sign or by zeros, or two of them if it is wider; ports of one bit are fla
 
 A capture takes all of these in one clock: the position and whatever else belongs to a tick is of the latest tick, the
 velocity and whatever belongs to an update is of the latest update, and the age says how many ticks came after what
-caused it. Only `swallowed_edges`, `over_speed` and what a watch of the encoder shows are of the clock of the capture.
+caused it. Only `swallowed_edges`, `over_speed`, `probed` and what a watch of the encoder shows are of the clock of the
+capture.
 Reading the first captured register, VELOCITY, captures, and the others keep what was captured until the next capture.
 Before the first update the velocity is 0, and what else has a unit and belongs to an update is not defined.
 """
@@ -20,8 +21,9 @@ from functools import cached_property
 from typing import Any
 
 from tachometry.spec.control import AnySpec
+from tachometry.spec.core.probe import edges_of, packed_edges
 from tachometry.spec.core.tachometer import TachometerSpec
-from tachometry.spec.language.port import COMPARE, INDEX, TICK, UPDATE, WIDE, Port
+from tachometry.spec.language.port import INDEX, UPDATE, WIDE, Port
 from tachometry.spec.registers.field import WORD, Draft, Field, Register
 from tachometry.spec.registers.manifest import manifest
 
@@ -35,7 +37,6 @@ _CONTROLS = {
     "preset": "Writing 1 sets the position to PRESET.",
     "home": "Writing 1 lets the next index be taken.",
 }
-_LIVE = (TICK, UPDATE, INDEX, COMPARE)  # what is captured is new with these strobes
 _DESCRIBED = ("name", "low", "width", "access", "reset", "signed", "unit", "port", "shift")  # in the manifest
 
 
@@ -55,7 +56,14 @@ class RegisterMap:
     @cached_property
     def registers(self) -> tuple[Register, ...]:
         """In the order of their offsets, which follow each other without a gap."""
-        drafts = (*self._head(), *self._captured(), *self._placing(), *self._added(), *self._interrupting())
+        drafts = (
+            *self._head(),
+            *self._captured(),
+            *self._placing(),
+            *self._probing(),
+            *self._added(),
+            *self._interrupting(),
+        )
         return tuple(
             Register(name, number * WORD // 8, help, fields, **more)
             for number, (name, help, fields, more) in enumerate(drafts)
@@ -82,8 +90,9 @@ class RegisterMap:
 
     @property
     def core_ports(self) -> tuple[Port, ...]:
-        """Ports that the core has beside those of the bus."""
-        return (*self.core.ports, *self.irq_ports)
+        """Ports that the core has beside those of the bus; what is written is no input."""
+        written = {field.port for field in self.settings}
+        return (*(port for port in self.core.ports if port.name not in written), *self.irq_ports)
 
     @property
     def irq_ports(self) -> tuple[Port, ...]:
@@ -104,6 +113,8 @@ class RegisterMap:
             found["fault"] = "A fault of the encoder was seen, see health."
         if self.spec.over_speed is not None:
             found["over_speed"] = f"A velocity was beyond {self.spec.over_speed}."
+        if self.spec.probe:
+            found["probe"] = "A probe has latched a position."
         return found
 
     @property
@@ -114,7 +125,8 @@ class RegisterMap:
     @cached_property
     def ports(self) -> tuple[Port, ...]:
         """Outputs of the core that are captured."""
-        return tuple(port for port in self.core.ports.outputs if port.held_by in _LIVE and not port.is_strobe)
+        live = {strobe for strobe, names in self.spec.ports.strobes.items() if names}
+        return tuple(port for port in self.core.ports.outputs if port.held_by in live and not port.is_strobe)
 
     @property
     def strobes(self) -> tuple[str, ...]:
@@ -287,6 +299,18 @@ class RegisterMap:
             more: dict[str, Any] = {"unit": "counts", "bits": width, "least": 0, "most": spec.modulus - 1}
             field = Field("value", WORD, help=help, writable=True, port="modulo_offset", **more)
             yield "MODULO_OFFSET", help, (field,), {}
+
+    def _probing(self) -> Iterable[Draft]:
+        """Return registers that arm probes, and choose their edges."""
+        probes = len(edges_of(self.spec.probe))
+        if not probes:
+            return
+        arms = Field("arm", probes, help="A bit for each probe.", writable=True, single=True, port="probe_arm")
+        yield "PROBE_ARM", "Writing 1 arms a probe: it latches at its next edge.", (arms,), {}
+        text = "Two bits for each probe, the first lowest: 1 rises, 2 falls, 3 both, 0 none."
+        edges = packed_edges(self.spec.probe)
+        field = Field("edges", 2 * probes, help=text, writable=True, reset=edges, port="probe_edges")
+        yield "PROBE_EDGES", "Edges at which probes latch.", (field,), {}
 
     def _added(self) -> Iterable[Draft]:
         """Return what a design around the core adds."""

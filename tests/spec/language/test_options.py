@@ -105,15 +105,16 @@ def test_every_option_does_what_it_says() -> None:
         "lines",
         "cpr",
         "pole-pairs",
+        "missing-teeth",
         "pwm",
         "health",
         "health-edges",
         "health-errors",
         "over-speed",
-        "missing-teeth",
         "preset",
         "index-once",
         "position-modulo",
+        "probe",
         "compare",
     } == {word.split("=")[0] for word in texts.split()}
 

@@ -1,0 +1,156 @@
+"""Probes against their rules clock by clock, and a core with probes against the golden model."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from proofs.source import mutant
+from support.nightly import nightly
+from support.simulate import clock_by_clock
+from support.verilog import play_native
+
+from tachometry.hdl.front_end import probe_latch
+from tachometry.sim.encoder.stress import stress
+from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.golden.registers import Access, GoldenBank
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.studies.lockstep import lockstep
+from tachometry.spec import TachometerSpec, of_texts
+from tachometry.spec.registers.map import RegisterMap
+
+BASE = {"ppr": "25", "clock": "1MHz", "tick": "20clk", "max-time": "60clk", "probe": "rising,falling,both"}
+SEEN = ["probed", *(f"probe_{name}_{k}" for k in range(2) for name in ("valid", "position", "time"))]
+END = 15  # of a time of four bits
+
+
+def check(seed: int, latency: int) -> None:
+    """Two probes with edges of their own, which change, on levels, steps and arms at random."""
+    rng = np.random.default_rng(seed)
+    rows, position = [], 0
+    held = {"level": 0, "edges": 0b0110}
+    for clock in range(400):
+        held |= {"edges": int(rng.integers(16))} if rng.random() < 0.02 else {}
+        held |= {"level": int(rng.integers(4))} if rng.random() < 0.3 else {}
+        step = int(rng.choice([-1, 1])) if rng.random() < (0.5 if clock % 100 < 50 else 0.03) else 0
+        arm = int(rng.integers(4)) if rng.random() < 0.2 else 0
+        rows.append({**held, "ready": 3 if clock > 5 else 0, "step": step, "arm": arm})
+    sums = np.cumsum([row["step"] for row in rows])
+    for clock, row in enumerate(rows):  # the position of the next clock has the steps up to that of `latency` − 1 ago
+        at = clock - latency + 1
+        row["position"] = int(sums[at] + 16) % 32 - 16 if at >= 0 else 0
+    seen = clock_by_clock(probe_latch.ProbeLatch(0b0110, 2, 5, 4, latency), rows, SEEN)
+    probed, wanted = [0, 0], dict.fromkeys(SEEN, 0)
+    for clock in range(1, len(rows)):
+        known, at = clock - 1, clock - latency  # the clock before, and that of the edge
+        for probe in range(2):
+            wanted[f"probe_valid_{probe}"] = 0
+            edge = False
+            if at > 0 and rows[at]["ready"]:
+                before, now = (rows[row]["level"] >> probe & 1 for row in (at - 1, at))
+                asked = rows[known - 1]["edges"] >> 2 * probe
+                edge = (now > before and bool(asked & 1)) or (now < before and bool(asked & 2))
+            if edge and not probed[probe]:
+                counts = [row for row in range(at + 1) if rows[row]["step"]]
+                position = int(sums[at] + 16) % 32 - 16
+                wanted[f"probe_valid_{probe}"] = 1
+                wanted[f"probe_position_{probe}"] = position
+                wanted[f"probe_time_{probe}"] = min(at - counts[-1], END) if counts else END
+            probed[probe] = int((probed[probe] or edge) and not rows[known]["arm"] >> probe & 1)
+        wanted["probed"] = probed[0] | probed[1] << 1
+        assert seen[clock] == wanted, (seed, latency, clock)
+    assert position
+
+
+@pytest.mark.parametrize("latency", [2, 3])
+def test_every_clock_is_as_the_rules_say(latency: int) -> None:
+    check(0, latency)
+
+
+@nightly  # it asks what the test above notices
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("~self.probed)", "self.probed)"),
+        ("& ~self.arm", ""),
+        ("self.probed | edge", "edge"),
+        ("~since.all()", "1"),
+        ("level & ~past & rising", "level & ~past"),
+        ("~level & past & falling", "~level & past & rising"),
+        ("Mux(step, 0,", "Mux(step, 1,"),
+        ("ready & (", "("),
+    ],
+)
+def test_mutants_are_noticed(right: str, wrong: str) -> None:
+    with mutant(probe_latch.ProbeLatch, right, wrong), pytest.raises(AssertionError):
+        check(0, 2)
+
+
+@pytest.mark.parametrize("clocks", [0, 2])
+def test_an_edge_of_a_probe_and_a_count_of_the_same_clock_are_in_order(clocks: int) -> None:
+    """A rises in clock 20, and the probe in a clock before it, with it, and after it."""
+    spec = of_texts("s", BASE | {"probe": "rising", "filter": f"{clocks}clk"})
+    for at, position, time in ((19, 0, 127), (20, 1, 0), (21, 1, 1)):
+        changes = np.array([0, min(at, 20), max(at, 20)] if at != 20 else [0, 20])
+        a, probe = ((changes >= edge).astype(np.uint8) for edge in (20, at))
+        trace = PinTrace(changes, a, np.zeros_like(a), 80, probe=probe, more={"probe_arm": np.zeros_like(a)})
+        found = lockstep(spec, trace, PySim())
+        assert found.n_mismatches == 0, found.first
+        latched = found.actual.tables["probe_valid_0"]
+        assert latched.probe_position_0.tolist() == [position]
+        assert latched.probe_time_0.tolist() == [min(time, 2**spec.times.probe_width - 1)]
+        assert latched.clock.tolist() == [at + spec.latency.entries["pin_to_probe"]]
+
+
+CORES = {
+    "s": ("s", {"index": "yes", "index-reset": "yes"}),
+    "filter": ("m", {"filter": "3clk", "max-speed": "100rev/s", "position-width": "8"}),
+}
+
+
+@pytest.mark.parametrize("case", CORES)
+def test_hardware_is_the_golden_model(case: str) -> None:
+    method, more = CORES[case]
+    spec = of_texts(method, BASE | more)
+    found = lockstep(spec, stress(spec, seed=1, n_edges=40), PySim())
+    assert found.n_mismatches == 0, found.first
+    assert all(len(found.actual.tables[f"probe_valid_{probe}"]) > 10 for probe in range(3))
+
+
+def case_on_a_bus() -> tuple[TachometerSpec, RegisterMap, PinTrace, list[Access]]:
+    """Return a core, its motion, and reads and writes of all registers, most of them those of probes."""
+    spec = of_texts("s", BASE)
+    trace = stress(spec, seed=2, n_edges=40).until(2500)
+    registers = RegisterMap(spec, irq=True)
+    rng = np.random.default_rng(1)
+    places = {register.name: register.offset // 4 for register in registers}
+    accesses = []
+    for clock in range(5, trace.n_clocks - 1, 3):
+        address, data = int(rng.integers(len(places))), None
+        if rng.random() < 0.2:
+            name = rng.choice(
+                ["PROBE_ARM", "PROBE_EDGES", "INTERRUPT_ENABLE", "INTERRUPT_CLEAR"], p=[0.6, 0.1, 0.1, 0.2]
+            )
+            address, data = places[str(name)], int(rng.integers(1 << 8))
+        accesses.append(Access(clock, address, data))
+    return spec, registers, trace, accesses
+
+
+def test_registers_and_interrupt_of_exported_verilog(tmp_path: Path) -> None:
+    spec, registers, trace, accesses = case_on_a_bus()
+    rows: list[dict[str, int]] = [{"capture": 0, "read": 0, "write": 0} for _ in range(trace.n_clocks)]
+    for clock, *levels in zip(trace.clock.tolist(), trace.a, trace.b, trace.lines["probe"], strict=True):
+        rows[clock] |= dict(zip(("a", "b", "probe"), map(int, levels), strict=True))
+    for access in accesses:
+        kind = {"read": 1} if access.data is None else {"write": 1, "write_data": access.data}
+        rows[access.clock] |= {"address": access.address, **kind}
+    seen = play_native(spec, tmp_path, rows, ["reg_read_data", "reg_error", "irq"], irq=True)
+    bank = GoldenBank(registers, trace)
+    told = set()
+    for access, (data, error) in zip(accesses, bank.answers(accesses), strict=True):
+        got = seen[access.clock + 1][0] if data is not None else None, bool(seen[access.clock + 1][1])
+        assert got == (data, error), f"{access}: {got}, not {data}, {error}"
+        name = registers.registers[access.address].name
+        told |= {(name, data)} if name.startswith("PROBE") else set()
+    assert len(told) > 20
+    assert [bool(row[2]) for row in seen] == bank.irq(accesses, trace.n_clocks)[: len(seen)]
+    assert len(bank.interrupts()["probe"]) > 10
