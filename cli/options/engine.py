@@ -28,8 +28,8 @@ _OPTIONS = [
         "--pulse",
         metavar="INPUT:TIME,TIME…",
         multiple=True,
-        help="Input preset (with --preset) or home (with --index-once) rises at these times, such as "
-        "preset:20ms,35ms or home:960clk. It can be given for each input.",
+        help="Input preset (with --preset), home (with --index-once) or probe_0 (with --probe) rises at these times, "
+        "such as preset:20ms,35ms or home:960clk. It can be given for each input.",
     ),
     option(
         _SIMULATION,
@@ -75,10 +75,10 @@ def _pulses(spec: TachometerSpec, texts: tuple[str, ...]) -> dict[str, Ints]:
     apart = 2 * (spec.filter_clocks + 1)  # high and low as long as the filter asks for
     for text in texts:
         name, colon, times = text.partition(":")
-        if name not in spec.controls or name in found or not colon:
-            if not spec.controls:
-                raise ParameterError("pulse", "must be given together with --preset or --index-once, whose inputs rise")
-            inputs = " or ".join(spec.controls)
+        if name not in spec.pulsed or name in found or not colon:
+            if not spec.pulsed:
+                raise ParameterError("pulse", "must be given together with --preset, --index-once or --probe")
+            inputs = " or ".join(spec.pulsed)
             raise ParameterError("pulse", f"must be INPUT:TIME,TIME…, once for each input, {inputs}, not {text!r}")
         clocks = np.sort([_clock("pulse", time, spec) for time in times.split(",")])
         if len(near := np.flatnonzero(np.diff(clocks) < apart)):

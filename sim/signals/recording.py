@@ -247,15 +247,18 @@ class PinTrace(_Lines):
     def with_pulses(self, name: str, rises: NDArray[np.int64], width: int = 1) -> "PinTrace":
         """Return the same trace with a line that is high for `width` clocks from each of the clocks `rises`.
 
-        They increase by more than `width`; those from `n_clocks` on are left out.
+        They increase by more than `width`; those from `n_clocks` on are left out. Of a line with several bits the name
+        ends in the number of one, such as probe_1.
         """
+        line, _, bit = name.partition("_") if name[-1].isdecimal() else (name, "", "0")
         rises = rises[rises < self.n_clocks]
         clock = merged(self.clock, rises, rises + width)
         clock = clock[clock < self.n_clocks]
         held = np.searchsorted(self.clock, clock, side="right") - 1
         lines = {name: line[held] for name, line in self.lines.items()}
         ends = np.searchsorted(rises + width, clock, side="right")
-        lines[name] = (np.searchsorted(rises, clock, side="right") > ends).astype(np.uint8)
+        high = (np.searchsorted(rises, clock, side="right") > ends).astype(np.uint8) << np.uint8(bit)
+        lines[line] = lines.get(line, np.uint8(0)) & ~np.uint8(1 << int(bit)) | high
         return PinTrace.of_lines(clock, self.n_clocks, lines)
 
     def with_tick_in(self, rises: NDArray[np.int64]) -> "PinTrace":

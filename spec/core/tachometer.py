@@ -15,7 +15,7 @@ from tachometry.spec.core.encoder import Encoder
 from tachometry.spec.core.facts import Facts
 from tachometry.spec.core.latency import Latency
 from tachometry.spec.core.ports import bound_ports, ports_of
-from tachometry.spec.core.probe import PROBE_HELP, parse_probes
+from tachometry.spec.core.probe import PROBE_HELP, edges_of, parse_probes
 from tachometry.spec.core.recovery import Recovery
 from tachometry.spec.core.scale import Scale
 from tachometry.spec.core.sensors import EDGE, Levels, parse_modulo, parse_state
@@ -324,6 +324,11 @@ class TachometerSpec:
     def controls(self) -> tuple[str, ...]:
         """Inputs whose rises a program or a switch makes."""
         return ("preset",) * (self.preset is not None) + ("home",) * self.index_once
+
+    @property
+    def pulsed(self) -> tuple[str, ...]:
+        """Inputs that a simulation may let rise: `controls`, and probes by their numbers."""
+        return (*self.controls, *(f"probe_{number}" for number in range(len(edges_of(self.probe)))))
 
     @property
     def moves_position(self) -> bool:

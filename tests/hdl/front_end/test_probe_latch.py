@@ -88,16 +88,16 @@ def test_mutants_are_noticed(right: str, wrong: str) -> None:
 @pytest.mark.parametrize("clocks", [0, 2])
 def test_an_edge_of_a_probe_and_a_count_of_the_same_clock_are_in_order(clocks: int) -> None:
     """A rises in clock 20, and the probe in a clock before it, with it, and after it."""
-    spec = of_texts("s", BASE | {"probe": "rising", "filter": f"{clocks}clk"})
+    spec = of_texts("s", BASE | {"probe": "2", "filter": f"{clocks}clk"})
+    edge = PinTrace(np.array([0, 20]), np.array([0, 1], np.uint8), np.zeros(2, np.uint8), 80)
     for at, position, time in ((19, 0, 127), (20, 1, 0), (21, 1, 1)):
-        changes = np.array([0, min(at, 20), max(at, 20)] if at != 20 else [0, 20])
-        a, probe = ((changes >= edge).astype(np.uint8) for edge in (20, at))
-        trace = PinTrace(changes, a, np.zeros_like(a), 80, probe=probe, more={"probe_arm": np.zeros_like(a)})
+        trace = edge.with_pulses("probe_1", np.array([at]), 40).completed(spec)
         found = lockstep(spec, trace, PySim())
         assert found.n_mismatches == 0, found.first
-        latched = found.actual.tables["probe_valid_0"]
-        assert latched.probe_position_0.tolist() == [position]
-        assert latched.probe_time_0.tolist() == [min(time, 2**spec.times.probe_width - 1)]
+        assert not len(found.actual.tables["probe_valid_0"])
+        latched = found.actual.tables["probe_valid_1"]
+        assert latched.probe_position_1.tolist() == [position]
+        assert latched.probe_time_1.tolist() == [min(time, 2**spec.times.probe_width - 1)]
         assert latched.clock.tolist() == [at + spec.latency.entries["pin_to_probe"]]
 
 
