@@ -60,7 +60,7 @@ class IndexCapture(wiring.Component):
         m = Module()
         level, ready = delay(m, self.level_z, self.ready, clocks=self._latency - 2)
         past_z = Signal()
-        seen = Signal() if self._once else self.rises
+        seen = Signal(name="seen") if self._once else self.rises
         m.d.sync += [
             past_z.eq(level),
             seen.eq(level & ~past_z & ready),

@@ -44,7 +44,10 @@ class GapFiller(wiring.Component):
         halves = Signal(range(wheel.most_halves + 1))
         known = Signal()  # the period is of two teeth in a row
         place = Signal(range(wheel.teeth))  # teeth to come until the gap
-        long, here, ends, found = Signal(), Signal(), Signal(), Signal()
+        long = Signal()
+        here = Signal()
+        ends = Signal()
+        found = Signal()
         latest = Signal.like(period)
         m.d.comb += [
             long.eq(since == wheel.longest),

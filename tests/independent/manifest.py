@@ -31,7 +31,6 @@ _SHARED = {
     "edge_error": "edge-error",
     "lowpass": "lowpass",
     "compare": "compare",
-    "probe": "probe",
     "over_speed": "over-speed",
     "health": "health",
     "health_edges": "health-edges",
@@ -49,7 +48,7 @@ WORDS = {
     "track": {**_SHARED, **_TRACK},
 }
 # Named only where they are asked for.
-_TACIT = ("health", "health_edges", "health_errors", "over_speed", "compare", "probe")
+_TACIT = ("health", "health_edges", "health_errors", "over_speed", "compare")
 _FLAGS = ("index", "index-reset", "age", "bounds", "paper-exact", "whole-cycles", "health")
 # Entries of the acceleration, and its unit for that of the velocity.
 ACCELERATION = ("width", "frac_bits", "unit", "rad_per_s2_per_lsb")

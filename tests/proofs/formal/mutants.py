@@ -66,7 +66,7 @@ MUTANTS = [
     Mutant("x4, filter 3", "p1_phase", GlitchFilter, "held == self._clocks - 1", "held == self._clocks - 2"),
     Mutant("x1, filter 1", "p1_angle", QuadratureDecoder, "~change_b & ~level_b", "~change_b & level_b"),
     Mutant("x4, 2 clocks", "p2_tick", PositionCounter, "step.eq(late)", "step.eq(self.step)"),
-    Mutant("x4, 2 clocks", "p2_open", PositionCounter, "self.position + step", "self.position - step"),
+    Mutant("x4, 2 clocks", "p2_open", PositionCounter, "before + step", "before - step"),
     Mutant("x4, 2 clocks", "p3_count", PulseCounter, "raised.eq(fresh)", "raised.eq(start)"),
     Mutant("x4, 2 clocks", "p3_count", PulseCounter, "raised.eq(fresh)", "raised.eq(fresh + step)"),
     Mutant("x2, 7 clocks", "p3_tick", SamplingClock, "left.eq(start)", "left.eq(start + 1)"),
