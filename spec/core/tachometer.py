@@ -35,72 +35,13 @@ class TachometerSpec:
     """A core of one axis; a method is a subclass, which says what it has of its own.
 
     Its fields are what is asked for, None where nothing is. What follows from them is in small objects: `times`,
-    `widths`, `scale`, `bound`, `latency`, `recovery` and `words`, and `form` has the numbers of the method alone.
+    `widths`, `scale`, `bound`, `latency`, `recovery` and `words`, and `form` has the numbers of the method alone. A
+    value out of range raises ParameterError.
 
     Parameters
     ----------
-    encoder : Encoder
-    timing : Timing
-    unit : str
-        Of `velocity`: `count/tick`, `rad/s`, `rev/s` or `rpm`.
-    frac_bits : int or None
-        One LSB of `velocity` is 2^−frac_bits of its unit. None: 16 in counts per tick, else 10; fewer if
-        there cannot be as many, or if with `max_speed` the velocity would not fit `velocity_width`.
-    velocity_width : int or None
-        Bits of `velocity`. With fewer than it can need, it saturates and raises `velocity_overflow`; `max_speed` must
-        fit. None: as many as it can need.
-    max_speed : Speed or None
-        Greatest speed to be measured. It narrows every number that depends on it; pulses beyond it saturate m_e and
-        raise `overflow`. None: as wide as the tick has clocks.
-    position_width : int
-        Bits of `position`, which wraps.
-    filter_clocks : int
-        A level is accepted after so many stable clocks, and reported so many clocks late; 0 for no filter.
-    index : bool
-        A rising index line Z captures the position.
-    index_reset : bool
-        The index also sets the position to 0.
-    index_at : str
-        Where the index is taken: `edge`, where Z rises, or a state of the lines, `A=1,B=1`, while Z is high.
-    index_once : bool
-        The index is taken once, after the input `home` has risen; output `homed` tells that it was.
-    preset : int or None
-        Position that a rise of the input `preset` sets; with registers, that which their register begins with.
-    position_modulo : str or None
-        Output `position_modulo`, the position within so many counts: a number, `rev` for those of a revolution, or
-        `rev/4` for a quarter of them.
-    external_tick : bool
-        Ticks come from outside; the tick of `timing` is their nominal period.
-    max_tick_cycles : int or None
-        External ticks are this many clocks apart at most. None: two nominal ticks.
-    age : bool
-        Output `age`: ticks since the update.
-    bounds : bool
-        Outputs `velocity_lower` and `velocity_upper`, which enclose the true mean speed over the measured window, and
-        `bounds_valid`; for a disc and lines whose edges are within `edge_error`, while no count is lost or added.
-    edge_error : Fraction
-        The distance of any two edges is off by at most so many counts, 0 to 1; it is rounded up to eighths.
-    lowpass : Fraction or None
-        G of the low-pass filter for fluctuating measurement time, eq. (22) of Tsuji 2009, in rad/s; None: no filter.
-    health : bool
-        Watch the encoder: outputs `health`, `faults`, `fault`, and with an index `index_error`.
-    health_edges : int
-        So many edges of a line within a second, and none of the other, are a fault of the other.
-    health_errors : int
-        More illegal transitions in a second are a fault.
-    over_speed : Speed or None
-        Output `over_speed` trips at a velocity beyond it, and stays so.
-    probe : str
-        Edges at which each probe input latches the position, such as `rising,both`; empty: there is no input.
-    compare : Compare or None
-        Output `compare` has pulses at these positions.
     chosen : str
         Why this method was taken, where none was named; empty: it was named.
-
-    Raises
-    ------
-    ParameterError
-        If a parameter is out of range.
     """
 
     encoder: Encoder
