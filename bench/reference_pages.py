@@ -124,8 +124,8 @@ from the same map as the gates.
 
 A capture takes in one clock all that the core shows: the position and whatever else belongs to a tick are of the latest
 tick, the velocity and whatever else belongs to an update are of the latest update, and `age` says how many ticks came
-after what caused that. Only `swallowed_edges`, `over_speed` and what `--health` shows
-are of the clock of the capture. There are two ways to capture:
+after what caused that: a position that `preset` has set is there from the next tick on. Only `swallowed_edges`,
+`over_speed`, and what `--health` and `--probe` show are of the clock of the capture. There are two ways to capture:
 
 - Reading VELOCITY, or VELOCITY_LOW where there are two words, captures, and answers with what has just been captured.
   This is enough for one program that polls.

@@ -19,6 +19,7 @@ from tachometry.sim.signals.run import Run
 from tachometry.sim.signals.tables import HeldVelocity, VelocityError, held_from, held_velocity, velocity_error
 from tachometry.sim.studies.lockstep import Lockstep, lockstep
 from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
+from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.units import format_time
 from tachometry.spec.methods.axis import WARM_UP
 
@@ -124,6 +125,9 @@ def simulate(
     trace = _placed(spec, recordings)
     if pulses is not None and isinstance(trace, PinTrace):
         for name, rises in pulses(spec.tachometer).items():
+            if len(rises) and not 0 < rises[0] <= rises[-1] < trace.n_clocks:  # in clock 0 it would be high, not rise
+                end = format_time(spec.times.seconds(trace.n_clocks))
+                raise ParameterError("pulse", f"must have times after 0 and before the end of {source}, at {end}")
             trace = trace.with_pulses(name, rises, spec.tachometer.filter_clocks + 1)
     fewest = spec.times.longest_tick + spec.latency.tick  # after which there is something to report
     if trace.n_clocks < fewest:

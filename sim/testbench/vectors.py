@@ -30,6 +30,7 @@ _BENCH = files(__package__) / "templates" / "test_NAME.py"
 # Clocks of the motion, and five times as many of the standstill after it: Icarus takes some 40,000 a second.
 _MOVING = 160_000
 _FEWEST_TICKS, _MOST_TICKS = 3, 1000
+_ARM = "probe_arm"  # an input, or a register on a bus, which no bench writes
 _MOST_BENCH_TICKS = 2_000_000  # of which each is a row of text
 
 
@@ -65,17 +66,19 @@ def cocotb_bench(core: AnySpec, name: str, recordings: Sequence[Recording] | Non
 
 
 def bench_of(core: AnySpec, name: str, traces: Sequence[PinTrace]) -> dict[str, str]:
-    """Return the same with what the pins of each axis see."""
+    """Return the same with what the pins of each axis see; probes latch once, as on a bus nothing arms them."""
+    traces = [PinTrace.of_lines(trace.clock, trace.n_clocks, trace.lines | _unarmed(trace)) for trace in traces]
     text = json.dumps(_vectors(core, traces), separators=(",", ":")).replace("[[", "[\n[").replace("],", "],\n") + "\n"
     return {f"test_{name}.py": notice("#") + _BENCH.read_text(encoding="utf-8"), f"{name}_vectors.json": text}
 
 
 def _vectors(core: AnySpec, traces: Sequence[PinTrace]) -> dict[str, Any]:
     """Return the content of `NAME_vectors.json`; test_NAME.py says what stands where."""
-    pins, changes, run = _put(core, traces)
+    pins, (clock, *levels), run = _put(core, traces)
+    driven = {pin: level for pin, level in zip(pins, levels, strict=True) if pin != _ARM}
     if not len(run.ticks.clock):
         raise ParameterError("motion", f"must last for a tick, not for {run.n_clocks} clocks")
-    inputs = {"clocks": run.n_clocks, "pins": pins, "changes": _rows(*changes)}
+    inputs = {"clocks": run.n_clocks, "pins": [*driven], "changes": _rows(clock, *driven.values())}
     return {
         "generator": generator(),
         "license": LICENSE,
@@ -83,6 +86,10 @@ def _vectors(core: AnySpec, traces: Sequence[PinTrace]) -> dict[str, Any]:
         **inputs,
         "strobes": strobe_rows(run, holds=core.axes is None),
     }
+
+
+def _unarmed(trace: PinTrace) -> dict[str, NDArray[np.uint8]]:
+    return {_ARM: np.zeros_like(trace.lines[_ARM])} if _ARM in trace.lines else {}
 
 
 def digest_of(vectors: Mapping[str, Any]) -> str:

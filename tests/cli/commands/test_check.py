@@ -23,7 +23,7 @@ from tachometry.spec.language import provenance
 
 SMALL = "--ppr 8 --clock 1MHz --tick 8us --max-time 160us --max-speed 2000rad/s --method"
 CORES = {
-    "s": f"{SMALL} s --bus axi-lite --irq --testbench cocotb --ci github",
+    "s": f"{SMALL} s --bus axi-lite --irq --probe 2 --testbench cocotb --ci github",
     "rio": f"{SMALL} t --for rio --ci gitlab",
     "litex": f"{SMALL} mt --for litex --index",
     "axes": f"{SMALL} s --axes 3 --tick 20us --testbench cocotb",
