@@ -45,7 +45,9 @@ def test_every_pair_of_options(method: str, part: int, tmp_path: Path) -> None:
 def check(words: tuple[str, ...], folder: Path, motions: int, left: int) -> None:
     folder.mkdir(exist_ok=True)
     spec = spec_of(words)
-    trace = stress(spec, 1, 300 if spec.timing.tick_cycles < 100 else 200)
+    # Long windows and what waits for the filter give few updates.
+    rare = {"--min-time", "--lowpass"} & {*words}
+    trace = stress(spec, 1, 400 if rare else 300 if spec.timing.tick_cycles < 100 else 200)
     n_clocks = trace.n_clocks + min(left, motions * stress(spec, 2, EDGES).n_clocks)
     verilator = LintingVerilator(folder, few=n_clocks < 500_000)
     engine: CompiledEngine = verilator
@@ -56,8 +58,6 @@ def check(words: tuple[str, ...], folder: Path, motions: int, left: int) -> None
     assert found.n_mismatches == 0, found.first
     # All that the configuration can show has happened.
     actual, updates = found.actual, found.actual.updates
-    # Long windows and what waits for the filter give few updates.
-    rare = {"--min-time", "--lowpass"} & {*words}
     assert np.count_nonzero(~updates.forced) > (5 if rare else 100)
     if "--paper-exact" not in words:
         assert spec.method == "m" or np.count_nonzero(updates.forced) > 1
