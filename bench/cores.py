@@ -26,6 +26,7 @@ from tachometry.spec import (
     TTachometer,
 )
 from tachometry.spec.control import AnySpec, LoopSpec
+from tachometry.spec.core.compare import Compare
 from tachometry.spec.registers.buses import BUSES, bus_of, ports_on
 from tachometry.spec.registers.demo import DemoMap, demo_manifest, demo_ports
 
@@ -108,7 +109,7 @@ EVERY_CLOCK_BARS = {
 }
 TRACK_BARS = {
     "ECP5": {"COMB": 1100, "FF": 850, "MULT": 0, "Fmax": 60},
-    "UP5K": {"Fmax": 12},
+    "UP5K": {"Fmax": 24},
 }
 # The reference core, and 250 COMB and 100 FF for the bank.
 BUS_BARS = {"ECP5": {"COMB": 265 + 250, "FF": 260 + 100}}
@@ -189,6 +190,10 @@ CONFIGURATIONS = (
     Configuration("index-reset", "and resets it", replace(REFERENCE, index=True, index_reset=True)),
     Configuration("index-once", "and is taken once", replace(REFERENCE, index=True, index_once=True)),
     Configuration("preset", "position is set by an input", replace(REFERENCE, preset=0)),
+    Configuration("probe", "a probe latches position and time", replace(REFERENCE, probe="rising")),
+    Configuration("compare", "pulses at positions", replace(REFERENCE, compare=Compare(100, 100, 50, "10us"))),
+    Configuration("over-speed", "trips at 900 rad/s", replace(REFERENCE, over_speed=Speed.parse("900rad/s"))),
+    Configuration("health", "faults of lines and index", replace(REFERENCE, index=True, health=True)),
     Configuration("position-modulo", "position within a revolution", replace(REFERENCE, position_modulo="rev")),
     Configuration(
         "external-tick",
@@ -286,7 +291,7 @@ CONFIGURATIONS = (
         "track-block",
         "tracking, 1000 rad/s, multiplier of the FPGA",
         TrackTachometer(**COMMON, max_speed=MAX_SPEED, multiplier="block"),
-        {"ECP5": {"COMB": 1500, "FF": 900, "MULT": 3, "Fmax": 60}},
+        {"ECP5": {"COMB": 1500, "FF": 900, "MULT": 3, "Fmax": 60}, "UP5K": {"Fmax": 24}},
         is_option=False,
         targets=("ECP5", "UP5K"),
     ),

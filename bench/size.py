@@ -181,6 +181,7 @@ PAGE_HEAD = """\
 - Latency is from `tick` to `velocity_valid`, which come together with many axes; of a core with a control loop, from
   `control_tick` to `current_valid`.
 - The column "what limits Fmax" has the longest path of the median seed, from register to register, as `box.signal`.
+- Fmax 0 is of a seed whose placement nextpnr cannot route.
 - Only cores whose Fmax has a bar are routed. `python bench/size.py --only NAME` routes any of them.
 
 """
