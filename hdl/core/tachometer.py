@@ -31,7 +31,7 @@ from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput, Seria
 from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import follow, members
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.probe import edges_of, packed_edges
+from tachometry.spec.core.probe import packed_edges
 from tachometry.spec.language.port import UPDATE
 
 
@@ -55,7 +55,7 @@ class Tachometer(wiring.Component):
     def __init__(self, spec: TachometerSpec) -> None:
         self._spec = spec
         super().__init__(members(spec.ports))
-        self.conditioner = InputConditioner(spec.filter_clocks, (*spec.lines, *self._probes(spec)))
+        self.conditioner = InputConditioner(spec.filter_clocks, (*spec.lines, *spec.probes))
         self.decoder = decoder_of(spec.encoder, spec.wheel)
         self.pulse_counter = PulseCounter(
             max(spec.times.longest_tick, spec.widths.max_pulse_count),
@@ -75,9 +75,8 @@ class Tachometer(wiring.Component):
             self.index_state = IndexState(spec.index_state, after, spec.latency.tick)
         self.probe_latch: ProbeLatch | None = None
         if spec.probe:
-            edges, probes = packed_edges(spec.probe), len(edges_of(spec.probe))
             widths = spec.position_width, spec.times.probe_width
-            self.probe_latch = ProbeLatch(edges, probes, *widths, spec.latency.tick)
+            self.probe_latch = ProbeLatch(packed_edges(spec.probe), len(spec.probes), *widths, spec.latency.tick)
         self.watch: EncoderWatch | None = None
         if spec.health:
             self.watch = EncoderWatch(
@@ -318,17 +317,12 @@ class Tachometer(wiring.Component):
             follow(m, watch, self.index_capture, ("index_valid", "index_position"))
             follow(m, self, watch, ("index_error",))
 
-    @staticmethod
-    def _probes(spec: TachometerSpec) -> list[str]:
-        """Return the names of the probe inputs, as lines."""
-        return [f"probe_{number}" for number in range(len(edges_of(spec.probe)))]
-
     def _probe(self, m: Module) -> None:
         """Latch the position at edges of probe inputs, if there are any."""
         if self.probe_latch is None:
             return
         m.submodules.probe_latch = latch = self.probe_latch
-        names = self._probes(self._spec)
+        names = self._spec.probes
         m.d.comb += [
             *(getattr(self.conditioner, name).eq(level) for name, level in zip(names, self.probe, strict=True)),
             latch.level.eq(Cat(getattr(self.conditioner, f"level_{name}") for name in names)),

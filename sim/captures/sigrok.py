@@ -116,7 +116,7 @@ def write_sr(path: str | os.PathLike[str], trace: Trace, clock_hz: int, *, _chun
     if isinstance(trace, AxesTrace):
         level, channels = trace.levels, [_channel(axis, name) for axis, name in trace.names]
     else:
-        level, channels = trace.level.reshape(-1, 1), [name.upper() for name in trace.lines]
+        level, channels = trace.level.reshape(-1, 1), [name.upper() for name in trace.wires]
     with writing(Path(path)) as beside, zipfile.ZipFile(beside, "w") as archive:
         archive.writestr(_member("version"), "2")
         archive.writestr(_member("metadata"), _metadata(clock_hz, channels))

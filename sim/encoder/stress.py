@@ -9,7 +9,6 @@ from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.axes import AxesTrace, Trace
 from tachometry.sim.signals.recording import PinTrace, merged, quadrature
 from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
-from tachometry.spec.core.probe import edges_of
 from tachometry.spec.core.sensors import packed_levels
 
 _SPEEDS = (0.3, 1.01, 1.5, 2.2, 3.25, 0.1)  # counts per tick
@@ -75,16 +74,15 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
 
 def _probed(spec: TachometerSpec, trace: PinTrace, seed: int) -> PinTrace:
     """Return the trace with edges of probes in clocks of edges, beside them and anywhere, armed now and then."""
-    if not spec.probe:
+    if not spec.probes:
         return trace
     rng = np.random.default_rng([seed, 2])
     near = rng.choice(trace.clock, len(trace.clock) // 2) + rng.integers(-2, 3, len(trace.clock) // 2)
     clock = merged(trace.clock, np.clip(near, 0, trace.n_clocks - 1), rng.integers(0, trace.n_clocks, 100))
-    held = np.searchsorted(trace.clock, clock, side="right") - 1
-    lines = {name: line[held] for name, line in trace.lines.items()}
+    lines = trace.at(clock)
     for name, often in (("probe", 0.4), ("probe_arm", 0.2)):
         row = np.maximum.accumulate(np.where(rng.random(len(clock)) < often, np.arange(len(clock)), 0))
-        lines[name] = rng.integers(0, 1 << len(edges_of(spec.probe)), len(clock)).astype(np.uint8)[row]
+        lines[name] = rng.integers(0, 1 << len(spec.probes), len(clock)).astype(np.uint8)[row]
     return PinTrace.of_lines(clock, trace.n_clocks, lines)
 
 

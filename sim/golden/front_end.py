@@ -11,7 +11,6 @@ from tachometry.sim.golden.tooth_wheel import Teeth, filled
 from tachometry.sim.signals.recording import PinTrace, merged, packed
 from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, TachometerSpec
-from tachometry.spec.core.probe import edges_of
 from tachometry.spec.core.sensors import changes as changes_of
 from tachometry.spec.core.sensors import packed_levels
 
@@ -213,7 +212,7 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     at = clock + spec.latency.pin_to_count + (np.arange(len(clock)) == 0)
     changed = packed([line[1:] ^ line[:-1] for line in levels])
     rises = wide = at[:0]
-    seen = [conditioned(f"probe_{number}") for number in range(len(edges_of(spec.probe)))]
+    seen = [conditioned(name) for name in spec.probes]
     probes = tuple((clock_of + spec.latency.pin_to_count, level) for clock_of, level in seen)
     if spec.wheel is not None:
         swallowed = np.sort(np.concatenate(returned)) + 3

@@ -9,7 +9,7 @@ from tachometry.sim.golden.front_end import Steps, positions_at
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.probe import FALLING, RISING, edges_of, packed_edges
+from tachometry.spec.core.probe import FALLING, RISING, packed_edges
 
 Ints = NDArray[np.int64]
 
@@ -87,4 +87,4 @@ def with_probed(spec: TachometerSpec, ticks: Table, found: dict[str, Table]) -> 
     if not spec.probe:
         return ticks
     probed = shown(found["probed"], ticks.clock)
-    return ticks.having(probed=probed if len(edges_of(spec.probe)) > 1 else probed != 0)
+    return ticks.having(probed=probed if len(spec.probes) > 1 else probed != 0)

@@ -9,7 +9,6 @@ from tachometry.sim import golden
 from tachometry.sim.golden import compare, health, probe
 from tachometry.sim.golden.front_end import decoded, homed
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.spec.core.probe import edges_of
 from tachometry.spec.language.port import COMPARE, INDEX, TICK, UPDATE, WIDE
 from tachometry.spec.registers.field import WORD, Field, Register
 from tachometry.spec.registers.map import COUNTER_WIDTH, RegisterMap
@@ -258,10 +257,10 @@ class GoldenBank:
             if access.data is None:
                 continue
             if access.address == named["PROBE_ARM"]:
-                arms |= {access.clock: access.data & (1 << len(edges_of(spec.probe))) - 1}
+                arms |= {access.clock: access.data & (1 << len(spec.probes)) - 1}
                 arms |= {access.clock + 1: 0}
             if access.address == named["PROBE_EDGES"]:
-                edges[access.clock + 1] = access.data & (1 << 2 * len(edges_of(spec.probe))) - 1
+                edges[access.clock + 1] = access.data & (1 << 2 * len(spec.probes)) - 1
         clock = np.unique([*arms, *edges])
         low = np.zeros(len(clock), dtype=np.uint8)
         arm, chosen = (

@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from tachometry.sim.signals.source import Source
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
-from tachometry.spec.core.probe import edges_of
 from tachometry.spec.language.units import format_time
 
-LINES = ("a", "b", "c", "z", "tick_in", "probe")
+LINES = ("a", "b", "c", "z", "tick_in")
 
 # What a computer's memory holds: an edge and a tick take some 300 bytes each on their way to a report.
 MAX_EDGES = 10_000_000
@@ -54,7 +53,6 @@ class _Lines:
     c: NDArray[np.uint8] | None
     z: NDArray[np.uint8] | None
     tick_in: NDArray[np.uint8] | None
-    probe: NDArray[np.uint8] | None
 
     @property
     def lines(self) -> dict[str, NDArray[np.uint8]]:
@@ -63,9 +61,14 @@ class _Lines:
         return {name: line for name, line in every.items() if line is not None} | getattr(self, "more", {})
 
     @property
+    def wires(self) -> dict[str, NDArray[np.uint8]]:
+        """Lines that are one wire: all but those of probes, which have a bit for each."""
+        return {name: line for name, line in self.lines.items() if not name.startswith("probe")}
+
+    @property
     def level(self) -> NDArray[np.uint8]:
-        """A number for each row, with a bit for each of `lines` but of probes, the first lowest."""
-        return packed([line for name, line in self.lines.items() if not name.startswith("probe")])
+        """A number for each row, with a bit for each of `wires`, the first lowest."""
+        return packed([*self.wires.values()])
 
 
 def _split(level: NDArray[np.uint8], lines: Sequence[str]) -> dict[str, NDArray[np.uint8]]:
@@ -94,8 +97,6 @@ class Recording(_Lines):
         Levels of a third line, as of halls. A sensor of one line has 0 in `b`.
     source : Source or None
         Of a capture, what it says of itself.
-    probe : uint8 array, shape (n,), or None
-        Levels of the probe inputs, with a bit for each, the first lowest.
     """
 
     time: NDArray[np.float64]
@@ -106,7 +107,6 @@ class Recording(_Lines):
     tick_in: NDArray[np.uint8] | None = None
     source: Source | None = None
     c: NDArray[np.uint8] | None = None
-    probe: NDArray[np.uint8] | None = None
 
     def __post_init__(self) -> None:
         if not (len(self.time) and _same_length(self.time, *self.lines.values())):
@@ -122,16 +122,6 @@ class Recording(_Lines):
     ) -> "Recording":
         """Return the recording with these lines whose `level` is given."""
         return Recording(time, duration=duration, source=None, **_split(level, lines))
-
-    def with_probes_at(self, times: NDArray[np.float64], spec: TachometerSpec) -> "Recording":
-        """Return the same recording with probe inputs that all rise, fall, rise … at these times, in seconds."""
-        time = np.unique(np.concatenate([self.time, times]))
-        time = time[time <= self.duration]
-        held = np.searchsorted(self.time, time, side="right") - 1
-        lines = {name: line[held] for name, line in self.lines.items()}
-        high = np.searchsorted(np.sort(times), time, side="right") & 1
-        lines["probe"] = (high * ((1 << len(edges_of(spec.probe))) - 1)).astype(np.uint8)
-        return Recording(time, duration=self.duration, source=self.source, **lines)
 
     def place(self, clock_hz: int) -> "PinTrace":
         """Sample the lines at clock edge c = time c / clock_hz; a change between two edges is seen at the later one.
@@ -196,10 +186,9 @@ class PinTrace(_Lines):
         Index line and external tick; None if it is absent.
     c : uint8 array, shape (n,), 0 or 1, or None
         A third line.
-    more : mapping of str to uint8 array, shape (n,), 0 or 1
-        Further inputs by name, such as `preset`; `probe_edges` is what a program has set `ProbeLatch.edges` to.
-    probe : uint8 array, shape (n,), or None
-        Levels of the probe inputs, with a bit for each, the first lowest.
+    more : mapping of str to uint8 array, shape (n,)
+        Further inputs by name, such as `preset`. `probe` and `probe_arm` have a bit for each probe, the first lowest;
+        `probe_edges` is what a program has set `ProbeLatch.edges` to.
     """
 
     clock: NDArray[np.int64]
@@ -210,7 +199,6 @@ class PinTrace(_Lines):
     tick_in: NDArray[np.uint8] | None = None
     c: NDArray[np.uint8] | None = None
     more: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
-    probe: NDArray[np.uint8] | None = None
 
     def __post_init__(self) -> None:
         if not (len(self.clock) and _same_length(self.clock, *self.lines.values())):
@@ -244,6 +232,11 @@ class PinTrace(_Lines):
             self.clock[inside], n_clocks, {name: line[inside] for name, line in self.lines.items()}
         )
 
+    def at(self, clock: NDArray[np.int64]) -> dict[str, NDArray[np.uint8]]:
+        """Return the levels of all lines in these clocks."""
+        held = np.searchsorted(self.clock, clock, side="right") - 1
+        return {name: line[held] for name, line in self.lines.items()}
+
     def with_pulses(self, name: str, rises: NDArray[np.int64], width: int = 1) -> "PinTrace":
         """Return the same trace with a line that is high for `width` clocks from each of the clocks `rises`.
 
@@ -254,8 +247,7 @@ class PinTrace(_Lines):
         rises = rises[rises < self.n_clocks]
         clock = merged(self.clock, rises, rises + width)
         clock = clock[clock < self.n_clocks]
-        held = np.searchsorted(self.clock, clock, side="right") - 1
-        lines = {name: line[held] for name, line in self.lines.items()}
+        lines = self.at(clock)
         ends = np.searchsorted(rises + width, clock, side="right")
         high = (np.searchsorted(rises, clock, side="right") > ends).astype(np.uint8) << np.uint8(bit)
         lines[line] = lines.get(line, np.uint8(0)) & ~np.uint8(1 << int(bit)) | high
@@ -272,8 +264,8 @@ class PinTrace(_Lines):
         if spec.external_tick and self.tick_in is None:
             return self.with_tick_in(nominal_ticks(spec, self.n_clocks)).completed(spec)
         low = {name: np.zeros_like(self.a) for name in spec.controls if name not in self.lines}
-        if probes := len(edges_of(spec.probe)):
-            low |= {"probe": np.zeros_like(self.a), "probe_arm": np.full_like(self.a, (1 << probes) - 1)}
+        if spec.probes:
+            low |= {"probe": np.zeros_like(self.a), "probe_arm": np.full_like(self.a, (1 << len(spec.probes)) - 1)}
         return PinTrace.of_lines(self.clock, self.n_clocks, low | self.lines) if low else self
 
 

@@ -58,9 +58,9 @@ def cocotb_bench(core: AnySpec, name: str, recordings: Sequence[Recording] | Non
         trace = recording.place(spec.timing.clock_hz)
         if spec.external_tick:
             trace = trace.with_tick_in(_external_ticks(spec, trace.n_clocks))
-        for number, control in enumerate(spec.controls):
+        for number, name_of in enumerate(spec.pulsed):
             rises = np.arange(1, 8) * trace.n_clocks // (9 + number)
-            trace = trace.with_pulses(control, rises, spec.filter_clocks + 1)
+            trace = trace.with_pulses(name_of, rises, spec.filter_clocks + 1)
         traces.append(trace.completed(spec))
     return bench_of(core, name, traces)
 
@@ -149,8 +149,7 @@ def usual_motion(spec: TachometerSpec, seed: int = 1, most: int = _MOVING) -> Re
         index_state=spec.index_place,
     )
     usual = _usual_form(spec, most, backward=seed % 2 == 0)
-    recording = encoder.record(parse_motion("+".join([*_to_compare(spec, 5 * most), usual]))).recording
-    return recording.with_probes_at(np.linspace(0, 0.9 * recording.duration, 60)[1:], spec) if spec.probe else recording
+    return encoder.record(parse_motion("+".join([*_to_compare(spec, 5 * most), usual]))).recording
 
 
 def _fastest(spec: TachometerSpec) -> float:

@@ -6,7 +6,7 @@ import math
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from tachometry.spec.core.probe import parse_probes
+from tachometry.spec.core.probe import edges_of
 from tachometry.spec.core.timing import MAX_TICK_CYCLES
 from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS
@@ -43,8 +43,7 @@ def check(spec: TachometerSpec) -> None:
     _check_index_state(spec)
     _check_place(spec)
     _check_health(spec)
-    if spec.probe:
-        parse_probes("probe", spec.probe)
+    edges_of(spec.probe)
     if spec.compare is not None:
         spec.compare.check(spec.timing.clock_hz, spec.position_width)
     if spec.over_speed is not None and spec.scale.over_speed >= spec.scale.full_scale:
@@ -80,7 +79,7 @@ def _check_index_state(spec: TachometerSpec) -> None:
 
 def _check_place(spec: TachometerSpec) -> None:
     if spec.index_once and not spec.index:
-        raise ParameterError("index_once", "must be given together with an index")
+        raise ParameterError("index_once", "must be given together with --index")
     if spec.wheel is not None and spec.controls:
         name = {"preset": "preset", "home": "index_once"}[spec.controls[0]]
         raise ParameterError(name, "must not be given together with --missing-teeth, whose gap is the index")

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from tachometry.spec.core.compare import COUNT_WIDTH
 from tachometry.spec.core.health import FAULT_TEXTS, FAULT_WIDTH, FAULTS_WIDTH
-from tachometry.spec.core.probe import edges_of
 from tachometry.spec.language.port import COMPARE, INDEX, TICK, UPDATE, WIDE, Port, held, pin, strobe
 
 if TYPE_CHECKING:
@@ -171,14 +170,14 @@ def _wrong(spec: TachometerSpec) -> str:
 
 
 def _probe_pins(spec: TachometerSpec) -> Iterable[Port]:
-    if probes := len(edges_of(spec.probe)):
+    if probes := len(spec.probes):
         yield pin("probe", "Probe inputs, asynchronous; their edges latch the position.", probes)
         text = "Arms probes, each while its bit is high, for the clocks after; synchronous to clk. After reset all are."
         yield pin("probe_arm", text, probes)
 
 
 def _probe_ports(spec: TachometerSpec) -> Iterable[Port]:
-    probes = range(len(edges_of(spec.probe)))
+    probes = range(len(spec.probes))
     if probes:
         text = "Probes that have latched and are not armed again. It changes between the ticks as well."
         yield held(TICK, "probed", len(probes), help=text)

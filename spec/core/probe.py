@@ -30,8 +30,8 @@ def parse_probes(what: str, text: str) -> str:
 
 
 def edges_of(probes: str) -> tuple[int, ...]:
-    """Return the edges at which each probe latches: `RISING`, `FALLING` or the sum of both."""
-    return tuple(_EDGES[edge] for edge in probes.split(",")) if probes else ()
+    """Return the edges at which each probe latches, in bits `RISING` and `FALLING`, of what `parse_probes` takes."""
+    return tuple(_EDGES[edge] for edge in parse_probes("probe", probes).split(",")) if probes else ()
 
 
 def packed_edges(probes: str) -> int:

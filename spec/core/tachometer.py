@@ -268,8 +268,13 @@ class TachometerSpec:
 
     @property
     def pulsed(self) -> tuple[str, ...]:
-        """Inputs that a simulation may let rise: `controls`, and probes by their numbers."""
-        return (*self.controls, *(f"probe_{number}" for number in range(len(edges_of(self.probe)))))
+        """Inputs that a simulation may let rise."""
+        return (*self.controls, *self.probes)
+
+    @property
+    def probes(self) -> tuple[str, ...]:
+        """Names of the probe inputs, each a bit of `probe`."""
+        return tuple(f"probe_{number}" for number in range(len(edges_of(self.probe))))
 
     @property
     def moves_position(self) -> bool:

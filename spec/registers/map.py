@@ -21,7 +21,7 @@ from functools import cached_property
 from typing import Any
 
 from tachometry.spec.control import AnySpec
-from tachometry.spec.core.probe import edges_of, packed_edges
+from tachometry.spec.core.probe import packed_edges
 from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.language.port import INDEX, UPDATE, WIDE, Port
 from tachometry.spec.registers.field import WORD, Draft, Field, Register
@@ -289,7 +289,7 @@ class RegisterMap:
                 )
                 yield (
                     f"PRESET{end}",
-                    f"{'' if last and not shift else 'Upper word. ' if shift else 'Lower word. '}{field.help}",
+                    ("Upper word. " if shift else "" if last else "Lower word. ") + field.help,
                     (field,),
                     {},
                 )
@@ -302,7 +302,7 @@ class RegisterMap:
 
     def _probing(self) -> Iterable[Draft]:
         """Return registers that arm probes, and choose their edges."""
-        probes = len(edges_of(self.spec.probe))
+        probes = len(self.spec.probes)
         if not probes:
             return
         arms = Field("arm", probes, help="A bit for each probe.", writable=True, single=True, port="probe_arm")

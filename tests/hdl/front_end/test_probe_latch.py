@@ -1,5 +1,8 @@
 """Probes against their rules clock by clock, and a core with probes against the golden model."""
 
+import re
+import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +13,7 @@ from support.simulate import clock_by_clock
 from support.verilog import play_native
 
 from tachometry.hdl.front_end import probe_latch
+from tachometry.sim.captures.sigrok import write_sr
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.engines.pysim import PySim
 from tachometry.sim.golden.registers import Access, GoldenBank
@@ -154,3 +158,20 @@ def test_registers_and_interrupt_of_exported_verilog(tmp_path: Path) -> None:
     assert len(told) > 20
     assert [bool(row[2]) for row in seen] == bank.irq(accesses, trace.n_clocks)[: len(seen)]
     assert len(bank.interrupts()["probe"]) > 10
+
+
+def test_a_capture_has_the_wires_of_a_core_with_probes(tmp_path: Path) -> None:
+    spec = of_texts("s", BASE | {"probe": "2", "preset": "7"})
+    trace = stress(spec, 3)
+    write_sr(tmp_path / "c.sr", trace, spec.timing.clock_hz)
+    with zipfile.ZipFile(tmp_path / "c.sr") as file:
+        text = file.read("metadata").decode()
+    names = re.findall(r"^probe\d+=(\w+)$", text, re.MULTILINE)
+    assert names == ["A", "B", "Z", "PRESET"]
+    assert trace.level.max() < 1 << len(names)
+    assert np.array_equal(trace.level >> 3, trace.lines["preset"])
+
+
+def test_a_number_of_probes_is_taken_in_python_too() -> None:
+    spec = of_texts("s", BASE | {"probe": "2"})
+    assert replace(spec, probe="2").probes == spec.probes == ("probe_0", "probe_1")
