@@ -12,6 +12,9 @@ def print_checked(results: Sequence[Checked]) -> int:
     """Print what was found of each core; the exit status."""
     console = stdout_console()
     for checked in results:
+        if checked.unchecked:
+            console.print(Text(f"{checked.manifest} was not checked: {checked.unchecked}"), soft_wrap=True)
+            continue
         rows = [(file, found, where) for file, (found, where) in checked.files.items()]
         print_table((str(checked.manifest.parent), "", ""), rows, left=(0, 1, 2))
         name = checked.manifest.stem

@@ -8,8 +8,8 @@ from amaranth.lib import wiring
 from tachometry.hdl.core.bus_tachometer import BusTachometer
 from tachometry.hdl.core.core import core_of
 from tachometry.hdl.export.kit import KIT, kit
-from tachometry.hdl.export.registers.files import register_files
-from tachometry.hdl.export.targets.target import bus_for, check_core, target_files
+from tachometry.hdl.export.registers.files import REGISTER_FILES, register_files
+from tachometry.hdl.export.targets.target import TARGETS, bus_for, check_core, target_files
 from tachometry.hdl.export.verilog import verilog_of
 from tachometry.spec.control import AnySpec
 from tachometry.spec.language.provenance import entries
@@ -73,6 +73,12 @@ def export(
     core = {f"{name}.v": verilog_of(top, described), f"{name}.json": json.dumps(described, indent=2) + "\n"}
     core |= kit(spec, name, on) | files
     return core | target_files(target, spec, name, on, core)
+
+
+def file_names(name: str) -> list[str]:
+    """Return the names of all files that `export` can make for a core of this name, whatever its options."""
+    of_targets = (file for target in TARGETS.values() for file in target.names)
+    return [file.replace("NAME", name) for file in (*CORE_FILES, *REGISTER_FILES, *of_targets)]
 
 
 def manifest_of(

