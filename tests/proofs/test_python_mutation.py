@@ -117,7 +117,7 @@ for verdict in sorted(judge_all(root, jobs, 2, folder, lambda verdict: None), ke
 
 @nightly  # it runs tests anew for each of four wrong lines
 def test_a_wrong_line_is_noticed_by_its_tests_alone(tmp_path: Path) -> None:
-    command = [sys.executable, "-c", SCRIPT, str(ROOT), str(tmp_path)]
+    command = [sys.executable, "-P", "-c", SCRIPT, str(ROOT), str(tmp_path)]
     env = {**os.environ, "PYTHONPATH": str(ROOT / "tests")}
     done = subprocess.run(command, cwd=ROOT, env=env, check=True, capture_output=True, text=True)
     assert done.stdout.split() == ["survived", "timeout", "killed", "untested"]
