@@ -324,6 +324,15 @@ CONFIGURATIONS = (
         )
         for axes, bars in AXES_BARS.items()
     ),
+    Configuration(
+        "axes-8-output-register",
+        "and the block RAM's output register",
+        AxesSpec(tachometer=REFERENCE, axes=8),
+        AXES_BARS[8],
+        is_option=False,
+        targets=("ECP5",),
+        after=inspect.getsource(ecp5_memory),
+    ),
     *(
         Configuration(
             f"axes-track-{axes}",
