@@ -194,6 +194,9 @@ CONFIGURATIONS = (
     Configuration("compare", "pulses at positions", replace(REFERENCE, compare=Compare(100, 100, 50, "10us"))),
     Configuration("over-speed", "trips at 900 rad/s", replace(REFERENCE, over_speed=Speed.parse("900rad/s"))),
     Configuration("health", "faults of lines and index", replace(REFERENCE, index=True, health=True)),
+    Configuration(
+        "complements", "and open circuits of three pairs", replace(REFERENCE, index=True, health=True, complements=48)
+    ),
     Configuration("position-modulo", "position within a revolution", replace(REFERENCE, position_modulo="rev")),
     Configuration(
         "external-tick",

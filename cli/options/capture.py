@@ -120,7 +120,8 @@ def _read(
             slowest_s=float(alone.times.seconds(alone.times.longest)),
         )
         if count is not None:
-            _refuse_lines({**lines, "sensor": None if alone.encoder.plain else sensor, "index": alone.index or None})
+            more = {"sensor": None if alone.encoder.plain else sensor, "index": alone.index or None}
+            _refuse_lines({**lines, **more, "complements": alone.complements})
             log = read_count_log(capture, _of_axis("count", count, axis, axes) or "", text, wrap)
             return with_last_tick(log.recording(alone.encoder.decoding), spec)
         if wrap is not None:
@@ -134,7 +135,7 @@ def _read(
         rate = None if samplerate is None else float(parse_frequency("samplerate", samplerate))
         second = SAME if sensor == "pulses" else line_b
         third = (c or "c") if sensor == "hall" else None
-        recording = read_capture(capture, line_a, second, rate, index, tick, text, third)
+        recording = read_capture(capture, line_a, second, rate, index, tick, text, third, alone.complemented)
         return with_last_tick(fitted(recording, alone.encoder), spec)
 
     if others.get("capture") is None:

@@ -93,7 +93,8 @@ def _read_encoder(**given: Any) -> dict[str, Any]:
     def encoder(spec: TachometerSpec) -> VirtualEncoder:
         from tachometry.sim.encoder.virtual import VirtualEncoder
 
-        return VirtualEncoder.of(spec.encoder, index=spec.index, index_state=spec.index_place, **values)
+        wires = dict(index=spec.index, index_state=spec.index_place, complemented=spec.complemented)
+        return VirtualEncoder.of(spec.encoder, **wires, **values)
 
     return dict(encoder=encoder, **given)
 

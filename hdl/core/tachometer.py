@@ -55,7 +55,7 @@ class Tachometer(wiring.Component):
     def __init__(self, spec: TachometerSpec) -> None:
         self._spec = spec
         super().__init__(members(spec.ports))
-        self.conditioner = InputConditioner(spec.filter_clocks, (*spec.lines, *spec.probes))
+        self.conditioner = InputConditioner(spec.filter_clocks, (*spec.lines, *spec.probes), spec.complemented)
         self.decoder = decoder_of(spec.encoder, spec.wheel)
         self.pulse_counter = PulseCounter(
             max(spec.times.longest_tick, spec.widths.max_pulse_count),
@@ -87,6 +87,7 @@ class Tachometer(wiring.Component):
                 position_width=spec.position_width if spec.index_watched else 0,
                 index_reset=spec.index_reset,
                 presets=spec.index_watched and spec.preset is not None,
+                complements=dict.fromkeys(spec.complemented, spec.complements or 0),
             )
         self.datapath = DATAPATHS[spec.method](spec)
         self.sampling_clock: TickSource
@@ -310,6 +311,8 @@ class Tachometer(wiring.Component):
         m.submodules.watch = watch = self.watch
         follow(m, watch, self.decoder, ("level_a", "level_b", "ready", "step", "decode_error"))
         follow(m, self, watch, ("health", "faults"))
+        follow(m, self.conditioner, self, (f"{line}_n" for line in self._spec.complemented))
+        follow(m, watch, self.conditioner, (f"equal_{line}" for line in self._spec.complemented))
         m.d.comb += self.fault.eq(watch.health.any())
         if self.index_capture is not None and self._spec.index_watched:
             if self._spec.preset is not None:

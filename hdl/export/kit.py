@@ -68,7 +68,9 @@ def _first_levels(spec: AnySpec) -> dict[str, int]:
     """Return levels of the sensor's lines before it turns, those that are not 0, and of an index that is inverted."""
     encoder, all_ones = spec.tachometer.encoder, (1 << (spec.axes or 1)) - 1
     first = dict(zip(encoder.kind.lines, encoder.kind.legal[0], strict=True)) | {"z": 0}
-    return {line: all_ones for line, level in first.items() if level ^ (line in encoder.inverted)}
+    at_pins = {line: level ^ (line in encoder.inverted) for line, level in first.items()}
+    at_pins |= {f"{line}_n": 1 - at_pins[line] for line in spec.tachometer.complemented}
+    return {line: all_ones for line, level in at_pins.items() if level}
 
 
 def _turned(encoder: Encoder, turns: tuple[int, int]) -> tuple[dict[str, str], int]:
@@ -93,9 +95,10 @@ def _turned(encoder: Encoder, turns: tuple[int, int]) -> tuple[dict[str, str], i
     return levels, counts
 
 
-def _wired(encoder: Encoder, levels: dict[str, str]) -> dict[str, str]:
-    """Return levels of the pins: those of the lines, but of inverted ones the others."""
-    return {line: f"~({level})" if line in encoder.inverted else level for line, level in levels.items()}
+def _wired(spec: TachometerSpec, levels: dict[str, str]) -> dict[str, str]:
+    """Return levels of the pins: those of the lines, but of inverted ones and complements the others."""
+    wired = {line: f"~({level})" if line in spec.encoder.inverted else level for line, level in levels.items()}
+    return wired | {f"{line}_n": f"~({wired[line]})" for line in spec.complemented if line in wired}
 
 
 @singledispatch
@@ -113,7 +116,7 @@ def _bench(spec: AnySpec) -> dict[str, object]:
         "axes": None,
         "hold": hold,
         "turns": turns,
-        "levels": _wired(encoder, levels),
+        "levels": _wired(tacho, levels),
         "ends": {} if encoder.kind.cycle else low,
         "places": 6 if encoder.sensor == "hall" else 4,
         "velocity": "velocity",
@@ -142,7 +145,9 @@ def _(tacho: AxesSpec) -> dict[str, object]:
         "axes": tacho,
         "hold": hold,
         "turns": turns,
-        "levels": _wired(encoder, {line: f"{{{', '.join(each)}}}" for line, each in zip("ab", turned, strict=True)}),
+        "levels": _wired(
+            tacho.tachometer, {line: f"{{{', '.join(each)}}}" for line, each in zip("ab", turned, strict=True)}
+        ),
         "ends": {},
         "places": 4,
         "velocity": "velocity_0" if tacho.parallel else "velocity",

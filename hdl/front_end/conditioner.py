@@ -20,6 +20,8 @@ class InputConditioner(wiring.Component):
         Clocks for which a level must hold; 0 for no filter.
     lines : tuple of str
         Names of the lines.
+    complemented : tuple of str
+        Those of them that come with their complements.
 
     Members
     -------
@@ -29,19 +31,28 @@ class InputConditioner(wiring.Component):
         Synchronised and filtered levels.
     ready_a, ready_b … : Out(1)
         High from the first clock in which the level of this line before the present one is real as well.
+    a_n, b_n … : In(1)
+        Asynchronous complements, of `complemented`.
+    equal_a, equal_b … : Out(1)
+        The line and its complement are real and equal, filtered neither, two clocks after the pins.
     clear : In(1)
         `swallowed_edges` is 0 in the next clock.
     swallowed_edges : Out(16)
         Edges that the filter has kept out, two for each glitch; stays at 65534.
     """
 
-    def __init__(self, filter_clocks: int = 0, lines: tuple[str, ...] = ("a", "b")) -> None:
+    def __init__(
+        self, filter_clocks: int = 0, lines: tuple[str, ...] = ("a", "b"), complemented: tuple[str, ...] = ()
+    ) -> None:
         self._filter_clocks = filter_clocks
         self._lines = lines
+        self._complemented = complemented
         super().__init__(
             {name: In(1) for name in lines}
             | {f"level_{name}": Out(1) for name in lines}
             | {f"ready_{name}": Out(1) for name in lines}
+            | {f"{name}_n": In(1) for name in complemented}
+            | {f"equal_{name}": Out(1) for name in complemented}
             | {"clear": In(1), "swallowed_edges": Out(16)}
         )
         self._filters = {name: GlitchFilter(filter_clocks) for name in lines if filter_clocks}
@@ -60,6 +71,10 @@ class InputConditioner(wiring.Component):
         for name in self._lines:
             level = Signal(name=f"synchronised_{name}") if self._filter_clocks else getattr(self, f"level_{name}")
             m.submodules[f"sync_{name}"] = Synchronizer(getattr(self, name), level)
+            if name in self._complemented:
+                other = Signal(name=f"synchronised_{name}_n")
+                m.submodules[f"sync_{name}_n"] = Synchronizer(getattr(self, f"{name}_n"), other)
+                m.d.comb += getattr(self, f"equal_{name}").eq(clocks_since_reset[1] & (level == other))
             if self._filter_clocks:
                 m.submodules[f"filter_{name}"] = line = self._filters[name]
                 m.d.comb += [

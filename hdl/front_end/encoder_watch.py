@@ -1,12 +1,16 @@
 """The watch of the encoder, for what is wrong with it."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 from amaranth import Cat, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, idle_of
+from tachometry.hdl.front_end.open_circuit import OpenCircuit
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
-from tachometry.spec.core.health import FAULT_WIDTH, FAULTS_WIDTH, Fault
+from tachometry.spec.core.health import FAULT_WIDTH, FAULTS_WIDTH, OPEN, Fault
 
 
 class EncoderWatch(wiring.Component):
@@ -29,6 +33,8 @@ class EncoderWatch(wiring.Component):
         The index sets the position to 0.
     presets : bool
         Something else sets the position.
+    complements : mapping of str to int
+        Lines that come with their complements, and for how many clocks a line may equal it.
 
     Members
     -------
@@ -42,6 +48,8 @@ class EncoderWatch(wiring.Component):
         Only with an index.
     preset : In(1)
         The position is being set; a turn in which it is, is not checked. Only if there are presets.
+    equal_a, equal_b, equal_z : In(1)
+        The line equals its complement; of `complements`.
     clear : In(1)
         All that is kept is 0 in the next clock.
     seen : Out(1)
@@ -64,6 +72,7 @@ class EncoderWatch(wiring.Component):
         position_width: int = 0,
         index_reset: bool = False,
         presets: bool = False,
+        complements: Mapping[str, int] = MappingProxyType({}),
     ) -> None:
         self._edges = edges
         self._errors = errors
@@ -71,11 +80,13 @@ class EncoderWatch(wiring.Component):
         self._index_reset = index_reset
         self._presets = presets
         self.window = SamplingClock(second)
+        self.open = {line: OpenCircuit(clocks) for line, clocks in complements.items()}
         position = signed(max(position_width, 1))
         index = {"index_valid": In(1), "index_position": In(position), "index_error": Out(position)}
         super().__init__(
             {
                 **dict.fromkeys(("level_a", "level_b", "ready", "decode_error", "clear"), In(1)),
+                **{f"equal_{line}": In(1) for line in complements},
                 "step": In(signed(2)),
                 **(index if position_width else {}),
                 "seen": Out(1),
@@ -87,8 +98,8 @@ class EncoderWatch(wiring.Component):
 
     @property
     def idle(self) -> tuple[Idle, ...]:
-        """The time within a second, which a simulation may move on."""
-        return idle_of({"window": self.window})
+        """The times within a second and of equal lines, which a simulation may move on."""
+        return idle_of({"window": self.window} | {f"open_{line}": box for line, box in self.open.items()})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
@@ -97,6 +108,10 @@ class EncoderWatch(wiring.Component):
         seen = {Fault.A_STANDS: a_stands, Fault.B_STANDS: b_stands, Fault.ILLEGAL: self._illegal(m)}
         if self._turn:
             seen[Fault.INDEX_COUNTS] = self._index(m)
+        for line, box in self.open.items():
+            m.submodules[f"open_{line}"] = box
+            m.d.comb += [box.equal.eq(getattr(self, f"equal_{line}")), box.clear.eq(self.clear)]
+            seen[OPEN[line]] = box.open
         code: Value = Value.cast(0)
         for fault in sorted(seen, reverse=True):
             code = Mux(seen[fault], fault, code)

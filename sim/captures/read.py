@@ -2,7 +2,7 @@
 
 import functools
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
@@ -53,6 +53,7 @@ def read_capture(
     tick_in: Channel | None = None,
     text: TextOptions = PLAIN,
     c: Channel | None = None,
+    complemented: Iterable[str] = (),
 ) -> Recording:
     """Read the encoder lines from a capture; the suffix tells its kind.
 
@@ -72,6 +73,8 @@ def read_capture(
         Only for a text, see `read_csv`.
     c : str, int or None
         Channel of a third line, likewise.
+    complemented : iterable of str
+        Lines whose complements are channels as well, which are named a_n for a.
 
     Raises
     ------
@@ -96,6 +99,7 @@ def read_capture(
                 why = "it has levels" if option == "threshold" else "it has its times"
                 raise OptionError(name, f"must not be given for {path}: {why}")
     others = {name: channel for name, channel in (("c", c), ("z", z), ("tick_in", tick_in)) if channel is not None}
+    others |= {f"{line}_n": f"{line}_n" for line in complemented}
     recording = reader(path, a, b, samplerate_hz, others)
     return _with_moving(recording, lambda number: reader(path, number, SAME, samplerate_hz, NONE))
 

@@ -26,7 +26,7 @@ NONUNIFORMITY, JITTER, ILLEGAL, LOST, BOUNCE = range(5)
 
 MAX_BOUNCES = 1000
 
-_FAULTY = ("a", "b", "c", "z")
+_FAULTY = ("a", "b", "c", "z", "a_n", "b_n", "z_n")
 _CHUNK = 1 << 16
 _LN2 = 0.6931471805599453
 _CLIP = 0.49  # of the gap to a neighbour: two edges that move towards each other still keep their order
@@ -67,7 +67,7 @@ class LineFault:
     Parameters
     ----------
     line : str
-        `a`, `b`, `c` of halls, or `z`.
+        `a`, `b`, `c` of halls, `z`, or a complement: `a_n`, `b_n` or `z_n`.
     time_s : float, seconds
     """
 
@@ -76,7 +76,7 @@ class LineFault:
 
     def __post_init__(self) -> None:
         if self.line not in _FAULTY:
-            raise ParameterError("line", f"must be a, b, c or z, not {self.line!r}")
+            raise ParameterError("line", f"must be a, b, c, z, a_n, b_n or z_n, not {self.line!r}")
         if not 0 <= self.time_s < math.inf:
             raise ParameterError("time", f"must be 0 s or more, not {self.time_s} s")
 
@@ -85,7 +85,8 @@ class LineFault:
         """Read LINE:TIME, such as b:200ms (s, ms, us or ns)."""
         line, _, time = text.strip().partition(":")
         if line.lower() not in _FAULTY or not time:
-            raise ParameterError(what, f"must be LINE:TIME, such as b:200ms, with line a, b, c or z, not {text!r}")
+            lines = "line a, b, c or z, or a complement as a_n"
+            raise ParameterError(what, f"must be LINE:TIME, such as b:200ms, with {lines}, not {text!r}")
         if (begins := read_nearest(what, time, TIME, "s")) < 0:
             raise ParameterError(what, f"must begin at 0 s or later, not at {time}")
         return LineFault(line.lower(), begins)

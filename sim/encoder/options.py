@@ -152,14 +152,16 @@ class EncoderOptions:
     )
     broken: LineFault | None = option(  # noqa: RUF009
         None,
-        "A broken wire, such as b:200ms: from then on line a, b, z, or c of halls is high, as an open input is.",
+        "A broken wire, such as b:200ms: from then on line a, b, z, c of halls, or a complement as a_n is high, as an "
+        "open input is.",
         metavar="LINE:TIME",
         group=_FAULTS,
         parse=_line_fault,
     )
     stuck: LineFault | None = option(  # noqa: RUF009
         None,
-        "A shorted wire, such as a:200ms: from then on line a, b, z, or c of halls stays as it is.",
+        "A shorted wire, such as a:200ms: from then on line a, b, z, c of halls, or a complement as a_n stays as it "
+        "is.",
         metavar="LINE:TIME",
         group=_FAULTS,
         parse=_line_fault,

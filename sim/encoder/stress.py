@@ -59,6 +59,7 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     n_clocks = int(clock[-1]) + spec.facts.rest_tenths * longest // 10 + 40 * cycles + 300
     a, b, c = (level >> np.uint8(line) & np.uint8(1) for line in range(3))
     trace = _probed(spec, PinTrace(clock, a, b, n_clocks, z, c=c if "c" in sensor.lines else None), seed)
+    trace = _open(spec, trace, seed)
     for name in spec.controls:
         few = 30 if name == "preset" else 6
         high = spec.filter_clocks + int(rng.integers(1, 30))
@@ -84,6 +85,22 @@ def _probed(spec: TachometerSpec, trace: PinTrace, seed: int) -> PinTrace:
         row = np.maximum.accumulate(np.where(rng.random(len(clock)) < often, np.arange(len(clock)), 0))
         lines[name] = rng.integers(0, 1 << len(spec.probes), len(clock)).astype(np.uint8)[row]
     return PinTrace.of_lines(clock, trace.n_clocks, lines)
+
+
+def _open(spec: TachometerSpec, trace: PinTrace, seed: int) -> PinTrace:
+    """Return the trace with complements that equal their lines for a while."""
+    rng = np.random.default_rng([seed, 3])
+    for line in spec.complemented:
+        most = spec.complements or 0
+        begin = np.append(0, rng.integers(0, trace.n_clocks, 20))
+        end = np.minimum(begin + np.append(most, rng.choice([1, most, most + 1, 3 * most], 20)), trace.n_clocks - 1)
+        clock = merged(trace.clock, begin, end)
+        lines = trace.at(clock)
+        ended = np.searchsorted(np.sort(end), clock, side="right")
+        equal = np.searchsorted(np.sort(begin), clock, side="right") > ended
+        lines[f"{line}_n"] = lines[line] ^ (~equal).astype(np.uint8)
+        trace = PinTrace.of_lines(clock, trace.n_clocks, lines)
+    return trace
 
 
 @singledispatch

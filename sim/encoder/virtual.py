@@ -108,6 +108,8 @@ class VirtualEncoder(EncoderOptions):
         Lines that are low where others are high, with commas between.
     missing_teeth : str or None
         Of pulses, see `Encoder`: the last teeth of a turn are not there.
+    complemented : tuple of str
+        Lines whose complements are there as well, named `a_n` for `a`.
 
     Raises
     ------
@@ -123,6 +125,7 @@ class VirtualEncoder(EncoderOptions):
     reverse: bool = False
     invert: str | None = None
     missing_teeth: str | None = None
+    complemented: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, encoder: Encoder, **values: Any) -> "VirtualEncoder":
@@ -145,8 +148,11 @@ class VirtualEncoder(EncoderOptions):
                 raise ParameterError(name, f"must not be given with --sensor {self.sensor}")
         for name, fault in (("broken", self.broken), ("stuck", self.stuck)):
             lines = SENSORS[self.sensor].lines
-            if fault is not None and fault.line not in (*lines, "z"):
-                raise ParameterError(name, f"must be of line {', '.join(lines)} or z, not {fault.line}")
+            if fault is None or fault.line in (*lines, "z", *(f"{line}_n" for line in self.complemented)):
+                continue
+            if fault.line.endswith("_n"):
+                raise ParameterError(name, f"must not be of {fault.line} without --complements, which makes that line")
+            raise ParameterError(name, f"must be of line {', '.join(lines)} or z, not {fault.line}")
         if not math.isfinite(self.start_angle_rad):
             raise ValueError(f"start_angle_rad must be finite, not {self.start_angle_rad}")
 
@@ -239,6 +245,9 @@ class VirtualEncoder(EncoderOptions):
             lines = (*lines, "z")
         inverted = self.invert.split(",") if self.invert else ()
         level = level ^ np.uint8(sum(1 << place for place, line in enumerate(lines) if line in inverted))
+        for line in self.complemented:
+            level |= (~level >> np.uint8(lines.index(line)) & np.uint8(1)) << np.uint8(len(lines))
+            lines = (*lines, f"{line}_n")
         for fault, high in ((self.broken, True), (self.stuck, False)):
             if fault is not None and fault.time_s < duration:
                 bit = np.uint8(1 << lines.index(fault.line)) if fault.line in lines else np.uint8(0)

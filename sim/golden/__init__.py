@@ -49,7 +49,7 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
         last, tick_errors = windows(spec, trace)
         beyond, nominal = None, np.ones_like(last)
     ticks, index = count(spec, steps, last, beyond)
-    wrong = health.faults(spec, steps, index)
+    wrong = health.faults(spec, trace, steps, index)
     ticks = health.with_health(spec, with_stalled(spec, ticks, nominal), wrong)
     measured = golden.updates(ticks, steps, trace.n_clocks)
     measured = measured.having(cause=measured.clock - spec.latency.datapath)

@@ -5,11 +5,13 @@ from numpy.typing import NDArray
 
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.ordered import places
+from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.health import FAULTS_WIDTH, Fault
+from tachometry.spec.core.health import FAULTS_WIDTH, OPEN, Fault
 
 Ints = NDArray[np.int64]
+_NONE = np.empty(0, dtype=np.int64)
 _OTHER = {1: Fault.B_STANDS, 2: Fault.A_STANDS}  # of what changes alone
 
 
@@ -44,18 +46,39 @@ def _index(spec: TachometerSpec, steps: Steps, index: Table) -> tuple[Ints, Ints
     return index.clock[1:][wrong] + 1, off[wrong]
 
 
-def faults(spec: TachometerSpec, steps: Steps, index: Table) -> Table:
-    """Return the clocks from which faults are shown, each with its code, and with the error of a wrong turn."""
+def _open(spec: TachometerSpec, trace: PinTrace, clears: Ints) -> tuple[Ints, Ints]:
+    """Return clocks in which lines have equalled their complements for too long, and the faults; what lasts when it is
+    cleared is found again.
+    """
+    found, codes = [_NONE], [_NONE]
+    for name in spec.complemented:
+        equal = np.concatenate([[False], trace.lines[name] == trace.lines[f"{name}_n"], [False]])
+        clock = np.append(trace.clock, trace.n_clocks) + 2  # of the synchronised lines
+        begin, end = clock[equal[1:] & ~equal[:-1]], clock[~equal[1:] & equal[:-1]]
+        lasts = np.searchsorted(begin, clears, side="right") > np.searchsorted(end, clears + 1, side="right")
+        start = np.sort(np.append(begin, clears[lasts] + 1))
+        until = np.minimum(end[np.searchsorted(end, start, side="right")], np.append(start[1:], 1 << 62))
+        late = start + (spec.complements or 0)
+        found.append(late[late < until])
+        codes.append(np.full_like(found[-1], int(OPEN[name])))
+    return np.concatenate(found), np.concatenate(codes)
+
+
+def faults(spec: TachometerSpec, trace: PinTrace, steps: Steps, index: Table, clears: Ints = _NONE) -> Table:
+    """Return the clocks from which faults are shown, each with its code, and with the error of a wrong turn; `clears`
+    are clocks in which a program clears them.
+    """
     if not spec.health:
-        return Table(np.empty(0, dtype=np.int64), {})
+        return Table(_NONE, {})
     standing, codes = _standing(spec, steps)
     illegal = _illegal(spec, steps.errors)
     wrong, off = _index(spec, steps, index) if spec.index_watched else (standing[:0], standing[:0])
-    clock = np.concatenate([standing, illegal, wrong])
+    opened, lines = _open(spec, trace, clears)
+    clock = np.concatenate([standing, illegal, opened, wrong])
     code = np.concatenate(
-        [codes, np.full(len(illegal), int(Fault.ILLEGAL)), np.full(len(wrong), int(Fault.INDEX_COUNTS))]
+        [codes, np.full(len(illegal), int(Fault.ILLEGAL)), lines, np.full(len(wrong), int(Fault.INDEX_COUNTS))]
     )
-    error = np.concatenate([np.zeros(len(standing) + len(illegal), dtype=np.int64), off])
+    error = np.concatenate([np.zeros(len(clock) - len(off), dtype=np.int64), off])
     clock, which = np.unique(clock, return_inverse=True)
     least, errors = np.full(len(clock), 1 << 62), np.zeros(len(clock), dtype=np.int64)
     np.minimum.at(least, which, code)

@@ -105,6 +105,7 @@ class GoldenBank:
         left = sorted(captures)
         self._ask(accesses)
         self._probe(accesses)
+        self._clear(accesses)
         found: list[tuple[int | None, bool]] = []
         for access in accesses:
             while left and left[0] <= access.clock:
@@ -245,6 +246,14 @@ class GoldenBank:
     @property
     def _latched(self) -> list[np.ndarray]:
         return [table.clock for name, table in self._tables.items() if name.startswith("probe_valid")]
+
+    def _clear(self, accesses: Sequence[Access]) -> None:
+        """Find the faults that are there again if a program clears them."""
+        if self._map.spec.complements is not None:
+            number = self._map.registers.index(self._map["CONTROL"])
+            clears = [one.clock for one in accesses if one.address == number and (one.data or 0) & 1]
+            given = self._map.spec, self._trace, self._steps, self._tables[INDEX]
+            self._tables["fault"] = health.faults(*given, np.array(clears, dtype=np.int64))
 
     def _probe(self, accesses: Sequence[Access]) -> None:
         """Find what probes latch when a program arms them, and chooses their edges."""

@@ -97,6 +97,8 @@ class Recording(_Lines):
         Levels of a third line, as of halls. A sensor of one line has 0 in `b`.
     source : Source or None
         Of a capture, what it says of itself.
+    more : mapping of str to uint8 array, shape (n,)
+        Further lines by name, such as `a_n`, the complement of A.
     """
 
     time: NDArray[np.float64]
@@ -107,6 +109,7 @@ class Recording(_Lines):
     tick_in: NDArray[np.uint8] | None = None
     source: Source | None = None
     c: NDArray[np.uint8] | None = None
+    more: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not (len(self.time) and _same_length(self.time, *self.lines.values())):
@@ -121,7 +124,9 @@ class Recording(_Lines):
         time: NDArray[np.float64], level: NDArray[np.uint8], duration: float, lines: Sequence[str] = ("a", "b")
     ) -> "Recording":
         """Return the recording with these lines whose `level` is given."""
-        return Recording(time, duration=duration, source=None, **_split(level, lines))
+        found: dict[str, Any] = _split(level, lines)
+        more = {name: found.pop(name) for name in lines if name not in LINES}
+        return Recording(time, duration=duration, source=None, **found, more=more)
 
     def place(self, clock_hz: int) -> "PinTrace":
         """Sample the lines at clock edge c = time c / clock_hz; a change between two edges is seen at the later one.
@@ -259,13 +264,14 @@ class PinTrace(_Lines):
 
     def completed(self, spec: TachometerSpec) -> "PinTrace":
         """Return the same trace with all inputs of a core: with nominal external ticks if it takes them, and all else
-        that is missing low, but probes armed.
+        that is missing low, but probes armed, and complements those of their lines.
         """
         if spec.external_tick and self.tick_in is None:
             return self.with_tick_in(nominal_ticks(spec, self.n_clocks)).completed(spec)
         low = {name: np.zeros_like(self.a) for name in spec.controls if name not in self.lines}
         if spec.probes:
             low |= {"probe": np.zeros_like(self.a), "probe_arm": np.full_like(self.a, (1 << len(spec.probes)) - 1)}
+        low |= {f"{line}_n": self.lines[line] ^ np.uint8(1) for line in spec.complemented}
         return PinTrace.of_lines(self.clock, self.n_clocks, low | self.lines) if low else self
 
 

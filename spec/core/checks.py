@@ -102,9 +102,12 @@ def _check_health(spec: TachometerSpec) -> None:
         raise ParameterError(
             "health", f"must be left out for {spec.encoder.sensor}: it watches two lines in quadrature"
         )
-    for name, least, most in (("health_edges", 2, 1 << 16), ("health_errors", 0, (1 << 16) - 1)):
+    if spec.complements is not None and not spec.health:
+        raise ParameterError("complements", "must be given together with --health")
+    ranges = {"health_edges": (2, 1 << 16), "health_errors": (0, (1 << 16) - 1), "complements": (2, 1 << 20)}
+    for name, (least, most) in ranges.items():
         value = getattr(spec, name)
-        if not least <= value <= most:
+        if value is not None and not least <= value <= most:
             raise ParameterError(name, f"must be from {least} to {most}, not {value}")
 
 

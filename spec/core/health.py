@@ -10,6 +10,9 @@ class Fault(IntEnum):
     B_STANDS = 2
     INDEX_COUNTS = 3
     ILLEGAL = 4
+    A_OPEN = 5
+    B_OPEN = 6
+    Z_OPEN = 7
 
 
 FAULT_WIDTH = 3  # bits of a code
@@ -19,4 +22,8 @@ FAULT_TEXTS = {
     Fault.B_STANDS: "line b stands while a has edges: broken or shorted",
     Fault.INDEX_COUNTS: "counts are lost or extra between two indices",
     Fault.ILLEGAL: "too many illegal transitions in a second",
+    Fault.A_OPEN: "line a equals its complement a_n: an open circuit",
+    Fault.B_OPEN: "line b equals its complement b_n: an open circuit",
+    Fault.Z_OPEN: "line z equals its complement z_n: an open circuit",
 }
+OPEN = {"a": Fault.A_OPEN, "b": Fault.B_OPEN, "z": Fault.Z_OPEN}  # of lines that have a complement

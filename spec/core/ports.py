@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from tachometry.spec.core.compare import COUNT_WIDTH
-from tachometry.spec.core.health import FAULT_TEXTS, FAULT_WIDTH, FAULTS_WIDTH
+from tachometry.spec.core.health import FAULT_TEXTS, FAULT_WIDTH, FAULTS_WIDTH, OPEN
 from tachometry.spec.language.port import COMPARE, INDEX, TICK, UPDATE, WIDE, Port, held, pin, strobe
 
 if TYPE_CHECKING:
@@ -24,6 +24,7 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
         pin("rst", "Synchronous reset, active high."),
         *(pin(line, help) for line, help in zip(spec.encoder.kind.lines, spec.encoder.kind.pins, strict=True)),
         *_if("z" in spec.lines, pin("z", "Index line, asynchronous; its rising edge captures the position.")),
+        *(pin(f"{line}_n", f"Complement of line {line.upper()}, asynchronous.") for line in spec.complemented),
         *_if(
             spec.external_tick,
             pin("tick_in", "External tick, asynchronous; its rising edge ends a sampling period."),
@@ -202,7 +203,8 @@ def _compare_ports(spec: TachometerSpec) -> Iterable[Port]:
 def _health_ports(spec: TachometerSpec) -> Iterable[Port]:
     if not spec.health:
         return
-    codes = "; ".join(f"{code}: {text}" for code, text in FAULT_TEXTS.items())
+    absent = {fault for line, fault in OPEN.items() if line not in spec.complemented}
+    codes = "; ".join(f"{code}: {text}" for code, text in FAULT_TEXTS.items() if code not in absent)
     now = "It changes between the ticks as well, and a capture takes what it is then."
     yield held(TICK, "health", FAULT_WIDTH, help=f"The first fault of the encoder since it was cleared; {codes}. {now}")
     yield held(TICK, "faults", FAULTS_WIDTH, help="Faults of the encoder since they were cleared; it stays at 255.")

@@ -206,6 +206,17 @@ class TachometerSpec:
         tests=("0",),
         tacit=True,
     )
+    complements: int | None = option(
+        None,
+        "Inputs a_n and b_n, and z_n with --index, of a differential encoder (with --health): a line that equals its "
+        "complement for longer than TIME is an open circuit, a fault. In s, ms, us or ns, rounded up to clocks; a "
+        "plain number is clocks. 1us is more than receivers and cables skew.",
+        metavar="TIME",
+        needs="health",
+        parse_at=parse_filter,
+        tests=("2", "40"),
+        tacit=True,
+    )
     over_speed: Speed | None = option(  # noqa: RUF009
         None,
         "Output over_speed trips at a velocity beyond this, in rad/s, rev/s or rpm, and stays so until a reset or "
@@ -253,6 +264,11 @@ class TachometerSpec:
         """Lines of the sensor, the index and `controls` included."""
         of_index = ("z",) if self.index and not self.encoder.missing else ()  # a gap needs none
         return (*self.encoder.kind.lines, *of_index, *self.controls)
+
+    @property
+    def complemented(self) -> tuple[str, ...]:
+        """Lines that come with their complements, which are inputs as well: `a_n` of `a`."""
+        return () if self.complements is None else (*self.encoder.kind.lines, *("z",) * self.index)
 
     @property
     def wheel(self) -> ToothWheel | None:

@@ -46,6 +46,8 @@ class DemoMap(RegisterMap):
         if not self.spec.encoder.plain:
             raise ParameterError("sensor", "must be quadrature with a demo, its lines as they come: it emulates these")
 
+        if self.spec.complements is not None:
+            raise ParameterError("complements", "must be left out of a demo, which emulates lines without complements")
         if self.spec.probe:
             raise ParameterError("probe", "must be left out of a demo, which emulates an encoder and no probe")
 

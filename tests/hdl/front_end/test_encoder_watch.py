@@ -124,7 +124,7 @@ MUTANTS = [
     ("errors == self._errors)", "errors >= self._errors)"),
     ("m.d.sync += errors.eq(0)", "m.d.sync += errors.eq(errors)"),
     ("m.d.sync += alone.eq(0)\n        return", "pass\n        return"),
-    ("known & (backward == was_backward)", "known"),
+    ("since & (backward == was_backward)", "since"),
     ("Mux(was_backward, self._turn, -self._turn)", "Mux(was_backward, -self._turn, self._turn)"),
     ("way.any() & off", "off"),
     ("with m.If(self.health == 0):", "with m.If(1):"),
@@ -154,7 +154,15 @@ def test_golden_model_and_hardware_agree_over_seconds(seed: int, decoding: str) 
 CORE = {"ppr": "500", "clock": "12MHz", "index": "yes", "health": "yes"}
 REAL: dict[str, Any] = {"jitter": 0.05, "nonuniformity": 0.1, "phase_error_deg": 10}
 EDGES = 4 * 100 * 500 / (2 * np.pi)  # a second, of both lines, at 100 rad/s
+PULSE = 2 * np.pi / 100 / 500  # s, and less than one until a line has the other level
 FAULTS: list[tuple[dict[str, Any], Fault, float]] = [
+    *(
+        ({fault: LineFault(line, 0.1)}, code, PULSE + 2e-6)
+        for code, lines in ((Fault.A_OPEN, ("a", "a_n")), (Fault.B_OPEN, ("b", "b_n")))
+        for line in lines
+        for fault in ("broken", "stuck")
+    ),
+    ({"broken": LineFault("z_n", 0.1)}, Fault.Z_OPEN, 2 * np.pi / 100),
     ({"broken": LineFault("b", 0.1)}, Fault.B_STANDS, 512 / (EDGES / 2)),
     ({"broken": LineFault("a", 0.1)}, Fault.A_STANDS, 512 / (EDGES / 2)),
     ({"stuck": LineFault("a", 0.1)}, Fault.A_STANDS, 512 / (EDGES / 2)),
@@ -167,8 +175,8 @@ FAULTS: list[tuple[dict[str, Any], Fault, float]] = [
 @pytest.mark.parametrize(("fault", "code", "within"), FAULTS)
 def test_each_fault_is_told_in_time(fault: dict[str, Any], code: Fault, within: float) -> None:
     """A line that stands within 2 N edges of the other: a second may end between them."""
-    spec = of_texts("m", CORE)
-    encoder = VirtualEncoder(500, index=True, seed=3, **REAL, **fault)
+    spec = of_texts("m", CORE | ({"complements": "1us"} if code >= Fault.A_OPEN else {}))
+    encoder = VirtualEncoder(500, index=True, complemented=spec.complemented, seed=3, **REAL, **fault)
     recording = encoder.record(parse_motion("constant:100rad/s:600ms")).recording
     run = golden.run(spec, PinTrace.of(recording, spec))
     shown = np.flatnonzero(run.ticks.health)
@@ -184,8 +192,8 @@ def test_each_fault_is_told_in_time(fault: dict[str, Any], code: Fault, within: 
 
 @pytest.mark.parametrize("seconds", only([1], [1, 10]))
 def test_clean_motion_on_a_real_disc_has_no_fault(seconds: int) -> None:
-    spec = of_texts("m", CORE)
-    encoder = VirtualEncoder(500, index=True, seed=5, **REAL)
+    spec = of_texts("m", CORE | {"complements": "1us"})
+    encoder = VirtualEncoder(500, index=True, complemented=spec.complemented, seed=5, **REAL)
     motion = "ramp:0:100rad/s:200ms+ramp:100rad/s:-100rad/s:300ms+sine:20rad/s:5Hz:400ms+constant:0.5rad/s:100ms"
     recording = encoder.record(parse_motion(f"{seconds}*({motion})")).recording
     run = golden.run(spec, PinTrace.of(recording, spec))

@@ -110,6 +110,7 @@ def test_every_option_does_what_it_says() -> None:
         "health",
         "health-edges",
         "health-errors",
+        "complements",
         "over-speed",
         "preset",
         "index-once",

@@ -1,0 +1,40 @@
+"""Against wires that are open."""
+
+from amaranth import Module, Signal
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
+
+
+class OpenCircuit(wiring.Component):
+    """Tells that a line has equalled its complement for longer than `clocks`, once until they differ again.
+
+    Members
+    -------
+    equal : In(1)
+        The line equals its complement.
+    clear : In(1)
+        What lasts is told again.
+    open : Out(1)
+        High in clock c + `clocks` if they have been equal from clock c on.
+    """
+
+    def __init__(self, clocks: int) -> None:
+        self._clocks = clocks
+        super().__init__({"equal": In(1), "clear": In(1), "open": Out(1)})
+
+    @property
+    def idle(self) -> tuple[Idle, ...]:
+        """The time for which they have been equal; a simulation may move it on."""
+        return (IdleCounter("since", 1, (self._clocks, self._clocks + 1)),)
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        since = Signal(range(self._clocks + 2))
+        m.d.comb += self.open.eq(self.equal & (since == self._clocks))
+        with m.If(~self.equal | self.clear):
+            m.d.sync += since.eq(0)
+        with m.Elif(since <= self._clocks):
+            m.d.sync += since.eq(since + 1)
+        return m

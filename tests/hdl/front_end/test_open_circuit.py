@@ -1,0 +1,122 @@
+"""Lines that equal their complements: for how long they may, and what is told of it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hdl.front_end.test_place import check_registers
+from proofs.source import mutant
+from support.nightly import nightly
+from support.simulate import clock_by_clock
+from support.verilog import run_in_icarus
+
+from tachometry.hdl.front_end import conditioner, encoder_watch, open_circuit
+from tachometry.sim import golden
+from tachometry.sim.encoder.imperfections import LineFault
+from tachometry.sim.encoder.stress import stress
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.signals.run import compare
+from tachometry.sim.studies.lockstep import lockstep
+from tachometry.spec import ParameterError, TachometerSpec, of_texts
+
+BASE = {"ppr": "8", "clock": "1MHz", "tick": "40us", "max-time": "400us", "health": "yes", "health-edges": "900"}
+
+
+def spec_of(texts: dict[str, str]) -> TachometerSpec:
+    return of_texts("m", BASE | {"health-errors": "900"} | texts)
+
+
+def check_box() -> None:
+    """Every length up to twice what is allowed, each cleared in every clock of it and not at all."""
+    for clocks in (2, 5):
+        rows, wanted = [], []
+        for length in range(2 * clocks + 4):
+            for cleared in range(length + 1):
+                since = 0
+                for clock in range(length + 1):
+                    equal, clear = clock < length, clock == cleared and cleared < length
+                    rows.append({"equal": int(equal), "clear": int(clear)})
+                    since += equal
+                    wanted.append({"open": int(equal and since == clocks + 1)})
+                    since *= equal and not clear
+        assert [*clock_by_clock(open_circuit.OpenCircuit(clocks), rows, ["open"])] == wanted
+
+
+def check_lockstep(texts: dict[str, str], seed: int = 1) -> None:
+    spec = spec_of(texts)
+    found = lockstep(spec, stress(spec, seed, 12), PySim())
+    assert found.n_mismatches == 0, found.first
+    assert found.actual.ticks.health[-1] in (5, 6, 7)
+
+
+CASES: tuple[dict[str, str], ...] = (
+    {"complements": "3", "index": "yes", "filter": "2"},
+    {"complements": "2", "invert": "a"},
+)
+
+
+def check_all() -> None:
+    check_box()
+    for texts in CASES:
+        check_lockstep(texts)
+    check_registers(BASE | CASES[0], 3)
+
+
+def test_each_length_is_told_once_until_it_is_cleared() -> None:
+    check_box()
+
+
+@pytest.mark.parametrize("texts", CASES)
+def test_hardware_does_as_the_golden_model(texts: dict[str, str]) -> None:
+    check_lockstep(texts)
+
+
+def test_registers_show_what_lasts_again_when_they_are_cleared() -> None:
+    check_registers(BASE | CASES[0], 3)
+
+
+def test_exported_verilog_does_in_icarus(tmp_path: Path) -> None:
+    spec = spec_of(CASES[0])
+    trace = stress(spec, 4, 12)
+    assert compare(golden.run(spec, trace), run_in_icarus(spec, tmp_path, trace)) == (0, [])
+
+
+@nightly  # it asks what the tests above notice
+@pytest.mark.parametrize(
+    ("box", "right", "wrong"),
+    [
+        (open_circuit.OpenCircuit, "since == self._clocks", "since == self._clocks - 1"),
+        (open_circuit.OpenCircuit, "~self.equal | self.clear", "~self.equal"),
+        (open_circuit.OpenCircuit, "since <= self._clocks", "since < self._clocks"),
+        (conditioner.InputConditioner, "clocks_since_reset[1] & (level == other)", "level == other"),
+        (encoder_watch.EncoderWatch, "seen[OPEN[line]] = box.open", "seen[OPEN['a']] = box.open"),
+    ],
+)
+def test_mutants_are_noticed(box: type, right: str, wrong: str) -> None:
+    with mutant(box, right, wrong), pytest.raises(AssertionError):
+        check_all()
+
+
+@pytest.mark.parametrize(
+    ("texts", "message"),
+    [
+        ({"complements": "0"}, "complements must be from 2 to 1048576, not 0"),
+        ({"complements": "soon"}, "complements must be"),
+    ],
+)
+def test_what_cannot_be(texts: dict[str, str], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        spec_of(texts)
+
+
+def test_complements_are_watched_with_health() -> None:
+    with pytest.raises(ParameterError, match="complements must be given together with --health"):
+        of_texts("m", {"ppr": "8", "clock": "1MHz", "complements": "1us"})
+    with pytest.raises(ParameterError, match="complements must be given together with --health"):
+        replace(spec_of(CASES[0]), health=False)
+
+
+def test_an_encoder_without_complements_breaks_none() -> None:
+    with pytest.raises(ParameterError, match="must not be of a_n without --complements"):
+        VirtualEncoder(8, broken=LineFault("a_n", 0.1))
