@@ -14,6 +14,7 @@ from tachometry.cli.reports.terminal import print_rows, stdout_console
 from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.simulation import Axis, Simulation
 from tachometry.spec import AxesSpec, CoreSpec
+from tachometry.spec.core.compare import BOTH
 from tachometry.spec.core.health import FAULT_TEXTS
 from tachometry.spec.language.port import COMPARE, WIDE
 from tachometry.spec.language.units import format_time, plural
@@ -98,6 +99,17 @@ def _updates(run: Run) -> tuple[str, str]:
     return "updates", f"{len(run.updates.clock)} ({np.count_nonzero(run.updates.forced)} of them forced)"
 
 
+def _none(axis: Axis) -> str:
+    """Say why there were no pulses of compare."""
+    compare, position = axis.spec.compare, axis.run.ticks.position
+    assert compare is not None
+    if compare.depth:
+        return ": its list is empty here, and a program fills it"
+    first = compare.ahead(axis.spec.position_width)
+    turning = "" if compare.direction == BOTH else f" while the shaft turned {compare.direction}"
+    return f": {first} was not reached{turning}, as position was {position.min()} to {position.max()}"
+
+
 def _rows(axis: Axis) -> list[tuple[str, str]]:
     """Return rows of the table of a core of one axis: a name and its value."""
     spec, run, truth = axis.spec, axis.run, axis.truth
@@ -132,7 +144,7 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         rows.append(("health", f"{faults}, first: {FAULT_TEXTS[code]}" if code else "no fault"))
     if spec.compare is not None:
         pulses = run.tables[COMPARE]
-        last = f", the last at position {pulses.compare_position[-1]}" if len(pulses) else ""
+        last = f", the last at position {pulses.compare_position[-1]}" if len(pulses) else _none(axis)
         rows.append(("compare", f"{plural(len(pulses), 'pulse')}{last}"))
     if spec.over_speed is not None:
         tripped = np.flatnonzero(run.ticks.over_speed)

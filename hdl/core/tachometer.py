@@ -31,6 +31,7 @@ from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput, Seria
 from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import follow, members
 from tachometry.spec import TachometerSpec
+from tachometry.spec.core.compare import LIST_PINS
 from tachometry.spec.core.probe import packed_edges
 from tachometry.spec.language.port import UPDATE
 
@@ -343,4 +344,8 @@ class Tachometer(wiring.Component):
         m.submodules.compare_output = box = self.compare_output
         (step,) = delay(m, self.decoder.step, clocks=self._spec.latency.tick)
         m.d.comb += [box.step.eq(step), box.position.eq(self.position)]
-        follow(m, self, box, ("compare", "compare_valid", "compare_position", "compare_count"))
+        shown = ["compare", "compare_valid", "compare_position", "compare_count"]
+        if "compare_waiting" in box.signature.members:
+            follow(m, box, self, LIST_PINS)
+            shown.append("compare_waiting")
+        follow(m, self, box, shown)

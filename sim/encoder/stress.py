@@ -1,8 +1,10 @@
 """A motion that visits what every core must survive."""
 
 from functools import singledispatch
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tachometry.sim.encoder.imperfections import pulsed
 from tachometry.sim.encoder.virtual import VirtualEncoder
@@ -42,6 +44,7 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     turns.append(np.full(4 * edges, rng.choice([1, -1])))
     clock = np.append(0, np.cumsum(np.maximum(1 + steps, np.rint(np.concatenate(gaps))).astype(np.int64)))
     turn = np.concatenate(turns)
+    went = np.interp(np.arange(int(clock[-1])), clock[1:], np.cumsum(turn) * spec.encoder.decoding / per_period)
     if steps:
         at, level = pulsed(clock.astype(np.float64), turn, float(clock[-1] + 2), directed=sensor.name == "step-dir")
         clock = at.astype(np.int64)
@@ -60,6 +63,8 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     a, b, c = (level >> np.uint8(line) & np.uint8(1) for line in range(3))
     trace = _probed(spec, PinTrace(clock, a, b, n_clocks, z, c=c if "c" in sensor.lines else None), seed)
     trace = _open(spec, trace, seed)
+    if spec.compare is not None and spec.compare.depth:
+        trace = _listed(spec, trace, went, seed)
     for name in spec.controls:
         few = 30 if name == "preset" else 6
         high = spec.filter_clocks + int(rng.integers(1, 30))
@@ -101,6 +106,20 @@ def _open(spec: TachometerSpec, trace: PinTrace, seed: int) -> PinTrace:
         lines[f"{line}_n"] = lines[line] ^ (~equal).astype(np.uint8)
         trace = PinTrace.of_lines(clock, trace.n_clocks, lines)
     return trace
+
+
+def _listed(spec: TachometerSpec, trace: PinTrace, went: NDArray[np.float64], seed: int) -> PinTrace:
+    """Return the trace with positions for the list of the compare output, near where the shaft is, often too many."""
+    rng = np.random.default_rng([seed, 3])
+    acts = np.unique(rng.integers(0, len(went), 200))
+    clock = merged(trace.clock, acts, acts + 1)
+    lines: dict[str, NDArray[Any]] = {**trace.at(clock)}
+    place = went.take(clock, mode="clip").astype(np.int64) + rng.integers(-3, 4, len(clock))
+    lines["compare_next"] = place & (1 << spec.position_width) - 1
+    for name, often in (("append", 0.6), ("clear", 0.1)):
+        act = np.isin(clock, acts) & (rng.random(len(clock)) < often)
+        lines[f"compare_{name}"] = act.astype(np.uint8)
+    return PinTrace.of_lines(clock, trace.n_clocks, lines)
 
 
 @singledispatch

@@ -56,9 +56,10 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
     updates = in_unit(spec, filtered(spec, ticks, measured))
     probes = probe.latched(spec, steps, trace)
     ticks = probe.with_probed(spec, ticks, probes)
-    tripped, pulses = trips(spec, updates), compare.pulses(spec, steps)
+    tripped, pulses = trips(spec, updates), compare.pulses(spec, steps, trace)
+    ticks = ticks.having(**compare.shown(spec, pulses, ticks.clock))
     found = {
-        "tick": compare.with_compare(spec, with_trip(spec, with_age(spec, ticks, updates), tripped), pulses),
+        "tick": with_trip(spec, with_age(spec, ticks, updates), tripped),
         "velocity_valid": updates,
         "index_valid": index,
         "index_wide": Table(steps.wide + spec.latency.tick, {}),
@@ -66,7 +67,7 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
         "tick_error": Table(tick_errors, {}),
         "fault": wrong,
         "over_speed": tripped,
-        "compare_valid": pulses,
+        **pulses,
         **probes,
     }
     return {name: table.rows(slice(np.searchsorted(table.clock, trace.n_clocks))) for name, table in found.items()}

@@ -1,50 +1,132 @@
 """The golden compare output finds the steps that lead to positions, one after the other."""
 
+from bisect import bisect_right
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.front_end import Steps, positions
+from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.compare import COUNT_WIDTH
+from tachometry.spec.core.compare import BACKWARD, BOTH, COUNT_WIDTH, FORWARD, LIST_PINS, Compare
+from tachometry.spec.language.port import COMPARE
+
+_NEVER = 1 << 62
+_WAITING = "compare_waiting"
+Clocks = list[tuple[int, int]]  # clocks, each with a number
 
 
-def pulses(spec: TachometerSpec, steps: Steps) -> Table:
-    """Return the first clocks of pulses, and their positions."""
-    compare = spec.compare
-    clocks: list[int] = []
-    reached: list[int] = []
-    if compare is not None:
-        size = 1 << spec.position_width
-        rows = np.flatnonzero(steps.step == (-1 if compare.backward else 1))
-        at = positions(spec, steps)[rows]
-        order = np.argsort(at, kind="stable")
-        ordered = at[order]
-        awaited, first = compare.start, 0
-        while not compare.count or len(clocks) < compare.count:
-            begin, end = np.searchsorted(ordered, [awaited, awaited + 1])
-            place = begin + np.searchsorted(order[begin:end], first)
-            if place == end:
-                break
-            first = int(order[place]) + 1
-            clocks.append(int(steps.clock[rows[first - 1]]))
-            reached.append(awaited)
-            awaited = (awaited + compare.apart + size // 2) % size - size // 2
-    clock = np.array(clocks, dtype=np.int64) + spec.latency.tick + 1
-    return Table(clock, {"compare_position": np.array(reached, dtype=np.int64)})
+class _Passes:
+    """Finds when the shaft passes a position; `clock` and `place` are of all steps that may lead to one."""
+
+    def __init__(self, clock: NDArray[np.int64], place: NDArray[np.int64]) -> None:
+        order = np.argsort(place, kind="stable")
+        self._clock, self._place = clock[order], place[order]
+
+    def first(self, place: int, since: int) -> int:
+        """Return the first clock from `since` on in which it passes there, or `_NEVER`."""
+        begin, end = np.searchsorted(self._place, [place, place + 1])
+        row = begin + np.searchsorted(self._clock[begin:end], since)
+        return int(self._clock[row]) if row < end else _NEVER
 
 
-def shown(spec: TachometerSpec, found: Table, clock: NDArray[np.int64]) -> dict[str, NDArray[np.int64]]:
+def pulses(spec: TachometerSpec, steps: Steps, trace: PinTrace) -> dict[str, Table]:
+    """Return the first clocks of pulses, and their positions; of a list, which `trace` fills, also how long it is."""
+    if (compare := spec.compare) is None:
+        return {}
+    half = 1 << spec.position_width - 1
+    # Both ways a position is the edge below it, so a step down from it leads over it.
+    place = positions(spec, steps) + ((steps.step < 0) & (compare.direction == BOTH))
+    place = (place + half) % (2 * half) - half
+    clock = steps.clock + spec.latency.tick
+    ways = {
+        way: _Passes(clock[rows], place[rows])
+        for way, rows in ((FORWARD, steps.step > 0), (BACKWARD, steps.step < 0))
+        if compare.direction in (way, BOTH)
+    }
+    if not compare.depth:
+        return {COMPARE: _table([*_computed(compare, ways, half)])}
+    found, changes = _listed(compare.depth, ways, trace, half)
+    at, level = np.array([(0, 0), *changes], dtype=np.int64).T
+    return {COMPARE: _table(found), _WAITING: Table(at, {_WAITING: np.cumsum(level)})}
+
+
+def _table(found: Clocks) -> Table:
+    clock, reached = np.array(found, dtype=np.int64).reshape(-1, 2).T
+    return Table(clock + 1, {"compare_position": reached})
+
+
+def _computed(compare: Compare, ways: dict[str, _Passes], half: int) -> Iterator[tuple[int, int]]:
+    """Yield the clocks in which positions that lie equally apart are passed, and these."""
+    number = compare.passed  # of those that lie behind
+    clock = -1
+    while True:
+        following = []
+        for way, passes in ways.items():
+            back = compare.direction == BOTH and way == BACKWARD
+            if not compare.count or number != (0 if back else compare.count):
+                place = (compare.start + (number - back) * compare.apart + half) % (2 * half) - half
+                following.append((passes.first(place, clock + 1), place, -1 if back else 1))
+        clock, place, turn = min(following, default=(_NEVER, 0, 0))
+        if clock == _NEVER:
+            return
+        yield clock, place
+        number += turn
+
+
+def _listed(depth: int, ways: dict[str, _Passes], trace: PinTrace, half: int) -> tuple[Clocks, Clocks]:
+    """Return the same of a list, and by how much the list changes, from which clocks on.
+
+    A position is awaited two clocks after it was appended, or a clock after the one before it was reached. There is
+    room for one less than `depth` that are not awaited yet.
+    """
+    found: Clocks = []
+    changes: Clocks = []
+    awaited: list[int] = []  # since the list was emptied: from when each was awaited
+    reached: Clocks = []  # and when it is reached, with its position
+
+    def empty(clock: int) -> None:
+        found.extend(pulse for pulse in reached if pulse[0] <= clock)
+        changes.extend((min(pulse[0], clock) + 1, -1) for pulse in reached)
+        awaited.clear()
+        reached.clear()
+
+    for clock, place, append, clear in _writes(trace):
+        if clear:
+            empty(clock)
+        elif append and len(awaited) - bisect_right(awaited, clock) != depth - 1:
+            awaited.append(max(clock + 2, reached[-1][0] + 1 if reached else 0))
+            place = (place + half) % (2 * half) - half
+            reached.append((min(passes.first(place, awaited[-1]) for passes in ways.values()), place))
+            changes.append((clock + 1, 1))
+    empty(_NEVER - 1)
+    return found, sorted(changes)
+
+
+def _writes(trace: PinTrace) -> Iterator[tuple[int, int, int, int]]:
+    """Yield the clocks in which the inputs of a list act, with their levels."""
+    lines = [trace.lines[name] for name in LIST_PINS]
+    ends = np.append(trace.clock[1:], trace.n_clocks)
+    for row in np.flatnonzero((lines[1] != 0) | (lines[2] != 0)).tolist():
+        place, append, clear = (int(line[row]) for line in lines)
+        for clock in range(int(trace.clock[row]), int(ends[row])):
+            yield clock, place, append, clear
+
+
+def shown(spec: TachometerSpec, found: dict[str, Table], clock: NDArray[np.int64]) -> dict[str, NDArray[np.int64]]:
     """Return what is shown of pulses in these clocks."""
-    assert spec.compare is not None
-    number = np.searchsorted(found.clock, clock, side="right")
-    begun = np.append(np.iinfo(np.int64).min // 2, found.clock)[number]
-    return {
+    if spec.compare is None:
+        return {}
+    pulses = found[COMPARE]
+    number = np.searchsorted(pulses.clock, clock, side="right")
+    begun = np.append(np.iinfo(np.int64).min // 2, pulses.clock)[number]
+    values = {
         "compare": clock - begun < spec.compare.clocks(spec.timing.clock_hz),
         "compare_count": number % (1 << COUNT_WIDTH),
     }
-
-
-def with_compare(spec: TachometerSpec, ticks: Table, found: Table) -> Table:
-    """Return ticks with what is shown of pulses."""
-    return ticks if spec.compare is None else ticks.having(**shown(spec, found, ticks.clock))
+    if spec.compare.depth:
+        waiting = found[_WAITING]
+        values[_WAITING] = waiting[_WAITING][np.searchsorted(waiting.clock, clock, side="right") - 1]
+    return values

@@ -9,7 +9,7 @@ from tachometry.sim import golden
 from tachometry.sim.golden import compare, health, probe
 from tachometry.sim.golden.front_end import decoded, homed
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.spec.language.port import COMPARE, INDEX, TICK, UPDATE, WIDE
+from tachometry.spec.language.port import INDEX, TICK, UPDATE, WIDE
 from tachometry.spec.registers.field import WORD, Field, Register
 from tachometry.spec.registers.map import COUNTER_WIDTH, RegisterMap
 
@@ -104,7 +104,7 @@ class GoldenBank:
         self._irq = {event: [0] for event in self._map.interrupts}  # since which clocks events count
         left = sorted(captures)
         self._ask(accesses)
-        self._probe(accesses)
+        self._act(accesses)
         self._clear(accesses)
         found: list[tuple[int | None, bool]] = []
         for access in accesses:
@@ -238,7 +238,7 @@ class GoldenBank:
             "swallowed_edges": 2 * min(glitches, (1 << 15) - 1),
             "over_speed": int(self._count(self._tables["over_speed"].clock, self._cleared + 1, clock) > 0),
             "homed": int(homed(self._map.spec, self._steps, np.array([clock]))[0]),
-            **(self._pulses(clock) if self._map.spec.compare is not None else {}),
+            **self._shown(compare.shown(self._map.spec, self._tables, np.array([clock]))),
             **({"probed": int(probe.shown(self._tables["probed"], np.array([clock]))[0])} if self._latched else {}),
             **(self._faults(clock) if self._map.spec.health else {}),
         }
@@ -255,38 +255,40 @@ class GoldenBank:
             given = self._map.spec, self._trace, self._steps, self._tables[INDEX]
             self._tables["fault"] = health.faults(*given, np.array(clears, dtype=np.int64))
 
-    def _probe(self, accesses: Sequence[Access]) -> None:
-        """Find what probes latch when a program arms them, and chooses their edges."""
-        spec = self._map.spec
-        if not spec.probe:
+    def _act(self, accesses: Sequence[Access]) -> None:
+        """Find what probes latch, and where pulses are, when a program writes what are inputs without a bus."""
+        fields = {field for field in self._map.settings if field.port.startswith(("probe_", "compare_"))}
+        if not fields:
             return
-        named = {register.name: number for number, register in enumerate(self._map)}
-        arms, edges = {0: 0}, {0: self._settings["probe_edges"]}
+        settings = dict(self._settings)
+        changes = {field.port: {0: settings[field.port]} for field in fields}
         for access in accesses:
-            if access.data is None:
+            if access.data is None or access.address >= len(self._map.registers):
                 continue
-            if access.address == named["PROBE_ARM"]:
-                arms |= {access.clock: access.data & (1 << len(spec.probes)) - 1}
-                arms |= {access.clock + 1: 0}
-            if access.address == named["PROBE_EDGES"]:
-                edges[access.clock + 1] = access.data & (1 << 2 * len(spec.probes)) - 1
-        clock = np.unique([*arms, *edges])
+            for field in fields.intersection(self._map.registers[access.address].fields):
+                value = settings[field.port] = written(field, access.data, settings[field.port])
+                acts = {access.clock: value, access.clock + 1: 0}
+                changes[field.port] |= acts if field.single else {access.clock + 1: value}
+        clock = np.unique([at for each in changes.values() for at in each])
         low = np.zeros(len(clock), dtype=np.uint8)
-        arm, chosen = (
-            np.array([*of.values()])[np.searchsorted([*of], clock, side="right") - 1] for of in (arms, edges)
-        )
-        lines = {"probe_arm": arm.astype(np.uint8), "probe_edges": chosen}
+        lines = {
+            port: np.array([*each.values()])[np.searchsorted([*each], clock, side="right") - 1]
+            for port, each in changes.items()
+        }
         pins = PinTrace(clock, low, low, self._trace.n_clocks, more=lines)
-        self._tables |= probe.latched(spec, self._steps, pins)
+        if self._map.spec.probe:
+            self._tables |= probe.latched(self._map.spec, self._steps, pins)
+        if "compare_next" in lines:
+            self._tables |= compare.pulses(self._map.spec, self._steps, pins)
 
-    def _pulses(self, clock: int) -> dict[str, int]:
-        found = compare.shown(self._map.spec, self._tables[COMPARE], np.array([clock]))
+    @staticmethod
+    def _shown(found: dict[str, np.ndarray]) -> dict[str, int]:
         return {name: int(column[0]) for name, column in found.items()}
 
     def _faults(self, clock: int) -> dict[str, int]:
         found = self._tables["fault"]
         first, end = np.searchsorted(found.clock, [self._cleared + 1, clock], side="right")[:, None]
-        return {name: int(column[0]) for name, column in health.shown(found, first, end).items()}
+        return self._shown(health.shown(found, first, end))
 
     @staticmethod
     def _count(clocks: np.ndarray, after: int, until: int) -> int:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim.signals.source import Source
 from tachometry.spec import TachometerSpec
+from tachometry.spec.core.compare import LIST_PINS
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 from tachometry.spec.language.units import format_time
 
@@ -191,9 +192,9 @@ class PinTrace(_Lines):
         Index line and external tick; None if it is absent.
     c : uint8 array, shape (n,), 0 or 1, or None
         A third line.
-    more : mapping of str to uint8 array, shape (n,)
+    more : mapping of str to integer array, shape (n,)
         Further inputs by name, such as `preset`. `probe` and `probe_arm` have a bit for each probe, the first lowest;
-        `probe_edges` is what a program has set `ProbeLatch.edges` to.
+        `probe_edges` is what a program has set `ProbeLatch.edges` to. `compare_next` is the bits of a position.
     """
 
     clock: NDArray[np.int64]
@@ -272,6 +273,8 @@ class PinTrace(_Lines):
         if spec.probes:
             low |= {"probe": np.zeros_like(self.a), "probe_arm": np.full_like(self.a, (1 << len(spec.probes)) - 1)}
         low |= {f"{line}_n": self.lines[line] ^ np.uint8(1) for line in spec.complemented}
+        if spec.compare is not None and spec.compare.depth:
+            low |= dict.fromkeys(LIST_PINS, np.zeros_like(self.a))
         return PinTrace.of_lines(self.clock, self.n_clocks, low | self.lines) if low else self
 
 

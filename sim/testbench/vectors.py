@@ -22,6 +22,7 @@ from tachometry.sim.testbench.loop_inputs import changes as loop_changes
 from tachometry.sim.testbench.loop_inputs import loop_inputs
 from tachometry.spec import AxesSpec, TachometerSpec
 from tachometry.spec.control import AnySpec, LoopSpec
+from tachometry.spec.core.compare import LIST_PINS
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.provenance import LICENSE, generator, notice
 
@@ -30,7 +31,7 @@ _BENCH = files(__package__) / "templates" / "test_NAME.py"
 # Clocks of the motion, and five times as many of the standstill after it: Icarus takes some 40,000 a second.
 _MOVING = 160_000
 _FEWEST_TICKS, _MOST_TICKS = 3, 1000
-_ARM = "probe_arm"  # an input, or a register on a bus, which no bench writes
+_ACTS = ("probe_arm", *LIST_PINS)  # inputs, or registers on a bus, which no bench writes
 _MOST_BENCH_TICKS = 2_000_000  # of which each is a row of text
 
 
@@ -75,7 +76,7 @@ def bench_of(core: AnySpec, name: str, traces: Sequence[PinTrace]) -> dict[str, 
 def _vectors(core: AnySpec, traces: Sequence[PinTrace]) -> dict[str, Any]:
     """Return the content of `NAME_vectors.json`; test_NAME.py says what stands where."""
     pins, (clock, *levels), run = _put(core, traces)
-    driven = {pin: level for pin, level in zip(pins, levels, strict=True) if pin != _ARM}
+    driven = {pin: level for pin, level in zip(pins, levels, strict=True) if pin not in _ACTS}
     if not len(run.ticks.clock):
         raise ParameterError("motion", f"must last for a tick, not for {run.n_clocks} clocks")
     inputs = {"clocks": run.n_clocks, "pins": [*driven], "changes": _rows(clock, *driven.values())}
@@ -89,7 +90,7 @@ def _vectors(core: AnySpec, traces: Sequence[PinTrace]) -> dict[str, Any]:
 
 
 def _unarmed(trace: PinTrace) -> dict[str, NDArray[np.uint8]]:
-    return {_ARM: np.zeros_like(trace.lines[_ARM])} if _ARM in trace.lines else {}
+    return {name: np.zeros_like(trace.lines[name]) for name in _ACTS if name in trace.lines}
 
 
 def digest_of(vectors: Mapping[str, Any]) -> str:
@@ -160,7 +161,7 @@ def _fastest(spec: TachometerSpec) -> float:
 
 def _to_compare(spec: TachometerSpec, longest: int) -> list[str]:
     """Return segments over the first three positions of the compare output, if that takes no more clocks."""
-    if spec.compare is None:
+    if spec.compare is None or spec.compare.depth:
         return []
     apart, most = spec.compare.apart, _fastest(spec)
     start, more = spec.compare.start, 3 + abs(spec.compare.start) // 16  # since illegal transitions lose counts

@@ -76,6 +76,8 @@ class LoopSpec(Law):
         for name in ("preset", "index_once"):
             if getattr(self.tachometer, name) not in (None, False):
                 raise ParameterError(name, "must not be given together with --loop, whose position would jump")
+        if self.tachometer.compare is not None and self.tachometer.compare.depth:
+            raise ParameterError("compare", "must not be a list together with --loop, whose inputs are commands")
         if not 8 <= self.current_width <= 24:
             raise ParameterError("current_width", f"must be from 8 to 24, not {self.current_width}")
         if self.multiplier not in MULTIPLIERS:

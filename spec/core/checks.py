@@ -45,7 +45,10 @@ def check(spec: TachometerSpec) -> None:
     _check_health(spec)
     edges_of(spec.probe)
     if spec.compare is not None:
-        spec.compare.check(spec.timing.clock_hz, spec.position_width)
+        fastest = Fraction(0)
+        if spec.max_speed is not None:
+            fastest = min(spec.max_speed.counts(spec.encoder.counts_per_rev, spec.times.seconds(1)), Fraction(1))
+        spec.compare.check(spec.timing.clock_hz, spec.position_width, fastest)
     if spec.over_speed is not None and spec.scale.over_speed >= spec.scale.full_scale:
         unit = SpeedUnit(spec.over_speed.unit)
         greatest = f"{unit.of(spec.scale.full_scale * spec.scale.rad_per_s_per_lsb):.6g} {unit.name}"

@@ -38,6 +38,7 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
         ),
         *_if(spec.index_once, pin("home", "Homing, asynchronous; its rising edge lets the next index be taken.")),
         *_probe_pins(spec),
+        *_list_pins(spec),
         held(
             *(UPDATE, "velocity", spec.widths.velocity),
             signed=True,
@@ -190,11 +191,27 @@ def _probe_ports(spec: TachometerSpec) -> Iterable[Port]:
         yield held(valid, f"probe_time_{number}", spec.times.probe_width, unit="clocks", help=text)
 
 
+def _list_pins(spec: TachometerSpec) -> Iterable[Port]:
+    if spec.compare is None or not spec.compare.depth:
+        return
+    texts = {
+        "next": "Position that compare_append appends to the list of compare.",
+        "append": "Appends it, in each clock in which it is high; if there is room in the list.",
+        "clear": "Empties the list of compare.",
+    }
+    for name, text in texts.items():
+        width = spec.position_width if name == "next" else 1
+        yield Port(f"compare_{name}", "input", width, signed=width > 1, help=f"{text} Synchronous to clk.")
+
+
 def _compare_ports(spec: TachometerSpec) -> Iterable[Port]:
     if spec.compare is None:
         return
     yield held(TICK, "compare", help=f"Pulse at a position, of {spec.compare.width}. It does not wait for a tick.")
     yield held(TICK, "compare_count", COUNT_WIDTH, help="Pulses of compare since reset; it wraps.")
+    if depth := spec.compare.depth:
+        text = f"Positions in the list of compare, with the one that is awaited: {depth} are all."
+        yield held(TICK, "compare_waiting", depth.bit_length(), help=text)
     yield strobe(COMPARE, "The first clock of a pulse of compare.")
     text = "Position of the latest pulse of compare."
     yield held(COMPARE, "compare_position", spec.position_width, signed=True, unit="counts", help=text)

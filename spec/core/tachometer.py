@@ -232,10 +232,11 @@ class TachometerSpec:
     compare: Compare | None = option(  # noqa: RUF009
         None,
         "Output compare has pulses of WIDTH, a time or clocks, at COUNT positions (0: no end) from START on, STEP "
-        "counts apart, while the shaft turns forward, or backward with :backward at the end: 100:100:50:10us.",
-        metavar="START:STEP:COUNT:WIDTH",
+        "counts apart: 100:100:50:10us. They come while the shaft turns forward; with :backward at the end backward, "
+        "and with :both whichever way. list:DEPTH:WIDTH takes positions that a program writes, up to DEPTH ahead.",
+        metavar="[START:STEP:COUNT|list:DEPTH]:WIDTH",
         parse=Compare.parse,
-        tests=("", "2:3:0:7clk", "-2:3:40:1clk:backward"),
+        tests=("", "2:3:0:2clk", "-2:3:40:1clk:backward", "3:4:9:1clk:both", "list:3:2clk"),
         tacit=True,
     )
     chosen: str = field(default="", compare=False, repr=False)

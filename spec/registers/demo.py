@@ -43,6 +43,8 @@ class DemoMap(RegisterMap):
     """
 
     def __post_init__(self) -> None:
+        if self.spec.compare is not None and self.spec.compare.depth:
+            raise ParameterError("compare", "must not be a list with a demo, which has no input for it")
         if not self.spec.encoder.plain:
             raise ParameterError("sensor", "must be quadrature with a demo, its lines as they come: it emulates these")
 

@@ -61,6 +61,7 @@ class RegisterMap:
             *self._captured(),
             *self._placing(),
             *self._probing(),
+            *self._listing(),
             *self._added(),
             *self._interrupting(),
         )
@@ -271,34 +272,45 @@ class RegisterMap:
         """Return what the position is set to, and by how much the place within a modulus is moved."""
         spec = self.spec
         if spec.preset is not None:
-            words = {0: ""} if spec.position_width <= WORD else {0: "_LOW", WORD: "_HIGH"}
-            for shift, end in words.items():
-                last = spec.position_width <= shift + WORD
-                reset = spec.preset >> shift
-                field = Field(
-                    "value",
-                    WORD,
-                    help="Position that the input preset, or CONTROL.preset, sets.",
-                    writable=True,
-                    reset=reset if last else reset & (1 << WORD) - 1,
-                    signed=last,
-                    unit="counts",
-                    port="preset_value",
-                    shift=shift,
-                    bits=spec.position_width - shift if last else 0,
-                )
-                yield (
-                    f"PRESET{end}",
-                    ("Upper word. " if shift else "" if last else "Lower word. ") + field.help,
-                    (field,),
-                    {},
-                )
+            help = "Position that the input preset, or CONTROL.preset, sets."
+            yield from self._position("PRESET", help, "preset_value", spec.preset)
         if spec.modulus is not None:
             help = "Counts by which position_modulo is ahead of counts since reset, or since an index that resets."
             width = (spec.modulus - 1).bit_length()
             more: dict[str, Any] = {"unit": "counts", "bits": width, "least": 0, "most": spec.modulus - 1}
             field = Field("value", WORD, help=help, writable=True, port="modulo_offset", **more)
             yield "MODULO_OFFSET", help, (field,), {}
+
+    def _position(self, name: str, help: str, port: str, reset: int = 0) -> Iterable[Draft]:
+        """Return what holds a position that a program writes, in two words if it is wide."""
+        width = self.spec.position_width
+        for shift, end in ({0: ""} if width <= WORD else {0: "_LOW", WORD: "_HIGH"}).items():
+            last = width <= shift + WORD
+            field = Field(
+                "value",
+                WORD,
+                help=help,
+                writable=True,
+                reset=reset >> shift if last else reset & (1 << WORD) - 1,
+                signed=last,
+                unit="counts",
+                port=port,
+                shift=shift,
+                bits=width - shift if last else 0,
+            )
+            yield f"{name}{end}", ("Upper word. " if shift else "" if last else "Lower word. ") + help, (field,), {}
+
+    def _listing(self) -> Iterable[Draft]:
+        """Return registers that fill the list of the compare output."""
+        if self.spec.compare is None or not self.spec.compare.depth:
+            return
+        yield from self._position("COMPARE_NEXT", "Position for the list of compare.", "compare_next")
+        acts = {"append": "Writing 1 appends COMPARE_NEXT, if there is room.", "clear": "Writing 1 empties the list."}
+        fields = (
+            Field(name, 1, place, help, writable=True, single=True, port=f"compare_{name}")
+            for place, (name, help) in enumerate(acts.items())
+        )
+        yield "COMPARE_LIST", "Changes the list of compare; COMPARE_WAITING says how long it is.", tuple(fields), {}
 
     def _probing(self) -> Iterable[Draft]:
         """Return registers that arm probes, and choose their edges."""

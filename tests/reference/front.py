@@ -204,13 +204,20 @@ def _turns(settings: Settings, front: Front, late: int) -> list[tuple[int, int, 
 def compared(settings: Settings, front: Front) -> list[tuple[int, int]]:
     """Return clocks of steps that lead to the awaited positions, and these."""
     start, step, count, _, *direction = settings.words["compare"].split(":")
-    sign = -1 if direction == ["backward"] else 1
+    sign, both = -1 if direction == ["backward"] else 1, direction == ["both"]
     found: list[tuple[int, int]] = []
-    awaited, position, rises = int(start), 0, set(front.index)
+    number, position, rises = 0, 0, set(front.index)
+    while both and number < int(count) and int(start) + number * int(step) <= 0:
+        number += 1  # of those that lie behind
     for clock in sorted({*front.steps, *rises}):
         position = wrapped(position + front.steps.get(clock, 0), settings.position_bits)
         position = 0 if clock in rises and settings.flag("index-reset") else position
-        if front.steps.get(clock) == sign and position == awaited and (int(count) == 0 or len(found) < int(count)):
+        turn = front.steps.get(clock, 0)
+        back = both and turn < 0  # over the edge that the position is forward
+        if not turn or not (both or turn == sign) or (int(count) > 0 and number == (0 if back else int(count))):
+            continue
+        awaited = wrapped(int(start) + sign * (number - back) * int(step), settings.position_bits)
+        if wrapped(position + back, settings.position_bits) == awaited:
             found.append((clock, awaited))
-            awaited = wrapped(awaited + sign * int(step), settings.position_bits)
+            number += turn if both else 1
     return found

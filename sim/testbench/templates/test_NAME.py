@@ -41,8 +41,9 @@ async def agrees_with_the_golden_model(dut: Any) -> None:
     signed = {port["name"]: port["signed"] for port in json.loads((FILE.parent / f"{NAME}.json").read_text())["ports"]}
     for pin in vectors["pins"]:
         getattr(dut, pin).value = 0
-    if hasattr(dut, "probe_arm"):  # else it is a register
-        dut.probe_arm.value = 0
+    for name in ("probe_arm", "compare_next", "compare_append", "compare_clear"):
+        if hasattr(dut, name):  # else it is a register
+            getattr(dut, name).value = 0
     dut.rst.value = 1
     Clock(dut.clk, PERIOD, unit="ns").start()
     for _ in range(3):

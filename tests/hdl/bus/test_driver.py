@@ -223,12 +223,14 @@ def test_the_driver_converts_to_what_the_shaft_did(tmp_path: Path) -> None:
 def test_drivers_of_all_methods_are_strict_c(tmp_path: Path) -> None:
     """All in one program: no name of one meets that of another."""
     lines = []
-    for method in ("s", "m", "t", "mt", "rairan"):
-        for seed in range(3):
-            name = f"{method}_{seed}"
-            for file, text in register_files(RegisterMap(random_case(seed, method)[0]), name).items():
-                (tmp_path / file).write_text(text, encoding="utf-8")
-            lines.append(f'#include "{name}_driver.h"')
+    specs = {f"{m}_{seed}": random_case(seed, m)[0] for m in ("s", "m", "t", "mt", "rairan") for seed in range(3)}
+    specs |= {
+        f"list_{n}": of_texts("s", {"ppr": "9", "position-width": str(n), "compare": "list:4:1us"}) for n in (32, 33)
+    }
+    for name, spec in specs.items():
+        for file, text in register_files(RegisterMap(spec), name).items():
+            (tmp_path / file).write_text(text, encoding="utf-8")
+        lines.append(f'#include "{name}_driver.h"')
     (tmp_path / "main.c").write_text("\n".join([*lines, "int main(void) { return 0; }\n"]))
     build.run([*build.compiler(), *STRICT, "-c", "main.c", "-o", "main.o"], "compiler", tmp_path)
     plus = [*build.compiler(), "-x", "c++", "-std=c++11", *STRICT[3:]]

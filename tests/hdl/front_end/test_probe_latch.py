@@ -13,6 +13,7 @@ from support.simulate import clock_by_clock
 from support.verilog import play_native
 
 from tachometry.hdl.front_end import probe_latch
+from tachometry.sim import golden
 from tachometry.sim.captures.sigrok import write_sr
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.engines.pysim import PySim
@@ -122,9 +123,10 @@ def test_hardware_is_the_golden_model(case: str) -> None:
 
 def case_on_a_bus() -> tuple[TachometerSpec, RegisterMap, PinTrace, list[Access]]:
     """Return a core, its motion, and reads and writes of all registers, most of them those of probes."""
-    spec = of_texts("s", BASE)
+    spec = of_texts("s", BASE | {"compare": "list:3:2clk", "position-width": "8"})
     trace = stress(spec, seed=2, n_edges=40).until(2500)
     registers = RegisterMap(spec, irq=True)
+    ticks = golden.tables(spec, trace)["tick"]
     rng = np.random.default_rng(1)
     places = {register.name: register.offset // 4 for register in registers}
     accesses = []
@@ -132,9 +134,15 @@ def case_on_a_bus() -> tuple[TachometerSpec, RegisterMap, PinTrace, list[Access]
         address, data = int(rng.integers(len(places))), None
         if rng.random() < 0.2:
             name = rng.choice(
-                ["PROBE_ARM", "PROBE_EDGES", "INTERRUPT_ENABLE", "INTERRUPT_CLEAR"], p=[0.6, 0.1, 0.1, 0.2]
+                ["PROBE_ARM", "PROBE_EDGES", "INTERRUPT_ENABLE", "INTERRUPT_CLEAR", "COMPARE_NEXT", "COMPARE_LIST"],
+                p=[0.2, 0.1, 0.1, 0.1, 0.2, 0.3],
             )
             address, data = places[str(name)], int(rng.integers(1 << 8))
+            if name == "COMPARE_NEXT":  # mostly ahead of the shaft
+                here = ticks.position[np.searchsorted(ticks.clock, clock) - 1]
+                data = int(here + np.sign(ticks.position[-1]) * (data % 8 + 2)) & 0xFF
+            elif name == "COMPARE_LIST":
+                data = 2 if data % 3 == 0 else 1
         accesses.append(Access(clock, address, data))
     return spec, registers, trace, accesses
 
@@ -154,8 +162,10 @@ def test_registers_and_interrupt_of_exported_verilog(tmp_path: Path) -> None:
         got = seen[access.clock + 1][0] if data is not None else None, bool(seen[access.clock + 1][1])
         assert got == (data, error), f"{access}: {got}, not {data}, {error}"
         name = registers.registers[access.address].name
-        told |= {(name, data)} if name.startswith("PROBE") else set()
-    assert len(told) > 20
+        told |= {(name, data)} if name.startswith(("PROBE", "COMPARE")) else set()
+    assert len([name for name, _ in told if name.startswith("PROBE")]) > 20
+    assert len([name for name, _ in told if name == "COMPARE_WAITING"]) == 4
+    assert len([name for name, _ in told if name == "COMPARE_COUNT"]) > 2
     assert [bool(row[2]) for row in seen] == bank.irq(accesses, trace.n_clocks)[: len(seen)]
     assert len(bank.interrupts()["probe"]) > 10
 

@@ -13,10 +13,58 @@ SEEN = ["compare", "compare_valid", "compare_position", "compare_count"]
 CASES = [
     (Compare(2, 3, 0, "4clk"), 4),
     (Compare(-4, 1, 5, "1clk"), 1),
-    (Compare(5, 2, 3, "9clk", backward=True), 9),
-    (Compare(-7, 15, 0, "2clk", backward=True), 2),
+    (Compare(5, 2, 3, "9clk", direction="backward"), 9),
+    (Compare(-7, 15, 0, "2clk", direction="backward"), 2),
+    (Compare(-3, 2, 0, "2clk", direction="both"), 2),
+    (Compare(-3, 3, 4, "1clk", direction="both"), 1),
+    (Compare(0, 0, 0, "3clk", direction="both", depth=4), 3),
+    (Compare(0, 0, 0, "1clk", direction="backward", depth=2), 1),
 ]
 WIDTH = 5
+
+
+class Listed:
+    """A list of which one position is awaited, and one less than `depth` wait."""
+
+    def __init__(self, compare: Compare) -> None:
+        self.compare = compare
+        self.waiting, self.awaited = list[int](), list[int]()
+
+    def place(self, step: int) -> int | None:
+        """Return the position that is awaited by such a step."""
+        return self.awaited[0] if self.awaited else None
+
+    def move(self, row: dict[str, int], reached: bool) -> None:
+        """Go through a clock."""
+        room = len(self.waiting) < self.compare.depth - 1
+        if self.waiting and (reached or not self.awaited):
+            self.awaited = [self.waiting.pop(0)]
+        elif reached:
+            self.awaited = []
+        self.waiting += [row["compare_next"]] if row["compare_append"] and room else []
+        if row["compare_clear"]:
+            self.waiting, self.awaited = [], []
+
+
+class Computed:
+    """Positions that lie equally apart, by their numbers."""
+
+    def __init__(self, compare: Compare) -> None:
+        self.compare, self.number, self.both = compare, 0, compare.direction == "both"
+        while self.both and (self.number < (compare.count or 99)) and compare.start + self.number * compare.step <= 0:
+            self.number += 1
+
+    def place(self, step: int) -> int | None:
+        """Return the position that is awaited by such a step."""
+        back = self.both and step < 0
+        if self.compare.count and self.number == (0 if back else self.compare.count):
+            return None
+        sign = -1 if self.compare.direction == "backward" else 1
+        return (self.compare.start + sign * (self.number - back) * self.compare.step + 16) % 32 - 16
+
+    def move(self, row: dict[str, int], reached: bool) -> None:
+        """Go through a clock."""
+        self.number += reached * (row["step"] if self.both else 1)
 
 
 def check(case: tuple[Compare, int], seed: int) -> None:
@@ -28,20 +76,32 @@ def check(case: tuple[Compare, int], seed: int) -> None:
         way = way if rng.random() < 0.95 else -way
         step = int(way * (rng.random() < 0.6))
         position = (position + step + 16) % 32 - 16
-        rows.append({"step": step, "position": position})
-    seen = clock_by_clock(compare_output.CompareOutput(compare, clocks, WIDTH), rows, SEEN)
-    awaited, begun = compare.start, list[int]()
-    wanted = dict.fromkeys(SEEN, 0)
+        row = {"step": step, "position": position}
+        if compare.depth:
+            place = (position + way * int(rng.integers(0, 6)) + 16) % 32 - 16
+            row |= {"compare_next": place, "compare_append": int(rng.random() < 0.3)}
+            row |= {"compare_clear": int(rng.random() < 0.02)}
+        rows.append(row)
+    names = [*SEEN, "compare_waiting"][: 5 if compare.depth else 4]
+    seen = clock_by_clock(compare_output.CompareOutput(compare, clocks, WIDTH), rows, names)
+    rule = Listed(compare) if compare.depth else Computed(compare)
+    begun = list[int]()
+    wanted = dict.fromkeys(names, 0)
     for clock, row in enumerate(rows):
         wanted["compare"] = int(bool(begun) and clock - begun[-1] < clocks)
         wanted["compare_valid"] = int(bool(begun) and clock == begun[-1])
+        if isinstance(rule, Listed):
+            wanted["compare_waiting"] = len(rule.waiting) + len(rule.awaited)
         assert seen[clock] == wanted, (case, seed, clock)
-        more = not compare.count or len(begun) < compare.count
-        if more and row["step"] == (-1 if compare.backward else 1) and row["position"] == awaited:
+        down, awaited = row["step"] < 0, rule.place(row["step"])
+        edge = (row["position"] + (down and compare.direction == "both") + 16) % 32 - 16
+        wrong = {"forward": down, "backward": not down, "both": False}[compare.direction]
+        reached = row["step"] != 0 and not wrong and edge == awaited
+        if reached and awaited is not None:
             begun.append(clock + 1)
             wanted |= {"compare_position": awaited, "compare_count": len(begun)}
-            awaited = (awaited + (-compare.step if compare.backward else compare.step) + 16) % 32 - 16
-    assert len(begun) == compare.count or len(begun) > 5
+        rule.move(row, reached)
+    assert len(begun) > 5 or (len(begun) == compare.count and compare.direction != "both")
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -59,13 +119,19 @@ def check_all() -> None:
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("self.step[0] & ", ""),
-        ("(self.step[1] == compare.backward) & ", ""),
+        ("return self.step[0] & (back", "return (back"),
+        ("(back == (direction == BACKWARD)) & ", ""),
+        ("self.position + back", "self.position"),
+        ("Mux(back, awaited - compare.step, awaited)", "awaited"),
+        ("Mux(back, number.any(), number != compare.count)", "number != compare.count"),
+        ("init=compare.passed", "init=0"),
+        ("fifo.r_rdy & self._at(awaited)", "self._at(awaited)"),
+        ("ResetInserter(self.compare_clear)(fifo)", "fifo"),
         ("self.compare_count != compare.count", "self.compare_count != compare.count + 1"),
         ("left.eq(left - 1)", "left.eq(left >> 1)"),
         ("left.eq(self._clocks)", "left.eq(self._clocks - 1)"),
         ("awaited.eq(awaited + compare.apart)", "awaited.eq(awaited + compare.step)"),
-        ("self.compare_position.eq(awaited)", "self.compare_position.eq(compare.start)"),
+        ("self.compare_position.eq(awaited)", "self.compare_position.eq(self._compare.start)"),
     ],
 )
 def test_mutants_are_noticed(right: str, wrong: str) -> None:
