@@ -116,6 +116,7 @@ compare: $(LINKED) ## all methods and what others use in several situations, wri
 
 studies: $(VENV)/.test ## control loops, tracking, encoders, changes of flip-flops, written to docs/measured
 	$(BIN)/python bench/encoder.py
+	$(BIN)/python bench/health.py
 	$(BIN)/python bench/toggles.py -o docs/measured/toggles.md
 	$(BIN)/python bench/tracking.py -o docs/measured/track.md
 	$(BIN)/python bench/control.py -o docs/measured/control.md --plot docs/measured/control.png

