@@ -17,7 +17,7 @@ from proofs.mutation.loops import LOOPS, Commanded
 from proofs.mutation.netlist import GROUP, exported, mutants
 from proofs.mutation.score import hold
 from proofs.mutation.simulate import library, run
-from proofs.mutation.stimulus import Stimulus, ending, steps, stimulus
+from proofs.mutation.stimulus import Stimulus, bursts, ending, steps, stimulus
 from support.nightly import nightly
 
 from tachometry.sim import golden
@@ -117,6 +117,13 @@ def test_registers_power_up_as_in_the_core(tmp_path: Path) -> None:
         found = [mutant for mutant in found if mutant.option("port") == "Q"][:GROUP]
         _, rows = run(library(case.pins, flat, found), len(found), len(case.pins.outputs), played.pins, 3000)
         hold(case, played, rows)
+
+
+def test_an_external_tick_comes_at_regular_times() -> None:
+    trace = bursts(next(case for case in CASES if case.spec.external_tick).spec, np.random.default_rng(1))
+    assert trace.tick_in is not None
+    rises = trace.clock[1:][trace.tick_in[1:] > trace.tick_in[:-1]]
+    assert len({*np.diff(rises).tolist()}) == 1
 
 
 def test_steps_have_windows_of_all_lengths_and_all_counts() -> None:

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress
-from tachometry.sim.signals.recording import LINES, PinTrace, packed, quadrature
+from tachometry.sim.signals.recording import PinTrace, packed, quadrature
 from tachometry.spec import STachometer, TachometerSpec
 from tachometry.spec.formats.reciprocal import Reciprocal
 
+_LINES = ("a", "b", "z", "tick_in")  # of the cores that are mutated
 _EDGES = 60  # of a motion, at each of its speeds
 _LONG = 100  # clocks of a tick with which motions have fewer edges, and lines change a few times in a tick
 _RATTLE = 40_000  # clocks
@@ -67,7 +68,7 @@ def noise(
     """Return such lines; those of the shaft stand still if wanted."""
     cycles = spec.timing.tick_cycles
     factor = 1 if cycles <= _LONG else float(rng.choice([1, 10 / cycles, 10 / cycles, 30 / cycles]))
-    lines = noise_lines(rng, n_clocks, len(LINES), n_parts, factor)
+    lines = noise_lines(rng, n_clocks, len(_LINES), n_parts, factor)
     if still:
         lines[:2] = lines[:2, :1]
     return _trace(spec, lines)
@@ -189,14 +190,14 @@ def _levels(clock: NDArray[np.int64], quarter: NDArray[np.int64], n_clocks: int)
 def _trace(spec: TachometerSpec, level: NDArray[np.uint8]) -> PinTrace:
     """Return the trace with these levels of A, B, Z and the tick, as far as they are there."""
     names = _lines(spec)
-    rows = level[[LINES.index(name) for name in names]]
+    rows = level[[_LINES.index(name) for name in names]]
     clock = np.flatnonzero(np.append(True, (rows[:, 1:] != rows[:, :-1]).any(axis=0)))
     return PinTrace(clock, n_clocks=level.shape[1], **dict(zip(names, rows[:, clock], strict=True)))
 
 
 def _lines(spec: TachometerSpec) -> list[str]:
     """Return inputs that are no clock and no reset, in the order of the ports."""
-    return [port.name for port in spec.ports if port.name in LINES]
+    return [port.name for port in spec.ports if port.name in _LINES]
 
 
 def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
