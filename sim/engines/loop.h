@@ -57,7 +57,7 @@ struct Watch {
   const Core &core;
   Gates *gates;
   int64_t now = 0, begun = 0;  // clock of the update before
-  int64_t outputs[N_COLUMNS];
+  int64_t outputs[N_COLUMNS] = {};
 #if GATES
   uint64_t levels[N_PINS] = {};
 
@@ -111,13 +111,14 @@ struct Watch {
   }
 #endif
 
-  void to(int64_t clock) {
-    for (; now < clock; now++) {
+  // Goes on to a clock, and looks at the outputs in it if it is asked to.
+  void to(int64_t clock, bool looks) {
+    for (; now < clock || looks; now++) {
       model.settle();
-      if (model.strobe()) {
-        model.outputs(outputs);
-        shown();
-      }
+      bool there = now >= clock;
+      if (there || model.strobe()) model.outputs(outputs);
+      if (there) break;
+      if (model.strobe()) shown();
       int64_t idle = model.idle();
       if (idle > 1) {
         idle = std::min(idle, clock - now);
@@ -127,11 +128,6 @@ struct Watch {
         model.edge();
       }
     }
-  }
-  int64_t position() {
-    model.settle();
-    model.outputs(outputs);
-    return outputs[core.position];
   }
 };
 
@@ -164,7 +160,7 @@ ENTRY __attribute__((flatten)) void loop_run(Loop *loop) {
     double speed = course.speed[at] + slope * within;
     if (act.at(clock)) driven = control.command;
     bool ticks = tick.at(clock), logs = log.at(clock);
-    int64_t position = ticks || logs ? watch.position() : 0;
+    int64_t position = watch.outputs[core.position];
     if (ticks) {
       double angle = course.angle[at] + (course.speed[at] + slope * within / 2) * within;
 #if GATES
@@ -198,7 +194,7 @@ ENTRY __attribute__((flatten)) void loop_run(Loop *loop) {
         double way = shaft.angle - before, part = way == 0 ? 0 : ((turn > 0 ? shaft.above : shaft.below) - before) / way;
         stop = std::min(clock + int64_t(std::clamp(part, 0.0, 1.0) * double(until - clock)), until - 1);
       }
-      watch.to(stop);
+      watch.to(stop, !turn && (until == tick.next || until == log.next));
       if (!turn) break;
       shaft.pass(turn);
       watch.lines(shaft.lines());
