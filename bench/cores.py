@@ -27,6 +27,7 @@ from tachometry.spec import (
 )
 from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.core.compare import Compare
+from tachometry.spec.core.stream import Stream
 from tachometry.spec.registers.buses import BUSES, bus_of, ports_on
 from tachometry.spec.registers.demo import DemoMap, demo_manifest, demo_ports
 
@@ -192,6 +193,7 @@ CONFIGURATIONS = (
     Configuration("preset", "position is set by an input", replace(REFERENCE, preset=0)),
     Configuration("probe", "a probe latches position and time", replace(REFERENCE, probe="rising")),
     Configuration("compare", "pulses at positions", replace(REFERENCE, compare=Compare(100, 100, 50, "10us"))),
+    Configuration("stream", "AXI4-Stream of records", replace(REFERENCE, stream=Stream())),
     Configuration("over-speed", "trips at 900 rad/s", replace(REFERENCE, over_speed=Speed.parse("900rad/s"))),
     Configuration("health", "faults of lines and index", replace(REFERENCE, index=True, health=True)),
     Configuration(

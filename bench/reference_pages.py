@@ -19,6 +19,7 @@ from tachometry.sim.studies.sweeping.sweep import COLUMNS
 from tachometry.spec import METHODS, Encoder, Port, TachometerSpec, Timing, of_texts
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.ports import loop_ports
+from tachometry.spec.core.stream import parts_of
 from tachometry.spec.registers.buses import BUSES
 from tachometry.spec.registers.loop import LoopMap
 from tachometry.spec.registers.map import RegisterMap
@@ -49,6 +50,7 @@ SPEED = {
 }
 _HEADER = ["port", "when", "kind", "meaning"]
 _LOOP = LoopSpec(tachometer=of_texts("s", {"ppr": "500", "max-speed": "1000rad/s"}))
+_STREAM = of_texts("track", {"ppr": "500", "max-speed": "1000rad/s", "stream": "axi"})
 _INTERRUPT = """
 ## An interrupt
 
@@ -261,6 +263,13 @@ def ports() -> str:
             "\nThe manifest states the latencies: a level sampled at clock c is counted in the window of c + "
             "`pin_to_count`, `tick` is high `tick_latency` clocks after the window's last clock, and `velocity_valid` "
             "`tick_to_velocity` clocks after `tick`.\n",
+            "## Of a stream\n",
+            "With `--stream` a core has these as well. The second table has the numbers of a record of `track`, "
+            "little-endian; other methods have no fine position and no acceleration. Numbers of more than 32 bits take "
+            "8 bytes: the manifest says where they all are, and what the bits of `flags` are. "
+            "[A stream for a DMA](../guides/integration.md#a-stream-for-a-dma) shows how to read them.\n",
+            markdown(_HEADER, [_described(port) for port in _streamed()], left=range(4)),
+            markdown(["number", "byte", "bytes", "kind"], _record(), left=[0, 3]),
             "## Of a control loop\n",
             "With `--loop` a core has these as well. Commands and outputs are synchronous to the clock.\n",
             markdown(_HEADER, [_described(port) for port in loop_ports(_LOOP)], left=range(4)),
@@ -271,6 +280,18 @@ def ports() -> str:
             markdown(_HEADER, [_described(port) for port in _beyond(gains="inputs")], left=range(4)),
         ]
     )
+
+
+def _streamed() -> list[Port]:
+    """Return ports that a stream adds."""
+    alone = {port.name for port in _STREAM.ports} - {port.name for port in replace(_STREAM, stream=None).ports}
+    return [port for port in _STREAM.ports if port.name in alone]
+
+
+def _record() -> list[list[str]]:
+    """Return rows of the table of what is in a record."""
+    kinds = ("unsigned", "signed")
+    return [[f"`{one.name}`", str(one.offset), str(one.size), kinds[one.signed]] for one in parts_of(_STREAM)]
 
 
 def boards() -> str:

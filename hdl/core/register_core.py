@@ -63,11 +63,16 @@ class RegisterCore(wiring.Component):
             switched = given & bank.loop_enable if pin.name == "enable" else given
             m.d.comb += getattr(whole, pin.name).eq(switched)
         follow(m, self, whole, (port.name for port in self._map.core.ports.outputs if port.name != _MODULO))
+        follow(m, self, whole, (port.name for port in spec.ports.streamed))
         follow(m, bank, whole, (port.name for port in spec.ports.outputs if port.name in names))
         follow(m, bank, whole, spec.ports.strobes)
         m.d.comb += [
             bank.capture.eq(self.capture),
-            *(box.clear.eq(bank.clear) for box in (core.conditioner, core.watch, core.trip) if box is not None),
+            *(
+                box.clear.eq(bank.clear)
+                for box in (core.conditioner, core.watch, core.trip, core.stream)
+                if box is not None
+            ),
             position.tick.eq(core.tick),
             position.position.eq(core.position),
             bank.position.eq(position.latest),

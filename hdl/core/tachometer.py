@@ -24,6 +24,7 @@ from tachometry.hdl.methods.datapath import LongTicks, OwnStandstill, OwnTicks, 
 from tachometry.hdl.output.compare_output import CompareOutput
 from tachometry.hdl.output.low_pass import LowPass
 from tachometry.hdl.output.over_speed import OverSpeed
+from tachometry.hdl.output.record_stream import RecordStream
 from tachometry.hdl.output.standstill import Standstill
 from tachometry.hdl.output.update import update_layout
 from tachometry.hdl.output.update_age import UpdateAge
@@ -33,6 +34,7 @@ from tachometry.hdl.wires.ports import follow, members
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.compare import LIST_PINS
 from tachometry.spec.core.probe import packed_edges
+from tachometry.spec.core.stream import READY, flags_of, parts_of, size_of
 from tachometry.spec.language.port import UPDATE
 
 
@@ -115,6 +117,9 @@ class Tachometer(wiring.Component):
         if spec.compare is not None:
             clocks = spec.compare.clocks(spec.timing.clock_hz)
             self.compare_output = CompareOutput(spec.compare, clocks, spec.position_width)
+        self.stream: RecordStream | None = None
+        if spec.stream is not None:
+            self.stream = RecordStream(parts_of(spec), len(flags_of(spec)) - 1, size_of(spec), spec.stream.packet)
         self.trip = None if spec.over_speed is None else OverSpeed(spec.scale.over_speed, spec.widths.velocity)
 
     @property
@@ -125,7 +130,7 @@ class Tachometer(wiring.Component):
     @property
     def idle(self) -> tuple[Idle, ...]:
         """Registers that a simulation may move on."""
-        names = ("conditioner", "probe_latch", "watch", "compare_output", "datapath")
+        names = ("conditioner", "probe_latch", "watch", "compare_output", "stream", "datapath")
         boxes: dict[str, object] = {name: getattr(self, name) for name in names}
         if not self._spec.facts.own_ticks:
             boxes["sampling_clock"] = self.sampling_clock
@@ -152,6 +157,7 @@ class Tachometer(wiring.Component):
         self._probe(m)
         self._watch(m)
         self._compare(m)
+        self._stream(m)
         if self.trip is not None:
             m.submodules.trip = self.trip
             follow(m, self.trip, self, ("velocity_valid", "velocity"))
@@ -349,3 +355,17 @@ class Tachometer(wiring.Component):
             follow(m, box, self, LIST_PINS)
             shown.append("compare_waiting")
         follow(m, self, box, shown)
+
+    def _stream(self, m: Module) -> None:
+        """Send records, if they are asked for."""
+        if self.stream is None or self._spec.stream is None:
+            return
+        m.submodules.stream = box = self.stream
+        when = self._spec.stream.when
+        event: Value = self.tick if when == "tick" else self.velocity_valid
+        if when == "edge":
+            (event,) = delay(m, self.decoder.step[0], clocks=self._spec.latency.tick)
+        flags = flags_of(self._spec)[1:]
+        m.d.comb += [box.event.eq(event), box.flags.eq(Cat(getattr(self, name) for name in flags))]
+        follow(m, box, self, (READY, *(part.name for part in parts_of(self._spec)[2:])))
+        follow(m, self, box, ("overruns", *(port.name for port in self._spec.ports.streamed)))

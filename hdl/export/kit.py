@@ -59,7 +59,10 @@ def _synchronizers(spec: AnySpec, bus: Bus | None) -> dict[str, list[str]]:
     """Return where the synchroniser of each pin is in the core: the boxes from the outermost to itself."""
     box = {"tick_in": ["sampling_clock"]} if spec.axes is None else {}
     default = ["conditioner"] if spec.axes is None else []
-    boxes = {pin.name: box.get(pin.name, default) for pin in spec.tachometer.ports.pins}
+    tacho = spec.tachometer
+    complements = [f"{line}_n" for line in tacho.complemented]
+    pins = (*tacho.lines, *complements, *tacho.probes, *["tick_in"] * tacho.external_tick)
+    boxes = {pin: box.get(pin, default) for pin in pins}
     boxes |= {line: ["bridge"] for line in (bus.asynchronous if bus else ())}
     return {pin: [*path, f"sync_{pin}"] for pin, path in boxes.items()}
 

@@ -12,6 +12,7 @@ from tachometry.sim.signals.axes import AxesTrace, Trace
 from tachometry.sim.signals.recording import PinTrace, merged, quadrature
 from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
 from tachometry.spec.core.sensors import packed_levels
+from tachometry.spec.core.stream import READY
 
 _SPEEDS = (0.3, 1.01, 1.5, 2.2, 3.25, 0.1)  # counts per tick
 
@@ -79,16 +80,21 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
 
 
 def _probed(spec: TachometerSpec, trace: PinTrace, seed: int) -> PinTrace:
-    """Return the trace with edges of probes in clocks of edges, beside them and anywhere, armed now and then."""
-    if not spec.probes:
+    """Return the trace with edges of probes in clocks of edges, beside them and anywhere, armed now and then; a stream
+    is ready now and then.
+    """
+    bits = {"probe": len(spec.probes), "probe_arm": len(spec.probes), READY: int(spec.stream is not None)}
+    if not any(bits.values()):
         return trace
     rng = np.random.default_rng([seed, 2])
     near = rng.choice(trace.clock, len(trace.clock) // 2) + rng.integers(-2, 3, len(trace.clock) // 2)
     clock = merged(trace.clock, np.clip(near, 0, trace.n_clocks - 1), rng.integers(0, trace.n_clocks, 100))
     lines = trace.at(clock)
-    for name, often in (("probe", 0.4), ("probe_arm", 0.2)):
+    for name, often in (("probe", 0.4), ("probe_arm", 0.2), (READY, 0.4)):
+        if not bits[name]:
+            continue
         row = np.maximum.accumulate(np.where(rng.random(len(clock)) < often, np.arange(len(clock)), 0))
-        lines[name] = rng.integers(0, 1 << len(spec.probes), len(clock)).astype(np.uint8)[row]
+        lines[name] = rng.integers(0, 1 << bits[name], len(clock)).astype(np.uint8)[row]
     return PinTrace.of_lines(clock, trace.n_clocks, lines)
 
 

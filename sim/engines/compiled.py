@@ -59,8 +59,8 @@ class Design:
 
     @property
     def wide(self) -> bool:
-        """Whether the level of a pin is a number, with a bit for each axis; else all levels are the bits of a byte."""
-        return any(pin.width > 1 for pin in self.pins)
+        """Whether levels are numbers, one for each pin, with a bit for each axis; else all are the bits of a byte."""
+        return len(self.pins) > 8 or any(pin.width > 1 for pin in self.pins)
 
     def levels(self, trace: Trace) -> NDArray[Any]:
         """Return levels of all pins for each row of a trace, as `pins_text` reads them."""

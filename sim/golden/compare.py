@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.golden.front_end import Steps, positions
+from tachometry.sim.golden.front_end import Steps, positions_at
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
@@ -38,7 +38,7 @@ def pulses(spec: TachometerSpec, steps: Steps, trace: PinTrace) -> dict[str, Tab
         return {}
     half = 1 << spec.position_width - 1
     # Both ways a position is the edge below it, so a step down from it leads over it.
-    place = positions(spec, steps) + ((steps.step < 0) & (compare.direction == BOTH))
+    place = positions_at(spec, steps, steps.clock, reset=True) + ((steps.step < 0) & (compare.direction == BOTH))
     place = (place + half) % (2 * half) - half
     clock = steps.clock + spec.latency.tick
     ways = {

@@ -336,15 +336,13 @@ class _Origins:
         return found
 
 
-def positions_at(spec: TachometerSpec, steps: Steps, clock: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the position with all steps of each clock and before, before an index of the clock resets it."""
+def positions_at(
+    spec: TachometerSpec, steps: Steps, clock: NDArray[np.int64], *, reset: bool = False
+) -> NDArray[np.int64]:
+    """Return the position with all steps of each clock and before, before an index of the clock resets it or after."""
     total = np.append(0, np.cumsum(steps.step))[np.searchsorted(steps.clock, clock, side="right")]
-    return wrapped(spec, total - _Origins.of(spec, steps).before_reset(clock, steps))
-
-
-def positions(spec: TachometerSpec, steps: Steps) -> NDArray[np.int64]:
-    """Return the position after each step."""
-    return wrapped(spec, np.cumsum(steps.step) - _Origins.of(spec, steps).after(steps.clock))
+    origins = _Origins.of(spec, steps)
+    return wrapped(spec, total - (origins.after(clock) if reset else origins.before_reset(clock, steps)))
 
 
 def homed(spec: TachometerSpec, steps: Steps, clock: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -9,6 +9,7 @@ from tachometry.sim import golden
 from tachometry.sim.golden import compare, health, probe
 from tachometry.sim.golden.front_end import decoded, homed
 from tachometry.sim.signals.recording import PinTrace
+from tachometry.spec.core.stream import OVERRUNS_WIDTH
 from tachometry.spec.language.port import INDEX, TICK, UPDATE, WIDE
 from tachometry.spec.registers.field import WORD, Field, Register
 from tachometry.spec.registers.map import COUNTER_WIDTH, RegisterMap
@@ -241,7 +242,12 @@ class GoldenBank:
             **self._shown(compare.shown(self._map.spec, self._tables, np.array([clock]))),
             **({"probed": int(probe.shown(self._tables["probed"], np.array([clock]))[0])} if self._latched else {}),
             **(self._faults(clock) if self._map.spec.health else {}),
+            **({"overruns": self._overruns(clock)} if self._map.spec.stream else {}),
         }
+
+    def _overruns(self, clock: int) -> int:
+        dropped = self._count(self._tables["overruns"].clock, self._cleared + 1, clock)
+        return min(dropped, (1 << OVERRUNS_WIDTH) - 1)
 
     @property
     def _latched(self) -> list[np.ndarray]:

@@ -17,6 +17,7 @@ from tachometry.sim.signals.source import Source
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.compare import LIST_PINS
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
+from tachometry.spec.core.stream import READY
 from tachometry.spec.language.units import format_time
 
 LINES = ("a", "b", "c", "z", "tick_in")
@@ -215,7 +216,7 @@ class PinTrace(_Lines):
     @classmethod
     def of(cls, recording: Recording, spec: TachometerSpec) -> "PinTrace":
         """Return what the pins of a core see of a recording: with nominal external ticks if the core takes them and
-        there are none, and with probes that are always armed.
+        there are none, and with probes that are always armed and a stream that is always ready.
 
         Raises
         ------
@@ -265,7 +266,7 @@ class PinTrace(_Lines):
 
     def completed(self, spec: TachometerSpec) -> "PinTrace":
         """Return the same trace with all inputs of a core: with nominal external ticks if it takes them, and all else
-        that is missing low, but probes armed, and complements those of their lines.
+        that is missing low, but probes armed, a stream ready, and complements those of their lines.
         """
         if spec.external_tick and self.tick_in is None:
             return self.with_tick_in(nominal_ticks(spec, self.n_clocks)).completed(spec)
@@ -275,6 +276,8 @@ class PinTrace(_Lines):
         low |= {f"{line}_n": self.lines[line] ^ np.uint8(1) for line in spec.complemented}
         if spec.compare is not None and spec.compare.depth:
             low |= dict.fromkeys(LIST_PINS, np.zeros_like(self.a))
+        if spec.stream is not None:
+            low[READY] = np.ones_like(self.a)
         return PinTrace.of_lines(self.clock, self.n_clocks, low | self.lines) if low else self
 
 

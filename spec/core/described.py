@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from tachometry.spec.core.stream import stream_entry
 from tachometry.spec.language.option import options_of
 from tachometry.spec.language.units import written_time
 
@@ -33,6 +34,7 @@ def entries_of(spec: TachometerSpec) -> dict[str, Any]:
             "full_scale_rad_per_s": scale.full_scale * scale.rad_per_s_per_lsb,
         },
         **spec.method_entries,
+        "stream": stream_entry(spec),
         "max_time_cycles": times.longest,
         "min_time_cycles": times.shortest,
         "bounds": {"none": spec.bound.shown_absent} if spec.bounds else None,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from tachometry.spec.core.compare import COUNT_WIDTH
 from tachometry.spec.core.health import FAULT_TEXTS, FAULT_WIDTH, FAULTS_WIDTH, OPEN
+from tachometry.spec.core.stream import READY, stream_ports
 from tachometry.spec.language.port import COMPARE, INDEX, TICK, UPDATE, WIDE, Port, held, pin, strobe
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
         *_if(spec.index_once, pin("home", "Homing, asynchronous; its rising edge lets the next index be taken.")),
         *_probe_pins(spec),
         *_list_pins(spec),
+        *_if(spec.stream, pin(READY, "The record is taken in this clock; synchronous to clk.")),
         held(
             *(UPDATE, "velocity", spec.widths.velocity),
             signed=True,
@@ -162,6 +164,7 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
                 "ticks it counts on, and a capture takes what it is then.",
             ),
         ),
+        *stream_ports(spec),
     )
 
 

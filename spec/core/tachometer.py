@@ -19,6 +19,7 @@ from tachometry.spec.core.probe import PROBE_HELP, edges_of, parse_probes
 from tachometry.spec.core.recovery import Recovery
 from tachometry.spec.core.scale import Scale
 from tachometry.spec.core.sensors import EDGE, Levels, parse_modulo, parse_state
+from tachometry.spec.core.stream import STREAM_HELP, Stream
 from tachometry.spec.core.times import Times
 from tachometry.spec.core.timing import Timing, parse_clocks, parse_filter
 from tachometry.spec.core.tooth_wheel import ToothWheel
@@ -237,6 +238,14 @@ class TachometerSpec:
         metavar="[START:STEP:COUNT|list:DEPTH]:WIDTH",
         parse=Compare.parse,
         tests=("", "2:3:0:2clk", "-2:3:40:1clk:backward", "3:4:9:1clk:both", "list:3:2clk"),
+        tacit=True,
+    )
+    stream: Stream | None = option(  # noqa: RUF009
+        None,
+        STREAM_HELP,
+        metavar="axi[:WHEN[:N]]",
+        parse=Stream.parse,
+        tests=("", "axi:update:3", "axi:edge:2", "axi:tick:1"),
         tacit=True,
     )
     chosen: str = field(default="", compare=False, repr=False)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 TICK, UPDATE, INDEX, COMPARE = "tick", "velocity_valid", "index_valid", "compare_valid"
 WIDE = "index_wide"
+STREAM = "m_axis"  # names of ports of a stream begin with it
 
 
 @dataclass(frozen=True)
@@ -71,8 +72,13 @@ class Ports(tuple[Port, ...]):
 
     @property
     def outputs(self) -> tuple[Port, ...]:
-        """Outputs of the exported core, in order."""
-        return tuple(port for port in self if port.direction == "output")
+        """Outputs of the exported core but those of a stream, in order."""
+        return tuple(port for port in self if port.direction == "output" and not port.name.startswith(STREAM))
+
+    @property
+    def streamed(self) -> tuple[Port, ...]:
+        """Outputs of a stream."""
+        return tuple(port for port in self if port.direction == "output" and port.name.startswith(STREAM))
 
     @property
     def strobes(self) -> dict[str, tuple[str, ...]]:

@@ -28,6 +28,7 @@ _LEFT_OUT: tuple[tuple[str, Any, str], ...] = (
     ("probe", "", f"what latches {_FOR_ONE}"),
     ("compare", None, f"what compares positions {_FOR_ONE}"),
     ("over_speed", None, f"what trips {_FOR_ONE}"),
+    ("stream", None, f"what sends records {_FOR_ONE}"),
     ("preset", None, f"what sets the position {_FOR_ONE}"),
     ("index_once", False, f"what waits for home {_FOR_ONE}"),
     ("position_modulo", None, f"its counter {_FOR_ONE}"),

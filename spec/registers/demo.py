@@ -52,6 +52,8 @@ class DemoMap(RegisterMap):
             raise ParameterError("complements", "must be left out of a demo, which emulates lines without complements")
         if self.spec.probe:
             raise ParameterError("probe", "must be left out of a demo, which emulates an encoder and no probe")
+        if self.spec.stream:
+            raise ParameterError("stream", "must be left out of a demo, whose pins lead to no DMA")
 
     @cached_property
     def ports(self) -> tuple[Port, ...]:

@@ -3,6 +3,7 @@
 import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -145,5 +146,7 @@ def play(
     assert said == "", f"warnings of Icarus:\n{said}"
     np.savetxt(folder / "pins.txt", changes, fmt="%d")
     subprocess.run(["vvp", "-n", "core.vvp"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
-    rows = np.loadtxt(folder / "rows.txt", dtype=np.int64, ndmin=2)
+    wide = any(port.width > 63 for port in outputs)  # which are Python's integers
+    more: dict[str, Any] = {"dtype": object, "converters": int} if wide else {"dtype": np.int64}
+    rows = np.loadtxt(folder / "rows.txt", ndmin=2, **more)
     return rows.reshape(-1, 1 + len(outputs))

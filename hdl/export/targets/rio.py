@@ -85,6 +85,8 @@ def _check(spec: TachometerSpec, values: Iterable[Port]) -> None:
     for name in spec.controls:
         option = {"preset": "preset", "home": "index_once"}[name]
         raise ParameterError(option, "must not be given for RIO, which has no pin for it")
+    if spec.stream:
+        raise ParameterError("stream", "must not be given for RIO, which has no DMA for it")
     if spec.index_reset:
         raise ParameterError("index_reset", "must not be given for RIO: its pin index-enable resets the position")
     for port in values:

@@ -7,6 +7,7 @@ from typing import Any
 from tachometry.hdl.export.registers.values import is_whole, sentences
 from tachometry.hdl.export.render import render_files
 from tachometry.spec.control import AnySpec
+from tachometry.spec.language.port import STREAM
 from tachometry.spec.registers.buses import Bus, ports_on, registers_on
 
 _MADE = ("NAME_ip/component.xml", "NAME_ip/NAME_ip.v")
@@ -64,31 +65,34 @@ def vivado(spec: AnySpec, name: str, bus: Bus | None, made: Mapping[str, str]) -
     ports = ports_on(spec, bus)
     there = _INTERFACES[bus.name] if bus else None
     outer = {port.name: port.name for port in ports}
-    holes: dict[str, Any] = {"clock": "clk", "reset": "rst", "polarity": "ACTIVE_HIGH", "bus": "", "associated": ""}
-    associated: dict[str, str] = {}
+    holes: dict[str, Any] = {"clock": "clk", "reset": "rst", "polarity": "ACTIVE_HIGH", "bus": ""}
+    kinds = {STREAM: "axis"} if spec.tachometer.stream else {}
     if bus is not None and there is not None:
-        logical = {port.name: port.name for port in ports if port.name.startswith(f"{there.name}_")}
-        logical = {port: port.removeprefix(f"{there.name}_").upper() for port in logical}
         registers = registers_on(spec, bus)
         outer |= {"clk": there.clock, "rst": there.reset}
-        associated = {"ASSOCIATED_BUSIF": there.name}
+        kinds = {there.name: there.kind} | kinds
         holes = {
             "clock": there.clock,
             "reset": there.reset,
             "polarity": "ACTIVE_LOW",
             "bus": there.name,
-            "kind": there.kind,
-            "logical": logical,
-            "associated": f"ASSOCIATED_BUSIF {there.name}, ",
             "registers": registers,
             "irq": registers.irq,
             "range": max(_LEAST_RANGE, 1 << registers.address_width),
         }
     clock_hz = spec.timing.clock_hz
+    names = [port.name for port in ports]
+    interfaces = [
+        (one, kind, {name: name.removeprefix(f"{one}_").upper() for name in names if name.startswith(f"{one}_")})
+        for one, kind in kinds.items()
+    ]
+    associated = {"ASSOCIATED_BUSIF": ":".join(kinds)} if kinds else {}
     files = render_files(
         _MADE,
         name,
-        **{"logical": {}, "irq": False, **holes},
+        **{"irq": False, **holes},
+        interfaces=interfaces,
+        logical={port: f"{kind}:1.0 {one} {its[port]}" for one, kind, its in interfaces for port in its},
         method=spec.tachometer.method,
         ports=ports,
         outer=outer,

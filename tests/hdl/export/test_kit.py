@@ -19,6 +19,7 @@ from tachometry.hdl.export import export
 from tachometry.hdl.export.targets.target import TARGETS
 from tachometry.sim.engines.verilator import home
 from tachometry.spec import METHODS, common_options, of_texts, own_options
+from tachometry.spec.core.stream import READY
 from tachometry.spec.language.provenance import LICENSE, generator, version
 
 BIN = Path(sys.executable).parent
@@ -26,7 +27,7 @@ PAGE = docs.page("guides/integration.md")
 BASE = {"ppr": "8", "clock": "1MHz", "tick": "80us", "max-time": "800us"}
 CASES = {
     "s": {"external-tick": "yes", "index": "yes", "filter": "4", "unit": "rpm", "bounds": "yes", "age": "yes"},
-    "m": {"decoding": "1", "lowpass": "20Hz"},
+    "m": {"decoding": "1", "lowpass": "20Hz", "probe": "2", "stream": "axi"},
     "t": {"decoding": "2", "index": "yes", "index-reset": "yes"},
     "mt": {"external-tick": "yes", "bounds": "yes"},
     "rairan": {"filter": "100", "bounds": "yes"},
@@ -128,7 +129,11 @@ def flip_flops(verilog: str) -> dict[str, str]:
 def test_constraints_meet_every_synchroniser_once(method: str, bus: str, more: list[str]) -> None:
     files = made(method, bus)
     found = flip_flops(files["spindle.v"])
-    pins = [pin.name for pin in of_texts(method, BASE | CASES[method]).ports.pins] + more
+    spec = of_texts(method, BASE | CASES[method])
+    pins = [pin.name for pin in spec.ports.pins if pin.name not in ("probe", "probe_arm", READY)] + [
+        *spec.probes,
+        *more,
+    ]
     assert len(found) == 2 * len(pins)
     first = [path for path in found if path.endswith("stage0")]
     # As Vivado, Quartus Standard, and others name them.

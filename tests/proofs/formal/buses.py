@@ -1,8 +1,12 @@
-"""These proofs are about registers on buses."""
+"""These proofs are about registers on buses, and about the stream of records."""
+
+from functools import partial
 
 from proofs.formal.prove import Proof
 
+from tachometry.hdl.output import record_stream as box
 from tachometry.spec import Encoder, MTachometer, Timing
+from tachometry.spec.core.stream import Part
 from tachometry.spec.registers.map import IDENTIFICATION, RegisterMap
 
 _SPEC = MTachometer(encoder=Encoder(1, 4), timing=Timing(8, 2, 4), frac_bits=4, position_width=8, average=2)
@@ -61,3 +65,16 @@ ON_BUSES = [
     _on("wishbone", "wishbone", _WISHBONE_PROBES, depth=5),
     _on("axi-lite", "axi_lite", _AXI_LITE_PROBES, depth=5),
 ]
+
+_PARTS = (Part("time", 32, 0, signed=False), Part("flags", 32, 4, signed=False), Part("position", 3, 8))
+_RECORD_PROBES = {"core_clocks": "clocks", "core_lost": "lost", "core_left": "left"}
+# By the name in its module, where a mutant takes its place.
+RECORDS = Proof(
+    "stream",
+    _SPEC,
+    "record_stream",
+    {"PACKET": 3},
+    _RECORD_PROBES,
+    depth=2,
+    box=partial(lambda *given: box.RecordStream(*given), _PARTS, 1, 16, 3),
+)

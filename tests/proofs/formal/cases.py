@@ -5,7 +5,7 @@ from typing import Any
 from unittest.mock import patch
 
 from proofs.formal.axes import COUNTS_OF_AXES, POSITIONS_OF_AXES
-from proofs.formal.buses import ON_BUSES
+from proofs.formal.buses import ON_BUSES, RECORDS
 from proofs.formal.control import CONTROL
 from proofs.formal.probes import STANDSTILL_PROBES, counting, within
 from proofs.formal.prove import Proof
@@ -239,6 +239,7 @@ QUICK = [
     "positions of two axes",
     "wishbone",
     "axi-lite",
+    "stream",
     "control loop",
     "control loop, any gains",
 ]
@@ -291,5 +292,6 @@ PROOFS = [
     *COUNTS_OF_AXES,
     *POSITIONS_OF_AXES,
     *ON_BUSES,
+    RECORDS,
     *CONTROL,
 ]

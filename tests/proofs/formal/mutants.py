@@ -33,6 +33,7 @@ from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
 from tachometry.hdl.methods.rairan import RairanMethod
 from tachometry.hdl.methods.rairan_counters import RairanCounters
 from tachometry.hdl.methods.tick_counts import TickCounts
+from tachometry.hdl.output.record_stream import RecordStream
 from tachometry.hdl.output.standstill import Standstill
 from tachometry.hdl.output.update_age import UpdateAge
 
@@ -249,6 +250,11 @@ MUTANTS = [
         "s_axi_rdata.eq(self.native.read_data",
         "s_axi_rdata.eq(self.native.read_data >> 1",
     ),
+    Mutant("stream", "ps_valid", RecordStream, "self.event | ~free", "self.event"),
+    Mutant("stream", "ps_stable", RecordStream, "~self.m_axis_tvalid | self.m_axis_tready", "1"),
+    Mutant("stream", "ps_record", RecordStream, "lost.eq(~free)", "lost.eq(free)"),
+    Mutant("stream", "ps_last", RecordStream, "tlast.eq(left == 0)", "tlast.eq(left == 1)"),
+    Mutant("stream", "ps_overruns", RecordStream, "self.event & ~free & ~self", "self.event & ~self"),
     Mutant("positions of two axes", "px_position", AxesDatapath, "before.position + count", "before.position", 60),
     Mutant("positions of two axes", "px_once", Turns, "ends & ~final", "ends & final", 40),
     Mutant("two axes of four slots", "px_axis", AxisCounters, "self.axis.eq(slot)", "self.axis.eq(self.slot)"),

@@ -24,9 +24,9 @@ from tachometry.spec import ParameterError, of_options
 BASE = {"ppr": "8", "clock": "1MHz", "tick": "80us", "max-time": "800us", "max-speed": "400rad/s"}
 LOOP = {"method": "m", "tick": "200us", "max-time": "2ms", "loop": "yes", "gains": "inputs"}
 CORES = {
-    "axi": (BASE | {"method": "s", "index": "yes"}, "axi-lite"),
+    "axi": (BASE | {"method": "s", "index": "yes", "stream": "axi"}, "axi-lite"),
     "apb": (BASE | {"method": "mt", "position-width": "40"}, "apb"),
-    "none": (BASE | {"method": "t"}, "none"),
+    "none": (BASE | {"method": "t", "stream": "axi:edge"}, "none"),
     "axes": (BASE | {"method": "s", "axes": "3", "parallel": "yes", "index": "yes"}, "axi-lite"),
     "loop": (BASE | LOOP | {"command": "generator"}, "axi-lite"),
     "track": (BASE | {"method": "track", "tick": "1ms", "max-time": "10ms"}, "axi-lite"),
@@ -108,7 +108,7 @@ def test_module_and_component_say_one_thing(core: str) -> None:
     assert {*attributes} == {*maps}
     assert len(attributes) == len(maps)
     parameters_of_module = dict(
-        re.findall(r"(\w+) (\w+)[,\"]", "".join(re.findall(r"X_INTERFACE_PARAMETER = (.*) \*\)", verilog)))
+        re.findall(r"(\w+) ([\w:]+)[,\"]", "".join(re.findall(r"X_INTERFACE_PARAMETER = (.*) \*\)", verilog)))
     )
     parameters = {
         one.findtext(f"{SPIRIT}name"): one.findtext(f"{SPIRIT}value")

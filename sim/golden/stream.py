@@ -1,0 +1,95 @@
+"""The golden stream sends a record of each event, unless the one before still waits."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.sim.golden import compare, health, probe
+from tachometry.sim.golden.front_end import Steps, homed, positions_at
+from tachometry.sim.golden.output import with_trip
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import Table
+from tachometry.spec import TachometerSpec
+from tachometry.spec.core.stream import LOST, OVERRUNS_WIDTH, READY, flags_of, stream_entry
+from tachometry.spec.language.port import TICK, UPDATE
+
+Ints = NDArray[np.int64]
+
+
+def _events(spec: TachometerSpec, steps: Steps, tables: Mapping[str, Table]) -> Ints:
+    """Return clocks of records, sent or not."""
+    assert spec.stream is not None
+    if spec.stream.when == "edge":
+        return steps.clock[steps.step != 0] + spec.latency.tick
+    return tables[TICK if spec.stream.when == "tick" else UPDATE].clock
+
+
+def _free(trace: PinTrace, clock: Ints) -> NDArray[np.bool_]:
+    """Tell which of the events find that the record before is taken, or is being taken."""
+    ready = trace.lines[READY] != 0
+    found = np.ones(len(clock), dtype=np.bool_)
+    if ready.all():
+        return found
+    row = np.searchsorted(trace.clock, clock + 1, side="right") - 1
+    opens = np.append(np.flatnonzero(ready), len(ready))
+    opening = opens[np.searchsorted(opens, row)]  # the row in which, or from which on, it is taken
+    taken = np.maximum(np.append(trace.clock, np.iinfo(np.int64).max)[opening], clock + 1)
+    until = 0
+    for place, (comes, goes) in enumerate(zip(clock.tolist(), taken.tolist(), strict=True)):
+        found[place] = comes >= until
+        until = goes if comes >= until else until
+    return found
+
+
+def with_overruns(spec: TachometerSpec, trace: PinTrace, steps: Steps, tables: dict[str, Table]) -> dict[str, Table]:
+    """Return tables with `overruns`, as a column of the ticks and as the clocks from which each dropped record is
+    counted.
+    """
+    if spec.stream is None:
+        return tables
+    clock = _events(spec, steps, tables)
+    dropped = clock[~_free(trace, clock)] + 1
+    number = np.searchsorted(dropped, tables[TICK].clock, side="right")
+    ticks = tables[TICK].having(overruns=np.minimum(number, (1 << OVERRUNS_WIDTH) - 1))
+    return tables | {TICK: ticks, "overruns": Table(dropped, {})}
+
+
+def records(
+    spec: TachometerSpec, trace: PinTrace, steps: Steps, tables: Mapping[str, Table]
+) -> tuple[Ints, NDArray[np.void]]:
+    """Return what is sent.
+
+    Parameters
+    ----------
+    steps : Steps
+        Those of the trace.
+    tables : mapping of str to Table
+        `sim.golden.tables` of them.
+
+    Returns
+    -------
+    clock : int64 array, shape (n,)
+        The first clock of each record on the stream.
+    records : structured array, shape (n,)
+        With the `dtype` of the manifest. What belongs to updates, the velocity aside, is not defined before the first.
+    """
+    entry, clock = stream_entry(spec), _events(spec, steps, tables)
+    assert entry is not None
+    free = _free(trace, clock)
+    rows = {name: np.searchsorted(tables[name].clock, clock, side="right") for name in (TICK, UPDATE)}
+    held = {
+        name: np.append(np.zeros_like(column[:1]) if len(column) else 0, column)[row]
+        for strobe, row in rows.items()
+        for name, column in tables[strobe].columns.items()
+    }
+    shown = Table(clock, held).having(homed=homed(spec, steps, clock), **{LOST: np.append(False, ~free[:-1])})
+    shown = health.with_health(spec, with_trip(spec, shown, tables["over_speed"]), tables["fault"])
+    shown = probe.with_probed(spec, shown.having(**compare.shown(spec, dict(tables), clock)), dict(tables))
+    found = np.zeros(len(clock), dtype=np.dtype(entry["dtype"]))
+    bits = [shown[name].astype(np.uint32) << np.uint32(place) for place, name in enumerate(flags_of(spec))]
+    position = positions_at(spec, steps, clock - spec.latency.tick, reset=True)
+    values = {"time": clock, "flags": sum(bits), "position": position}
+    for name in entry["dtype"]["names"]:
+        found[name] = values[name] if name in values else shown[name]
+    return clock[free] + 1, found[free]

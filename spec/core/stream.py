@@ -1,0 +1,132 @@
+"""A stream sends records of what the ports show, as AXI4-Stream."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Self
+
+from tachometry.spec.language.option import ParameterError
+from tachometry.spec.language.port import STREAM, TICK, UPDATE, Port
+
+if TYPE_CHECKING:
+    from tachometry.spec.core.tachometer import TachometerSpec
+
+STREAM_HELP = (
+    "AXI4-Stream m_axis for a DMA: a record of time, flags, position and velocity, and of what else track has, with "
+    "every update, or tick or edge as WHEN; tlast ends packets of N records, 256 without it: axi:edge:1000."
+)
+READY = f"{STREAM}_tready"
+OVERRUNS_WIDTH = 16  # bits of the number of records that were dropped, which stays at its end
+LOST = "lost"  # the first flag: records were dropped before this one
+_WORD = 4  # bytes
+_MOST_RECORDS = 1 << 16  # of a packet
+_FINE = ("position_fine", "acceleration")  # of the ports that only a method has, these are in a record
+
+
+@dataclass(frozen=True)
+class Stream:
+    """Says when there are records.
+
+    Parameters
+    ----------
+    when : str
+        A record comes with every `update` of the velocity, `tick`, or `edge` that counts.
+    packet : int
+        Records from one `tlast` to the next.
+    """
+
+    when: str = "update"
+    packet: int = 256
+
+    @classmethod
+    def parse(cls, what: str, text: str) -> Self:
+        """Read axi, axi:WHEN or axi:WHEN:N, such as axi:edge:1000; ParameterError if it is none of them."""
+        found = re.fullmatch(r"axi(?::(update|tick|edge)(?::(\d{1,5}))?)?", text.strip().lower(), re.ASCII)
+        if found is None or not 1 <= int(found[2] or 1) <= _MOST_RECORDS:
+            form = f"must be axi, or axi: and update, tick or edge, and maybe :N, 1 to {_MOST_RECORDS} records a packet"
+            raise ParameterError(what, f"{form}, such as axi:edge:1000, not {text!r}")
+        return cls(found[1] or cls.when, int(found[2] or cls.packet))
+
+    def __str__(self) -> str:
+        return f"axi:{self.when}:{self.packet}"
+
+
+@dataclass(frozen=True)
+class Part:
+    """A number of a record, little-endian.
+
+    Parameters
+    ----------
+    name : str
+        That of its port, but of `time` and `flags`.
+    width : int
+        Bits that it has; it is extended to whole words by its sign or by zeros.
+    offset : int
+        Bytes; a multiple of `size`.
+    """
+
+    name: str
+    width: int
+    offset: int
+    signed: bool = True
+
+    @property
+    def size(self) -> int:
+        """Bytes: one word or two."""
+        return _WORD if self.width <= 8 * _WORD else 2 * _WORD
+
+
+def parts_of(spec: TachometerSpec) -> tuple[Part, ...]:
+    """Return what is in a record, without gaps: behind time and flags the numbers of two words come first."""
+    found = [Part("time", 32, 0, signed=False), Part("flags", 32, _WORD, signed=False)]
+    more = [(port.name, port.width) for port in spec.method_ports if port.name in _FINE]
+    more = [("position", spec.position_width), ("velocity", spec.widths.velocity), *more]
+    for name, width in sorted(more, key=lambda number: number[1] <= 8 * _WORD):
+        found.append(Part(name, width, found[-1].offset + found[-1].size))
+    return tuple(found)
+
+
+def size_of(spec: TachometerSpec) -> int:
+    """Return the bytes of a record, a power of two."""
+    last = parts_of(spec)[-1]
+    return 1 << (last.offset + last.size - 1).bit_length()
+
+
+def flags_of(spec: TachometerSpec) -> tuple[str, ...]:
+    """Return the bits of `flags`, the lowest first: `LOST`, and ports."""
+    held = (port for port in spec.ports.outputs if port.held_by in (TICK, UPDATE) and not port.is_strobe)
+    return (LOST, *(port.name for port in held if port.width == 1))
+
+
+def stream_entry(spec: TachometerSpec) -> dict[str, Any] | None:
+    """Return what the manifest says of a stream; `dtype` is that of NumPy."""
+    if spec.stream is None:
+        return None
+    parts = parts_of(spec)
+    dtype = {
+        "names": [part.name for part in parts],
+        "formats": [f"<{'i' if part.signed else 'u'}{part.size}" for part in parts],
+        "offsets": [part.offset for part in parts],
+        "itemsize": size_of(spec),
+    }
+    return {"when": spec.stream.when, "packet": spec.stream.packet, "flags": [*flags_of(spec)], "dtype": dtype}
+
+
+def stream_ports(spec: TachometerSpec) -> tuple[Port, ...]:
+    """Return the ports of a stream, if there is one."""
+    if spec.stream is None:
+        return ()
+    size = size_of(spec)
+    return (
+        Port(
+            f"{STREAM}_tdata", "output", 8 * size, help=f"A record of {size} bytes, see stream.dtype of the manifest."
+        ),
+        Port(f"{STREAM}_tvalid", "output", help="There is a record; it stays until it is taken."),
+        Port(f"{STREAM}_tlast", "output", help="The record is the last one of its packet."),
+        Port(
+            *("overruns", "output", OVERRUNS_WIDTH, False, TICK, "records"),
+            help="Records that were dropped since one still waited; it stays at 65535. Between the ticks it counts on, "
+            "and a capture takes what it is then.",
+        ),
+    )
