@@ -60,6 +60,10 @@ def test_every_bit_of_stress(wheel: str) -> None:
         assert lockstep(spec, trace, PySim()).n_mismatches
 
 
+def test_before_the_first_tooth_there_is_no_period() -> None:
+    assert not len(filled(ToothWheel(11, 1, longest=255), np.array([300, 390]), 1000).index)
+
+
 def test_exported_verilog_in_icarus(tmp_path: Path) -> None:
     spec = spec_of("12-2", "m", index="yes", filter="2")
     trace = stress(spec, 2, 40)
