@@ -24,7 +24,7 @@ ALLOWED = {
     "hdl/arithmetic": {"hdl/wires", "spec"},
     "hdl/front_end": {"hdl/arithmetic", "hdl/wires", "spec"},
     "hdl/output": {"hdl/arithmetic", "hdl/wires", "spec"},
-    "hdl/methods": {"hdl/arithmetic", "hdl/output", "hdl/wires", "spec"},
+    "hdl/methods": {"hdl/arithmetic", "hdl/front_end", "hdl/output", "hdl/wires", "spec"},
     "hdl/axes": {"hdl/arithmetic", "hdl/front_end", "hdl/methods", "hdl/output", "hdl/wires", "spec"},
     "hdl/bus": {"hdl/wires", "spec"},
     "hdl/control": {"hdl/arithmetic", "hdl/wires", "spec"},

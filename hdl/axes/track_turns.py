@@ -12,7 +12,6 @@ from tachometry.hdl.output.update import update_layout
 from tachometry.spec.formats.tracking import PLACE_BITS
 from tachometry.spec.methods.axes import AxesSpec
 from tachometry.spec.methods.axis import output_cycles
-from tachometry.spec.methods.track import FETCH_CLOCKS
 from tachometry.spec.methods.track_axis import TrackAxis
 
 
@@ -71,7 +70,7 @@ class TrackTurns(wiring.Component):
     @property
     def latency(self) -> int:
         """Clocks from the beginning of a turn to `valid`."""
-        return self._axis.program.clocks + FETCH_CLOCKS
+        return self._axis.program.clocks
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
@@ -85,7 +84,7 @@ class TrackTurns(wiring.Component):
         turn = Signal(range(max(n, 2)))
         whose = Signal.like(self.axis)
         at = {name: running & (clock == place) for name, place in (("begin", 0), ("read", 1), ("add", 2), ("keep", 3))}
-        shows = running & (clock == axis.program.clocks + FETCH_CLOCKS - 1)
+        shows = running & (clock == axis.program.clocks - 1)
         ends = running & (clock == plan.cycles - 1)
         m.d.sync += clock.eq(clock + 1)
         with m.If(ends):

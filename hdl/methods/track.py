@@ -1,10 +1,11 @@
 """The tracking method."""
 
-from amaranth import Module, Signal, Value, signed
+from amaranth import Module, ResetInserter, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 
-from tachometry.hdl.arithmetic.idle import Idle, IdleCounter, idle_of
+from tachometry.hdl.arithmetic.idle import Idle, idle_of
+from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.tick_counts import TickCounts
 from tachometry.hdl.methods.track_machine import TrackMachine
@@ -37,6 +38,7 @@ class TrackMethod(wiring.Component):
         self._spec = spec
         self.tick_counts = TickCounts(spec.form, spec.timing.max_ticks)
         self.machine = TrackMachine(spec.program)
+        self.left = SamplingClock(spec.latency.datapath - 1)
         super().__init__({**datapath_members(spec), "step": In(signed(2)), "position": In(signed(spec.position_width))})
 
     @property
@@ -47,7 +49,7 @@ class TrackMethod(wiring.Component):
     @property
     def idle(self) -> tuple[Idle, ...]:
         """Registers that a simulation may move on."""
-        return (IdleCounter("left", -1, (1,)), *idle_of({"tick_counts": self.tick_counts}))
+        return idle_of({"tick_counts": self.tick_counts, "left": self.left})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
@@ -56,14 +58,14 @@ class TrackMethod(wiring.Component):
         m.submodules.machine = machine = self.machine
         position = Signal.like(self.position)
         # All ways through the program take as long.
-        clocks = spec.latency.datapath - 1
-        left = Signal(range(clocks + 1))
+        awaited = Signal()
         ready = Signal()
-        m.d.comb += ready.eq(left == 1)
+        m.submodules.left = ResetInserter(self.tick)(self.left)
+        m.d.comb += ready.eq(awaited & self.left.last)
+        with m.If(ready):
+            m.d.sync += awaited.eq(0)
         with m.If(self.tick):
-            m.d.sync += [position.eq(self.position), left.eq(clocks)]
-        with m.Elif(left.any()):
-            m.d.sync += left.eq(left - 1)
+            m.d.sync += [position.eq(self.position), awaited.eq(1)]
         m.d.comb += [counts.tick.eq(self.tick), counts.step.eq(self.step), machine.begin.eq(self.tick)]
         names = ("number", "times", "places", "last", "moved", "length", "kind", "end", "down")
         m.d.comb += [getattr(machine, name).eq(getattr(counts, name)) for name in names]

@@ -81,8 +81,9 @@ def _encoded(program: Program, one: Instruction, layout: data.StructLayout) -> i
 class TrackMachine(wiring.Component):
     """Runs the program once for every tick; `spec.formats.tracking_code` says what each instruction does.
 
-    While an instruction is executed, the word of the next one is read, and the one behind that is fetched. All wait
-    while one needs the unit, and that is busy.
+    While an instruction is executed, the word of the next one is read, and the one behind that is fetched; with more
+    stages, there is a register in front of the memory of words and one behind it. All wait while one needs the unit,
+    and that is busy.
 
     Parameters
     ----------
@@ -101,7 +102,7 @@ class TrackMachine(wiring.Component):
     kind, end, down : In
         Of the last count's edge; of the position at the end; whether the count went backward.
     velocity, position_fine, quality, acceleration : Out(signed)
-        They are those of this tick `program.clocks` after `begin`, and three more.
+        They are those of this tick `program.clocks - 1` after `begin`.
     """
 
     def __init__(self, program: Program, *others: Program) -> None:
@@ -155,19 +156,29 @@ class TrackMachine(wiring.Component):
         stop = Signal()
         hold = Signal()
         go = Signal()
-        coming = data.View(layout, fetch.data)
         now = Signal(layout, reset_less=True)
         place = Signal.like(pc)
+        coming, valid = data.View(layout, fetch.data), fetched
+        address, word = self._at(self._chosen(m, coming.word)), read.data
+        if program.times.stages > 1:
+            m.d.sync += (held := Signal.like(Value.cast(address), reset_less=True)).eq(Mux(hold, held, address))
+            m.d.sync += (word := Signal(signed(WIDTH), reset_less=True)).eq(Mux(hold, word, read.data))
+            address = held
         m.d.comb += [
             place.eq(Mux(taken, Cat(now.how, now.store), pc)),
             fetch.addr.eq(place),
             fetch.en.eq(~hold),
-            read.addr.eq(self._at(self._chosen(m, coming.word))),
+            read.addr.eq(address),
             read.en.eq(~hold),
             go.eq(active & ~hold),
         ]
+        for _ in range(program.times.stages - 1):
+            following, follows = Signal(layout, reset_less=True), Signal()
+            with m.If(~hold):
+                m.d.sync += [following.eq(coming), follows.eq(valid & ~taken & ~stop)]
+            coming, valid = following, follows
         with m.If(~hold):
-            m.d.sync += [now.eq(coming), active.eq(fetched & ~taken & ~stop), pc.eq(place + 1)]
+            m.d.sync += [now.eq(coming), active.eq(valid & ~taken & ~stop), pc.eq(place + 1)]
         with m.If(stop):
             m.d.sync += [fetched.eq(0), pc.eq(labels["tick"])]
             with m.If(self._is_last()):
@@ -197,7 +208,7 @@ class TrackMachine(wiring.Component):
         flipped = (right ^ minus.replicate(WIDTH))[:WIDTH]
         m.d.comb += [
             left.eq(Mux(used, sum_, 0) | given),
-            right.eq(read.data | Mux(from_unit, unit.result, 0)),
+            right.eq(word | Mux(from_unit, unit.result, 0)),
             minus.eq(now.subtract ^ (now.by_sign & sign)),
             carry.eq(minus ^ (from_unit & unit.up)),
             total.eq((Cat(C(1, 1), left).as_signed() + Cat(carry, flipped).as_signed()) >> 1),

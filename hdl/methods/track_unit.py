@@ -267,6 +267,7 @@ class SmallUnit(Unit):
         is_log, is_factor, is_product, is_read, doubled, nothing = (
             Signal(name=f"is_{name}", reset_less=True) for name in names
         )
+        seeks = is_log | is_factor
         begins = (doing != Start.NONE) & (doing != Start.CHANCE)
         reads, adds, shifts = (state == item for item in (State.READS, State.ADDS, State.SHIFTS))
         # What is added next: a digit of the factor, which turns meanwhile, or all at once.
@@ -312,9 +313,10 @@ class SmallUnit(Unit):
         m.d.comb += total.eq((Cat(C(1, 1), work[low:]).as_signed() + Cat(minus, addend).as_signed()) >> 1)
         # Where it goes.
         by_8, by_2, ends, large = (Signal(name=name) for name in ("by_8", "by_2", "ends", "large"))
-        beyond_8, beyond_2 = (
-            Mux(is_factor, work[bits - 1 + step :].any(), is_log & work[CHANCE_BITS + step :].any()) for step in (8, 2)
-        )
+        # A factor ends below `bits`, a logarithm at bit 8; both ask for what is far beyond, so that is told once.
+        far = work[bits + 7 :].any()
+        beyond_8 = (seeks & far) | (is_log & work[CHANCE_BITS + 8 : bits + 7].any())
+        beyond_2 = (seeks & (far | work[bits + 1 : bits + 7].any())) | (is_log & work[CHANCE_BITS + 2 : bits + 1].any())
         m.d.comb += [
             by_8.eq(shifts & ((pairs[-1] & ~(pairs[2:].all() & pairs[:2].any())) | beyond_8)),
             by_2.eq(shifts & ~by_8 & (pairs[-1] | beyond_2)),

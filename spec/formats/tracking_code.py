@@ -2,8 +2,8 @@
 
 The machine has one adder with an accumulator, the *sum*; a memory of words; and a unit that takes products,
 logarithms, powers and shifts, and whose result is read as `~`. An instruction takes a clock. It waits while the unit
-works and it needs it. A word is read one instruction before its use, so none is read right behind its change. A jump
-tests the sum that was before it, and meanwhile adds a term as others do; it stores nothing.
+works and it needs it. A word is read before its use, so none is read right behind its change. A jump tests the sum that
+was before it, and meanwhile adds a term as others do; it stores nothing.
 """
 
 from collections.abc import Mapping
@@ -53,7 +53,6 @@ OUTPUTS = ("", "velocity", "position_fine", "quality", "acceleration")
 ADDRESS_BITS = 7
 FIRST_CHOSEN = (1 << ADDRESS_BITS) - 8  # address of what the tick chooses
 FIRST_INPUT = FIRST_CHOSEN - 8  # of inputs: the words there are 0
-TAKEN = 1  # clock that is lost when a jump is taken
 _LEFTS = {"lo+": Left.LEAST, "hi+": Left.MOST}
 
 
@@ -167,8 +166,11 @@ class Code:
 
 
 @cache
-def assembled(listing: str = LISTING) -> Code:
-    """Return the instructions of a listing, with one that does nothing where a word would be read too early."""
+def assembled(listing: str = LISTING, apart: int = 2) -> Code:
+    """Return the instructions of a listing, with some that do nothing where a word would be read too early.
+
+    The one that reads a word is `apart` instructions behind one that stores it, or more.
+    """
     code: list[Instruction] = []
     labels: dict[str, int] = {}
     for line in listing.splitlines():
@@ -184,11 +186,21 @@ def assembled(listing: str = LISTING) -> Code:
         elif words == ["end"]:
             code.append(Instruction(jump=Jump.END))
         else:
-            for one in _chain(words):
-                if code and code[-1].store and one.source == Source.WORD and _same(code[-1].store, one.word):
-                    code.append(Instruction())
-                code.append(one)
-    return _joined(code, labels)
+            code += _chain(words)
+    return _spaced(_joined(code, labels), apart)
+
+
+def _spaced(code: Code, apart: int) -> Code:
+    """Return a code with enough instructions between a word's change and its use."""
+    made: list[Instruction] = []
+    places: list[int] = []
+    for one in code.instructions:
+        if one.source == Source.WORD:
+            near = (back for back in range(1, apart) if back <= len(made) and _same(made[-back].store, one.word))
+            made += [Instruction()] * (apart - next(near, apart))
+        places.append(len(made))
+        made.append(one)
+    return Code(tuple(made), {label: places[place] for label, place in code.labels.items()})
 
 
 def _joined(code: list[Instruction], labels: dict[str, int]) -> Code:
@@ -251,7 +263,7 @@ def _longest(times: Times, output: str = "") -> int:
 def _longest_of(counts: int, times: Times, output: str) -> int:
     """Return them for no count, one, or several; nothing else of how ways exclude each other is known."""
     known = {Jump.ALWAYS: True, Jump.END: True, Jump.EMPTY: counts == 0, Jump.SEVERAL: counts > 1}
-    code, labels = assembled().instructions, assembled().labels
+    code, labels = assembled(apart=times.apart).instructions, assembled(apart=times.apart).labels
     entry: dict[int, tuple[int, int]] = {labels["tick"]: (0, 0)}  # clock, and when the unit has finished
     longest, open_ = 0, {labels["tick"]}
     while open_:
@@ -269,7 +281,7 @@ def _longest_of(counts: int, times: Times, output: str) -> int:
             continue
         following = [] if known.get(one.jump) else [(place + 1, clock)]
         if one.target and known.get(one.jump, True):
-            following.append((labels[one.target], clock + TAKEN))
+            following.append((labels[one.target], clock + times.stages))
         for after, at in following:
             before = entry.get(after, (-1, -1))
             now = max(before[0], at), max(before[1], free)
@@ -300,7 +312,7 @@ class Program:
     @cached_property
     def code(self) -> Code:
         """The instructions."""
-        return assembled()
+        return assembled(apart=self.times.apart)
 
     @property
     def lead(self) -> int:
@@ -309,13 +321,13 @@ class Program:
 
     @cached_property
     def clocks(self) -> int:
-        """Clocks from the first instruction to the last output, by the longest way."""
-        return _longest(self.times, "acceleration")
+        """Clocks from the tick until the last output holds, by the longest way."""
+        return _longest(self.times, "acceleration") + self.times.fetch_clocks
 
     @cached_property
     def all_clocks(self) -> int:
-        """Clocks from the first instruction to the last one."""
-        return _longest(self.times)
+        """Clocks from a tick until the next may come."""
+        return _longest(self.times) + self.times.fetch_clocks
 
     @cached_property
     def constants(self) -> dict[str, int]:

@@ -31,6 +31,7 @@ reset:                                  # before the first tick
     quiet = zero
     since = zero
     doubt = log_4 - order
+    after = minus_one
 tick:
     if empty goto silent
     if several goto many
@@ -38,7 +39,6 @@ tick:
     tau = $times
     raw = zero s+ half
     c = sum - o@last
-    after = minus_one
     quiet = $last
     since = $length + since min most_since
     dt = sum - tau max clock log
@@ -51,7 +51,6 @@ many:                                   # about the mean time, by logarithms; wh
     t = o@m1 + o@m2 + o@m3
     log_n = ~
     $times log
-    after = minus_one
     quiet = $last
     zero - log_n + ~ exp
     since = $length + since min most_since
@@ -80,14 +79,15 @@ known:
     t = v + ~
     V = sum + ~
     times t place
-    w = log_dt - log_T lo+ log_T + log_growth
+    share = log_dt - log_T
+    w = sum lo+ growing
     P = p + ~
     zero s+ near - sixteenth
     if neg goto same
 event:
     w exp                               # memory grows by g·min(dt, T), if it grows or 4096·dt ≥ T
     growth keep
-    log_dt - log_T + least_log
+    share + least_log
     if neg goto full
     step = zero s+ ~
 grown:
@@ -99,17 +99,16 @@ grown:
     goto heard
 mean:
     $number by
-    since = tau
     times P mean
     left keep
-    w = zero s+ left
-    t = places - ~
-    w by
     edge = raw - moved
+    t = places - ~
+    zero s+ left by
+    since = tau
     times V place_64
+    memory = T + step min most_memory
     t s+ ~ keep log
     log_64 - log_n + ~ exp
-    memory = T + step min most_memory
     e = zero s+ ~ keep log
 heard:
     room s- e
@@ -123,7 +122,7 @@ heard:
     since + lead by
     zero - D3 s+ mu s+ mu
     if pos goto four
-    memory log
+    T = memory log
     of_e = log_e - log_dt
     goto sized
 alone:
@@ -137,10 +136,9 @@ four:
     of_e = log_e - log_dt
 fired:
     slow_T = zero
-    memory = memory - ~ lo+ ~ log
+    T = memory - ~ lo+ ~ log
 sized:
     e keep
-    T = memory
     log_T = ~
     log_X = log_dt - log_T min log_quarter gain 1
     of_v = of_e + log_X + log_X
@@ -148,7 +146,6 @@ sized:
     of_a = of_v + log_X - log_dt
     v = V s+ ~
     log_X gain 2
-    vs = v
     of_a + ~ exp
     of_a = log_T - of_slope
     after = one
@@ -165,7 +162,8 @@ curved:
     times a velocity                    # the velocity at the time when it is shown
     as = sum
     quality = of_curve
-    velocity = vs + ~
+    vs = v
+    velocity = sum + ~
     goto placed
 straight:
     of_a + ~ exp
@@ -186,6 +184,7 @@ place:                                  # and the place at the end of the tick
     t = zero s+ v min most
     vs + ~ product place
     v = zero s+ t
+    if empty goto seen
     p + ~ out position_fine
 shown:
     tick by
@@ -237,10 +236,11 @@ short:
     o2 = o2 s- ~
     o3 = o3 s- ~
 ready:                                  # growth of the memory and noise, for the next event
+    after = minus_one
     D log
     Ds = D
     growth = zero
-    log_growth = zero
+    growing = log_T
     least_log = log_4096
     limit = ~ + ~ + order
     lag log
@@ -259,13 +259,13 @@ scaled:
     if pos goto lost
     T - slow_T
     if pos goto end
-    log_growth = log_eighth
+    growing = log_T + log_eighth
 end:
     end
 lost:
     growth = minus_one
     least_log = count
-    log_growth = log_half
+    growing = log_T + log_half
     trouble - log_4
     if neg goto end
     slow_T = T + T
@@ -273,11 +273,6 @@ lost:
 full:
     step = zero
     goto grown
-show:
-    since + lead by
-    times as velocity
-    velocity = vs + ~
-    goto place
 slip:                                   # counts were lost or added, or the offset was upset
     o@last = o@last min quarter max minus_quarter
     slips = slips + one
@@ -333,19 +328,18 @@ same:                                   # the same edge again: no event, unless 
     p = p - moved
     goto show
 silent:
-    after = minus_one
     since = $length + since min most_since
     quiet = $length + quiet max zero min most
     sum - forget
     if pos goto rest
     phase
     if neg goto nothing
+show:
     since + lead by
     times as velocity
     velocity = vs + ~
-    since by
-    times as half_velocity
-    vs + ~ product place
+    goto place
+seen:
     z = p + ~ keep
     if neg goto below
     sum + o@up

@@ -27,6 +27,8 @@ class Times:
     ----------
     log, exp, over, gain, by, times : int
         At most.
+    stages : int
+        Clocks from when an instruction is fetched until it is executed, which are lost when a jump is taken: 1, or 3.
     """
 
     log: int
@@ -35,6 +37,17 @@ class Times:
     gain: int
     by: int
     times: int
+    stages: int = 1
+
+    @property
+    def apart(self) -> int:
+        """Instructions from one that stores a word to the first that reads it."""
+        return (self.stages + 3) // 2
+
+    @property
+    def fetch_clocks(self) -> int:
+        """Clocks to fetch the first instruction, to read its word, and to hold the result twice."""
+        return self.stages + 3
 
     def of(self, start: Start) -> int:
         """Return those of what begins; 0: nothing."""
@@ -103,7 +116,8 @@ class Small:
             max(self._seeks(leading, end) for leading in range(WIDTH - 1))
             for end in (CHANCE_BITS, self.form.factor_bits - 1)
         )
-        return Times(log=5 + log, exp=5 + power, over=4 + over, gain=3, by=4 + factor, times=3 + self.digits + product)
+        times = 3 + self.digits + product
+        return Times(log=5 + log, exp=5 + power, over=4 + over, gain=3, by=4 + factor, times=times, stages=3)
 
     @staticmethod
     def _steps(pairs: int) -> int:

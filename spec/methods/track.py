@@ -24,7 +24,6 @@ from tachometry.spec.language.option import ParameterError, option
 from tachometry.spec.language.port import UPDATE, Port, held
 from tachometry.spec.language.units import format_time, next_written_time, short_time, written_time
 
-FETCH_CLOCKS = 4  # to fetch the first instruction, to read its word, and to hold the result twice
 NOISE = Fraction(1, 4 * 20_000)  # rad/s that an LSB has at 2000 counts: a quarter of what is left at constant speed
 LOOP_MEMORY = Fraction(3, 5)  # over k_v: the longest memory in a loop
 _MAX_TIME = "100ms"  # by default
@@ -97,13 +96,13 @@ class TrackLatency(Latency["TrackTachometer"]):
 
     @property
     def datapath(self) -> int:
-        return self.spec.program.clocks + FETCH_CLOCKS
+        return self.spec.program.clocks
 
     @property
     def busy(self) -> int:
         # An update is shown before the next tick, so its age needs no number.
         shown = self.tick_to_velocity + self.low_pass
-        return max(self.spec.program.all_clocks + FETCH_CLOCKS, shown)
+        return max(self.spec.program.all_clocks, shown)
 
 
 class TrackRecovery(Recovery["TrackTachometer"]):
@@ -260,9 +259,9 @@ class TrackTachometer(TachometerSpec):
     def program(self) -> Program:
         """The program of the datapath from a tick to the update."""
         latency = self.latency
-        delay = latency.pin_to_count + latency.tick + FETCH_CLOCKS + latency.low_pass + latency.output
+        delay = latency.pin_to_count + latency.tick + latency.low_pass + latency.output
         serial = Program(self.form, Small(self.form).times, delay)
-        fits = self.times.has_room(serial.all_clocks + FETCH_CLOCKS)
+        fits = self.times.has_room(serial.all_clocks)
         return (
             serial
             if self.multiplier == "serial" or (self.multiplier == "auto" and fits)

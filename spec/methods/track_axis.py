@@ -8,7 +8,7 @@ from functools import cached_property
 from tachometry.spec.formats.tracking_code import Program
 from tachometry.spec.formats.tracking_units import QUICK, Small
 from tachometry.spec.methods.axis import AxisTimes, OneAxis, Plan, output_cycles, own_options
-from tachometry.spec.methods.track import FETCH_CLOCKS, TrackTachometer
+from tachometry.spec.methods.track import TrackTachometer
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,8 +47,8 @@ class TrackAxis(OneAxis, TrackTachometer):
     def plan(self) -> Plan:
         """When each axis has its turn: on as few machines as all turns end in time with."""
         program = self.program
-        cycles = program.all_clocks + FETCH_CLOCKS + 1
-        latency = program.clocks + FETCH_CLOCKS + output_cycles(self)
+        cycles = program.all_clocks + 1
+        latency = program.clocks + output_cycles(self)
         found = [Plan(self.axes_of_tick, cycles, latency, n) for n in range(1, self.axes_of_tick + 1)]
         return next((plan for plan in found if plan.end + self.slots <= self._room), found[0])
 

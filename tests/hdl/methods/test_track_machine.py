@@ -14,7 +14,6 @@ from tachometry.sim.golden.methods.track_recursion import Recursion
 from tachometry.spec import TrackTachometer
 from tachometry.spec.formats.tracking_code import OUTPUTS, Instruction
 from tachometry.spec.formats.tracking_units import Start
-from tachometry.spec.methods.track import FETCH_CLOCKS
 
 CORES = {
     "serial": core(multiplier="serial", clock="12MHz", tick="200us", max_speed="500rad/s", max_time="8ms"),
@@ -28,7 +27,7 @@ SHOWN = OUTPUTS[1:]
 def check(spec: TrackTachometer, rows: Sequence[Sequence[int]], play: Player = clock_by_clock) -> int:
     """Begin a tick as soon as may be: outputs hold what they must, in their clock; how many instructions were met."""
     program = spec.program
-    spacing = program.all_clocks + FETCH_CLOCKS
+    spacing = program.all_clocks
     inputs: list[dict[str, int]] = []
     for row in rows:
         # What the tick had comes a clock after it, as it comes from the front end.
@@ -37,7 +36,7 @@ def check(spec: TrackTachometer, rows: Sequence[Sequence[int]], play: Player = c
     right = Interpreter(program)
     for number, row in enumerate(rows):
         expected = right.tick(*row)
-        for after in (program.clocks + FETCH_CLOCKS - 1, spacing - 1):
+        for after in (program.clocks - 1, spacing - 1):
             shown = seen[number * spacing + after]
             assert tuple(shown[name] for name in SHOWN) == expected, f"tick {number}, {after} clocks later"
     return len(right.met)

@@ -8,7 +8,7 @@ from support.tracking import Interpreter, core, windows
 
 from tachometry.sim.golden.methods.track_recursion import Recursion
 from tachometry.spec import TrackTachometer
-from tachometry.spec.formats.tracking_code import Jump, assembled
+from tachometry.spec.formats.tracking_code import FIRST_INPUT, Jump, assembled
 
 # Ticks of few clocks and of many, of one length and of several; words as wide as they come.
 CORES = [
@@ -38,6 +38,7 @@ def test_listing() -> None:
     labels = {place: label for label, place in code.labels.items()}
     missed = [(labels.get(place), one) for place, one in enumerate(code.instructions) if not met[place]]
     assert not missed
+    assert len(CORES[0].program.words) <= FIRST_INPUT
 
 
 @pytest.mark.parametrize(
