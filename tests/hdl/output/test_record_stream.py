@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 from proofs.source import mutant
 from support import docs
+from support.command import run
 from support.nightly import nightly, only
 from support.simulate import clock_by_clock
 from support.verilog import play
 
 from tachometry.hdl.core.register_core import RegisterCore
 from tachometry.hdl.export import export
+from tachometry.hdl.export.targets.rio import rio
 from tachometry.hdl.output.record_stream import RecordStream
 from tachometry.sim import build, golden
 from tachometry.sim.encoder.stress import stress
@@ -24,7 +26,7 @@ from tachometry.sim.golden import stream
 from tachometry.sim.golden.front_end import decoded
 from tachometry.sim.golden.registers import Access, GoldenBank
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.spec import AxesSpec, ParameterError, STachometer, TachometerSpec, of_options, of_texts
+from tachometry.spec import AxesSpec, ParameterError, STachometer, TachometerSpec, of_manifest, of_options, of_texts
 from tachometry.spec.core.stream import READY, Part, Stream
 from tachometry.spec.registers.demo import DemoMap
 from tachometry.spec.registers.map import RegisterMap
@@ -168,21 +170,21 @@ def test_registers_have_the_records_that_were_dropped() -> None:
 
 
 def test_the_page_reads_records_and_so_does_c(tmp_path: Path) -> None:
-    spec = of_texts("s", BASE | {"position-width": "48", "stream": "axi"})
+    page = docs.page("guides/integration.md")
+    (command,) = re.findall(r"```console\n(tachometry generate .*--stream.*)\n", page)
+    (shown,) = re.findall(r"```python\n(about = .*?)```", page, re.DOTALL)
+    assert run(*command.split()[1:-1], tmp_path) == 0
+    spec = of_manifest(tmp_path / "spindle.json").tachometer
     trace = stress(spec, seed=1, n_edges=10)
     steps = decoded(spec, trace)
     clock, records = stream.records(spec, trace, steps, golden.tables(spec, trace, steps))
-    (shown,) = re.findall(r"```python\n(about = .*?)```", docs.page("guides/integration.md"), re.DOTALL)
-    files = export(spec, "spindle", "axi-lite")
-    (tmp_path / "spindle.json").write_text(files["spindle.json"])
     records.tofile(tmp_path / "spindle.bin")
     shown = shown.replace("rtl/", f"{tmp_path}/").replace("spindle.bin", f"{tmp_path}/spindle.bin")
     found: dict[str, Any] = {"json": json, "np": np, "Path": Path}
     exec(shown, found)
-    assert found["seconds"].tolist() == ((clock - 1) / 1e6).tolist()
+    assert found["seconds"].tolist() == ((clock - 1) % 2**32 / 1e8).tolist()
     assert np.abs(found["rad_per_s"]).max() == np.abs(records["velocity"]).max() * spec.scale.rad_per_s_per_lsb
     assert found["lost"].tolist() == (records["flags"] & 1).tolist()
-    (tmp_path / "spindle_regs.h").write_text(files["spindle_regs.h"])
     (tmp_path / "main.c").write_text(_C)
     flags = ("-x", "c", "-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-o", "main", "main.c")
     build.run([*build.compiler(), *flags], "compiler", tmp_path)
@@ -214,4 +216,4 @@ def test_cores_that_send_none_refuse_it() -> None:
     with pytest.raises(ParameterError, match="stream must be left out of a demo"):
         DemoMap(spec)
     with pytest.raises(ParameterError, match="stream must not be given for RIO"):
-        export(spec, target="rio")
+        rio(spec, "core", None, {})
