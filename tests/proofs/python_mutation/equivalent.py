@@ -360,3 +360,17 @@ _argue(
     "Compilers do not read where the lines of a comment end.",
     *("110 → 111", "110 → 109"),
 )
+_argue("hdl/export/kit.py: ", "The smoke test holds its pins for as long as it likes.", "5000 → 4999")
+_argue(
+    "spec/core/tachometer.py: TachometerSpec.wheel",
+    "It is only longer than what is measured, and costs a bit.",
+    "1 → 0 #2",
+)
+_argue("spec/methods/axes.py: nearest_ticks", "It is asked for where the tick itself does not fit.", "1 → 0 #3")
+_argue(
+    "sim/golden/methods/track_recursion.py: Recursion._event",
+    "Of a sign it is only asked whether it is negative.",
+    "1 → 2 #3",
+)
+_argue("sim/golden/command_generator.py: Gains", "Nothing assigns to it, and nothing hashes it.", "True → False")
+_argue("sim/golden/control.py: Control.set", "There are as many gains as terms.", "True → False")

@@ -351,6 +351,8 @@ def test_limits() -> None:
         LoopSpec(tachometer=CORE, current_width=25)
     with pytest.raises(ParameterError, match=r"^kp must be at least 0, not -0\.5$"):
         LoopSpec(tachometer=CORE, position_gain=Fraction(-1, 2))
+    with pytest.raises(ParameterError, match=r"^kp must be of a size from 1e-12 to 1e12, not 1e-13$"):
+        LoopSpec(tachometer=CORE, position_gain=Fraction(1, 10**13))
     for period in (0, (1 << 24) + 1):
         with pytest.raises(ParameterError, match=rf"^control_period must be from 1 to {1 << 24} clocks, not {period}$"):
             LoopSpec(tachometer=CORE, control_period=period)

@@ -6,7 +6,7 @@ import pytest
 from support.nightly import nightly
 from support.tracking import Interpreter, core, windows
 
-from tachometry.sim.golden.methods.track_recursion import Recursion
+from tachometry.sim.golden.methods.track_recursion import Recursion, log2
 from tachometry.spec import TrackTachometer
 from tachometry.spec.formats.tracking_code import FIRST_INPUT, Jump, assembled
 
@@ -39,6 +39,23 @@ def test_listing() -> None:
     missed = [(labels.get(place), one) for place, one in enumerate(code.instructions) if not met[place]]
     assert not missed
     assert len(CORES[0].program.words) <= FIRST_INPUT
+
+
+@pytest.mark.parametrize("grows", [1, -1])
+def test_a_memory_of_the_most_events_shrinks_or_stays(grows: int) -> None:
+    form, program = CORES[0].form, CORES[0].program
+    machine, state, half = Interpreter(program), Recursion(form, program.lead), form.tick_cycles // 2
+    rows = [(1, half, 1, half, 1, nth % 4, 0, (nth + 1) % 4, 2 * half) for nth in range(4)]
+    assert [machine.tick(*row) for row in rows] == [state.tick(*row) for row in rows]
+    state.memory = machine.words["T"] = 5000 * form.tick_cycles << form.time_bits
+    state.log_memory = machine.words["log_T"] = log2(state.memory)
+    machine.words["growing"] = state.log_memory + state.log_growth
+    if grows < 0:
+        state.grows = machine.words["growth"] = grows
+        machine.words["least_log"] = machine.words["count"]
+    for both in (machine, state):
+        both.tick(*rows[0])
+    assert machine.words["T"] == state.memory
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from tachometry.sim.golden.methods import track
 from tachometry.sim.golden.methods.track_recursion import Recursion
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.spec import TrackTachometer
-from tachometry.spec.formats.tracking import WIDTH
+from tachometry.spec.formats.tracking import GAIN_STEPS, LOG_BITS, PLACE_BITS, WIDTH
 
 CORES = {
     "default": core(),
@@ -78,6 +78,18 @@ def test_twins_on_more_motions(seed: int) -> None:
     spec = CORES[[*CORES][seed % len(CORES)]]
     held = windows(spec, seed, 20_000)
     assert np.array_equal(compiled(spec, held), track.rows(spec.form, spec.program.lead, held))
+
+
+def test_gains_are_those_of_least_squares() -> None:
+    """Of a parabola through n places with X = 1/n, at the last, where the table has nearly that X."""
+    form = CORES["default"].form
+    scale = np.array([0, form.velocity_bits, form.acceleration_bits]) - [0, PLACE_BITS, PLACE_BITS - 1]
+    logs = np.array(form.gains).T / 2**LOG_BITS - scale - np.arange(3) * form.time_bits
+    exact = 2 ** (2 + (np.arange(len(logs)) + 0.5) / GAIN_STEPS)
+    for nth in np.flatnonzero(np.abs(exact / np.round(exact) - 1) < 0.01):
+        n = round(exact[nth])
+        last = np.linalg.pinv(np.vander(np.arange(1 - n, 1), 3, increasing=True))[:, -1]
+        assert logs[nth] == pytest.approx(np.log2(last * float(n) ** np.arange(1, 4)), abs=0.03), n
 
 
 def trace_of(clock: NDArray[np.int64], position: NDArray[np.int64]) -> PinTrace:
