@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -14,6 +14,7 @@ from tachometry.boards.monitor.recorder import Recorder
 from tachometry.boards.monitor.session import Frame, Session
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.ports import BOUNDS
+from tachometry.spec.language.port import MISSED, WIDE
 
 HISTORY = 10.0  # seconds that are kept
 _COUNTERS = 0.5  # seconds from a look at the counters to the next
@@ -27,6 +28,8 @@ class State:
     Parameters
     ----------
     columns : sequence of Column
+    told : Counter of str
+        In how many frames each flag of a wrong index was set.
     waits_for : str
         Why there is no telemetry; empty: there is.
     """
@@ -36,6 +39,7 @@ class State:
     columns: Mapping[str, Column]
     counts: Counts = field(default_factory=Counts)
     counters: Mapping[str, int] = field(default_factory=dict)
+    told: Counter[str] = field(default_factory=Counter)
     waits_for: str = ""
     recorded: str = ""
     frame: Frame | None = None
@@ -45,6 +49,7 @@ class State:
         """Frames that have come."""
         for frame in frames:
             self.frame = frame
+            self.told.update(name for name in (WIDE, MISSED) if frame.snapshot.flags.get(name))
             lower, upper = (self.value(name) for name in BOUNDS)
             speed = self.value("velocity")
             assert speed is not None

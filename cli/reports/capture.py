@@ -5,6 +5,7 @@ import numpy as np
 from tachometry.sim.signals.recording import Recording
 from tachometry.sim.signals.source import Source
 from tachometry.sim.studies.simulation import Axis
+from tachometry.spec.language.port import MISSED
 from tachometry.spec.language.units import plural
 
 _Row = tuple[str, str]
@@ -48,7 +49,7 @@ def index_distance(axis: Axis) -> str:
 
 def axis_warnings(axis: Axis) -> list[str]:
     """Tell what of the capture of an axis contradicts itself or the options."""
-    return capture_warnings(axis.recording) + _index(axis) + _index_place(axis)
+    return capture_warnings(axis.recording) + _index(axis) + _index_place(axis) + _index_missed(axis)
 
 
 def capture_warnings(recording: Recording) -> list[str]:
@@ -111,3 +112,13 @@ def _index_place(axis: Axis) -> list[str]:
         else "z may be high for longer than a quarter of a period of A, or not be in step with A and B"
     )
     return [f"to and fro, the index is found {int(near.max())} counts apart, as it is taken where z rises: {why}"]
+
+
+def _index_missed(axis: Axis) -> list[str]:
+    """Tell if Z comes and goes without the state in which the index is taken, and in which state it mostly is."""
+    if not (times := len(axis.run.tables.get(MISSED, ()))) or (usual := axis.state_of_index) is None:
+        return []
+    return [
+        f"{plural(times, 'time')} z came and went without the state in which the index is taken; "
+        f"it is mostly high in {usual}: type --index-at {usual}, or edge"
+    ]

@@ -16,6 +16,7 @@ from tachometry.boards.monitor.watch import HISTORY, Display, State
 from tachometry.cli.reports.streams import printable
 from tachometry.spec.core.health import FAULT_TEXTS, Fault
 from tachometry.spec.core.ports import BOUNDS
+from tachometry.spec.language.port import MISSED, WIDE
 from tachometry.spec.language.units import plural
 
 _LINE = 1.0  # seconds of board from a plain line to the next
@@ -188,6 +189,8 @@ def wrong_rows(state: State) -> list[tuple[str, str]]:
         if name in state.counters or name != "tick_errors":
             number = state.counters.get(name)
             rows.append((text, "-" if number is None else f"{number}{' or more' * (number == _SATURATED)}"))
+    if state.spec.index_state is not None:
+        rows += [(name.replace("_", " "), str(state.told[name])) for name in (WIDE, MISSED)]
     if "health" in state.columns:
         code = state.value("health")
         rows.append(("health", "-" if code is None else f"{code}: {FAULT_TEXTS[Fault(int(code))]}" if code else "0"))

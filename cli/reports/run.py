@@ -16,7 +16,7 @@ from tachometry.sim.studies.simulation import Axis, Simulation
 from tachometry.spec import AxesSpec, CoreSpec
 from tachometry.spec.core.compare import BOTH
 from tachometry.spec.core.health import FAULT_TEXTS
-from tachometry.spec.language.port import COMPARE, WIDE
+from tachometry.spec.language.port import COMPARE, MISSED, WIDE
 from tachometry.spec.language.units import format_time, plural
 
 _Row = tuple[str, str]  # a name and its value
@@ -125,8 +125,9 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         rows.append(("edges swallowed", f"{run.ticks.swallowed_edges[-1]} (glitch filter)"))
     if spec.index:
         last = f", the last at position {run.index.index_position[-1]}" if len(run.index.clock) else ""
-        wide = len(run.tables[WIDE]) if WIDE in run.tables else 0
-        told = f"; wider than a period {wide} times" if wide else ""
+        wrong = {WIDE: "wider than a period", MISSED: "passed by without the state of --index-at"}
+        found = {text: len(run.tables.get(name, ())) for name, text in wrong.items()}
+        told = "".join(f"; {text} {number} times" for text, number in found.items() if number)
         rows.append(("index", f"{len(run.index.clock)} times{last}{index_distance(axis)}{told}"))
     if spec.wheel is not None:
         synced = np.flatnonzero(run.ticks.synced)

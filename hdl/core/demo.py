@@ -37,7 +37,7 @@ class Demo(wiring.Component):
         self._map = registers
         self.core = RegisterCore(registers)
         self._lines = [pin.name for pin in spec.ports.pins if pin.name in ENCODER_LINES]
-        self.emulator = EncoderEmulator(spec.encoder.pulses_per_rev if spec.index else None)
+        self.emulator = EncoderEmulator(spec.encoder.pulses_per_rev if spec.index else None, spec.index_place)
         self.bridge = bridge_on(registers, bus)
         self.telemetry: TelemetrySender | None = None
         if isinstance(self.bridge, UartBridge):

@@ -38,6 +38,8 @@ class EncoderEmulator(wiring.Component):
     ----------
     lines_per_rev : int or None
         Periods in a revolution, for the index line; None: there is none.
+    index_place : int
+        Quarter of its period in which the index is high, 0 to 3.
 
     Members
     -------
@@ -64,8 +66,9 @@ class EncoderEmulator(wiring.Component):
         High in one quarter of a period in each revolution; only with `lines_per_rev`.
     """
 
-    def __init__(self, lines_per_rev: int | None = None) -> None:
+    def __init__(self, lines_per_rev: int | None = None, index_place: int = 0) -> None:
         self._lines_per_rev = lines_per_rev
+        self._index_place = index_place
         super().__init__(
             {
                 "speed": In(signed(PHASE_WIDTH)),
@@ -151,7 +154,7 @@ class EncoderEmulator(wiring.Component):
             m.d.sync += line.ideal.eq(since < _HALF + ends[name])
 
     def _index(self, m: Module, fine: Signal, turns: object) -> None:
-        """Drive the index line, in the first quarter of the first period."""
+        """Drive the index line, in a quarter of the first period."""
         last = self._lines_per_rev - 1 if self._lines_per_rev else 0
         period = Signal(range(last + 1))
         with m.If(turns == 1):
@@ -159,7 +162,7 @@ class EncoderEmulator(wiring.Component):
         with m.Elif(turns != 0):
             m.d.sync += period.eq(Mux(period == 0, last, period - 1))
         index = Signal()
-        m.d.sync += index.eq((period == 0) & (fine < _QUARTER))
+        m.d.sync += index.eq((period == 0) & (fine[-2:] == self._index_place))
         z = Signal()
         with m.If(~self.stuck[2]):
             m.d.sync += z.eq(index)

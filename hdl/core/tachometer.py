@@ -35,7 +35,7 @@ from tachometry.spec import TachometerSpec
 from tachometry.spec.core.compare import LIST_PINS
 from tachometry.spec.core.probe import packed_edges
 from tachometry.spec.core.stream import READY, flags_of, parts_of, size_of
-from tachometry.spec.language.port import UPDATE
+from tachometry.spec.language.port import MISSED, UPDATE, WIDE
 
 
 class Tachometer(wiring.Component):
@@ -91,6 +91,7 @@ class Tachometer(wiring.Component):
                 index_reset=spec.index_reset,
                 presets=spec.index_watched and spec.preset is not None,
                 complements=dict.fromkeys(spec.complemented, spec.complements or 0),
+                misses=spec.index_state is not None,
             )
         self.datapath = DATAPATHS[spec.method](spec)
         self.sampling_clock: TickSource
@@ -305,9 +306,10 @@ class Tachometer(wiring.Component):
             m.d.comb += [
                 state.level.eq(Cat(getattr(self.decoder, f"level_{line}") for line in lines)),
                 state.level_z.eq(level),
+                state.step.eq(self.decoder.step),
                 state.ready.eq(ready & self.decoder.ready),
-                self.index_wide.eq(state.index_wide),
             ]
+            follow(m, self, state, (WIDE, MISSED))
             level, ready = state.index, state.ready
         return level, ready
 
@@ -326,6 +328,8 @@ class Tachometer(wiring.Component):
                 m.d.comb += watch.preset.eq(self.controls["preset"].rises)
             follow(m, watch, self.index_capture, ("index_valid", "index_position"))
             follow(m, self, watch, ("index_error",))
+        if self.index_state is not None:
+            follow(m, watch, self.index_state, (MISSED,))
 
     def _probe(self, m: Module) -> None:
         """Latch the position at edges of probe inputs, if there are any."""

@@ -35,6 +35,8 @@ class EncoderWatch(wiring.Component):
         Something else sets the position.
     complements : mapping of str to int
         Lines that come with their complements, and for how many clocks a line may equal it.
+    misses : bool
+        The index is taken in a state, which it may miss.
 
     Members
     -------
@@ -46,6 +48,8 @@ class EncoderWatch(wiring.Component):
     index_valid : In(1)
     index_position : In(signed(position_width))
         Only with an index.
+    index_missed : In(1)
+        Only if it may.
     preset : In(1)
         The position is being set; a turn in which it is, is not checked. Only if there are presets.
     equal_a, equal_b, equal_z : In(1)
@@ -73,6 +77,7 @@ class EncoderWatch(wiring.Component):
         index_reset: bool = False,
         presets: bool = False,
         complements: Mapping[str, int] = MappingProxyType({}),
+        misses: bool = False,
     ) -> None:
         self._edges = edges
         self._errors = errors
@@ -91,6 +96,7 @@ class EncoderWatch(wiring.Component):
                 **(index if position_width else {}),
                 "seen": Out(1),
                 **({"preset": In(1)} if presets else {}),
+                **({"index_missed": In(1)} if misses else {}),
                 "health": Out(FAULT_WIDTH),
                 "faults": Out(FAULTS_WIDTH),
             }
@@ -112,6 +118,8 @@ class EncoderWatch(wiring.Component):
             m.submodules[f"open_{line}"] = box
             m.d.comb += [box.equal.eq(getattr(self, f"equal_{line}")), box.clear.eq(self.clear)]
             seen[OPEN[line]] = box.open
+        if hasattr(self, "index_missed"):
+            seen[Fault.INDEX_MISSED] = self.index_missed
         code: Value = Value.cast(0)
         for fault in sorted(seen, reverse=True):
             code = Mux(seen[fault], fault, code)

@@ -96,7 +96,7 @@ class VirtualEncoder(EncoderOptions):
         Whether there is an index line Z: high once a turn, in the first period from shaft angle 0, and gated as usual:
         only while A and B are as in `index_state`.
     index_state : int
-        Place of the index in its period: in quadrature 0, where A and B are low, to 3.
+        Place of the index in its period: in quadrature 0, where A and B are low, to 3; usually 2, where cores take it.
     sensor : str
         What it is instead of an incremental encoder with lines A and B, see `tachometry.spec.core.sensors`. Of pulses
         there is line A alone. Halls change six times in each of `pulses_per_rev` periods. Of steps and of pulses up and
@@ -121,7 +121,7 @@ class VirtualEncoder(EncoderOptions):
     start_angle_rad: float = 0.0
     index: bool = False
     sensor: str = "quadrature"
-    index_state: int = 0
+    index_state: int = 2
     reverse: bool = False
     invert: str | None = None
     missing_teeth: str | None = None

@@ -17,6 +17,7 @@ from tachometry.sim.signals.axes import AxesTrace, Trace
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, Table
 from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
+from tachometry.spec.language.port import MISSED, WIDE
 
 
 def model(spec: TachometerSpec) -> Any:
@@ -62,7 +63,8 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
         "tick": with_trip(spec, with_age(spec, ticks, updates), tripped),
         "velocity_valid": updates,
         "index_valid": index,
-        "index_wide": Table(steps.wide + spec.latency.tick, {}),
+        WIDE: Table(steps.wide + spec.latency.tick, {}),
+        MISSED: Table(steps.missed + spec.latency.tick, {}),
         "decode_error": Table(steps.errors, {}),
         "tick_error": Table(tick_errors, {}),
         "fault": wrong,

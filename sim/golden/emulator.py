@@ -111,10 +111,13 @@ class GoldenEmulator:
     ----------
     lines_per_rev : int or None
         Periods in a revolution, for the index line; None: there is none.
+    index_place : int
+        Quarter of its period in which the index is high, 0 to 3.
     """
 
-    def __init__(self, lines_per_rev: int | None = None) -> None:
+    def __init__(self, lines_per_rev: int | None = None, index_place: int = 0) -> None:
         self._lines_per_rev = lines_per_rev
+        self._index_place = index_place
         self._random = _Random()
         self._lines = [_Line(k, self._random) for k in range(2)]
         self._clock = self._speed = self._moved = self._turned = 0
@@ -195,7 +198,7 @@ class GoldenEmulator:
         )
         level = a | b << np.uint8(1)
         if self._lines_per_rev is not None:
-            index = ((total[:n] >> PHASE_WIDTH) % self._lines_per_rev == 0) & (fine < _TURN // 4)
+            index = ((total[:n] >> PHASE_WIDTH) % self._lines_per_rev == 0) & (fine * 4 // _TURN == self._index_place)
             z = np.append(np.array(self._z, dtype=np.uint8), index.astype(np.uint8))
             if settings.stuck & 4:
                 z[:-1] = z[0]

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim.golden.index_state import in_state, passed_by
 from tachometry.sim.golden.ordered import places
 from tachometry.sim.golden.tooth_wheel import Teeth, filled
 from tachometry.sim.signals.recording import PinTrace, merged, packed
@@ -145,8 +146,8 @@ class Steps:
         Clocks in which the glitch filter has counted a glitch.
     changed : uint8 array, shape (n,)
         The lines that change in `clock`: 1 of A, 2 of B, 3 both.
-    wide : int64 array
-        Clocks in which Z meets its state a second time.
+    wide, missed : int64 arrays
+        Clocks in which Z meets its state a second time, and has come and gone without it.
     wheel : Teeth or None
         Of a wheel with missing teeth, the teeth.
     z : int64 array
@@ -166,6 +167,7 @@ class Steps:
     swallowed: NDArray[np.int64]
     changed: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, dtype=np.uint8))
     wide: NDArray[np.int64] = field(default_factory=_none)
+    missed: NDArray[np.int64] = field(default_factory=_none)
     z: NDArray[np.int64] = field(default_factory=_none)
     presets: NDArray[np.int64] = field(default_factory=_none)
     values: NDArray[np.int64] = field(default_factory=_none)
@@ -211,7 +213,7 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     # The level before the first is not real.
     at = clock + spec.latency.pin_to_count + (np.arange(len(clock)) == 0)
     changed = packed([line[1:] ^ line[:-1] for line in levels])
-    rises = wide = at[:0]
+    rises = wide = missed = at[:0]
     seen = [conditioned(name) for name in spec.probes]
     probes = tuple((clock_of + spec.latency.pin_to_count, level) for clock_of, level in seen)
     if spec.wheel is not None:
@@ -222,15 +224,18 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
         z = z ^ np.uint8("z" in encoder.inverted)
         if spec.index_state is not None:
             at_z, levels_z = together([*zip([clock] * len(levels), levels, strict=True), (at_z, z)])
+            line_z = levels_z[-1]
             z, again = in_state(spec, levels_z)
-            wide = at_z[again] + spec.latency.pin_to_count
+            at_state = at_z + spec.latency.pin_to_count
+            wide = at_state[again]
+            missed = passed_by(at[step != 0], step[step != 0], at_state, line_z, z)
         rises = at_z[1:][z[1:] > z[:-1]] + spec.latency.pin_to_count
     asked = {"preset": rises[:0], "home": rises[:0]}
     for name in spec.controls:
         at_pin, level = conditioned(name)
         asked[name] = at_pin[1:][level[1:] > level[:-1]] + spec.latency.pin_to_count
     swallowed = np.sort(np.concatenate(returned)) + 3
-    found = Steps(at[1:], step[1:], at[wrong], rises, swallowed, changed, wide, rises, probes=probes)
+    found = Steps(at[1:], step[1:], at[wrong], rises, swallowed, changed, wide, missed, rises, probes=probes)
     return found.asked(spec, asked["preset"], np.full(len(asked["preset"]), spec.preset or 0), asked["home"])
 
 
@@ -241,38 +246,6 @@ def _without_gaps(spec: TachometerSpec, steps: Steps, trace: PinTrace) -> Steps:
     index = teeth.index if spec.index else steps.index
     step = np.full(len(teeth.clock), -1 if spec.encoder.reverse else 1)
     return replace(steps, clock=teeth.clock, step=step, errors=teeth.errors, index=index, wheel=teeth)
-
-
-def in_state(spec: TachometerSpec, levels: Sequence[NDArray[np.uint8]]) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
-    """Return the index as it is in the state in which it is taken, and where it meets that state a second time.
-
-    Parameters
-    ----------
-    levels : sequence of uint8 arrays, shape (n,)
-        Of the lines as they are on the pins, and of Z as it should be read, at each change.
-
-    Returns
-    -------
-    z : uint8 array, shape (n,)
-    again : bool array, shape (n,)
-        Z has been high since the lines left the state on the other side.
-    """
-    *lines, z = levels
-    kind, state = spec.encoder.kind, spec.index_state
-    assert state is not None
-    place = packed(
-        [line ^ np.uint8(name in spec.encoder.inverted) for name, line in zip(kind.lines, lines, strict=True)]
-    )
-    here = place == packed_levels(state)
-    after = (place == packed_levels(kind.after(state))) & (len(lines) > 1)
-    again = np.zeros(len(z), dtype=np.bool_)
-    left = -1  # the row in which the state was left
-    for row in np.flatnonzero(np.diff(here, prepend=here[:1])).tolist():
-        if not here[row]:
-            left = row
-        elif left >= 0 and z[left : row + 1].all():
-            again[row] = len(lines) == 1 or after[left] != after[row - 1]
-    return z & here, again
 
 
 def first_beyond(steps: Steps, last: NDArray[np.int64], limit: int) -> NDArray[np.int64]:

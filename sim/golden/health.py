@@ -74,11 +74,11 @@ def faults(spec: TachometerSpec, trace: PinTrace, steps: Steps, index: Table, cl
     illegal = _illegal(spec, steps.errors)
     wrong, off = _index(spec, steps, index) if spec.index_watched else (standing[:0], standing[:0])
     opened, lines = _open(spec, trace, clears)
-    clock = np.concatenate([standing, illegal, opened, wrong])
-    code = np.concatenate(
-        [codes, np.full(len(illegal), int(Fault.ILLEGAL)), lines, np.full(len(wrong), int(Fault.INDEX_COUNTS))]
-    )
-    error = np.concatenate([np.zeros(len(clock) - len(off), dtype=np.int64), off])
+    missed = steps.missed + spec.latency.tick
+    others = {Fault.ILLEGAL: illegal, Fault.INDEX_MISSED: missed, Fault.INDEX_COUNTS: wrong}
+    clock = np.concatenate([standing, opened, *others.values()])
+    code = np.concatenate([codes, lines, *(np.full(len(found), int(fault)) for fault, found in others.items())])
+    error = np.append(np.zeros(len(clock) - len(off), dtype=np.int64), off)
     clock, which = np.unique(clock, return_inverse=True)
     least, errors = np.full(len(clock), 1 << 62), np.zeros(len(clock), dtype=np.int64)
     np.minimum.at(least, which, code)

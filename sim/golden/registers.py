@@ -10,7 +10,7 @@ from tachometry.sim.golden import compare, health, probe
 from tachometry.sim.golden.front_end import decoded, homed
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec.core.stream import OVERRUNS_WIDTH
-from tachometry.spec.language.port import INDEX, TICK, UPDATE, WIDE
+from tachometry.spec.language.port import INDEX, MISSED, TICK, UPDATE, WIDE
 from tachometry.spec.registers.field import WORD, Field, Register
 from tachometry.spec.registers.map import COUNTER_WIDTH, RegisterMap
 
@@ -75,7 +75,7 @@ class GoldenBank:
         self._tables = golden.tables(registers.spec, self._trace, self._steps)
         self._strobes = tuple(registers.spec.ports.strobes)
         self._happened = {"updated": self._tables[UPDATE].clock, "indexed": self._tables[INDEX].clock}
-        self._happened[WIDE] = self._tables[WIDE].clock
+        self._happened |= {name: self._tables[name].clock for name in (WIDE, MISSED)}
         self._follow(self._tables[TICK].overflow)
         self._stalls = rises(self._tables[TICK].clock, self._tables[TICK].stalled)
 

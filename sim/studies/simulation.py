@@ -14,7 +14,7 @@ from tachometry.sim.engines.waveform import Curve, add_curves
 from tachometry.sim.signals.arrays import Ints
 from tachometry.sim.signals.axes import AxesTrace, Trace, of_axis
 from tachometry.sim.signals.progress import Bar
-from tachometry.sim.signals.recording import PinTrace, Recording
+from tachometry.sim.signals.recording import PinTrace, Recording, packed
 from tachometry.sim.signals.run import Run
 from tachometry.sim.signals.tables import HeldVelocity, VelocityError, held_from, held_velocity, velocity_error
 from tachometry.sim.studies.lockstep import Lockstep, lockstep
@@ -71,6 +71,16 @@ class Axis:
         position, half = self.run.index.index_position, 1 << (self.spec.position_width - 1)
         distance = position[1:] if self.spec.index_reset else np.diff(position)
         return (distance + half) % (2 * half) - half
+
+    @property
+    def state_of_index(self) -> str | None:
+        """State of the lines in which Z of quadrature is high for the longest time; None without Z."""
+        recording, inverted = self.recording, self.spec.encoder.inverted
+        if recording.z is None or self.spec.encoder.sensor != "quadrature":
+            return None
+        a, b, z = (getattr(recording, name) ^ np.uint8(name in inverted) for name in "abz")
+        usual = np.bincount(packed([a, b]), np.diff(recording.time, append=recording.duration) * z).argmax()
+        return f"A={usual & 1},B={usual >> 1}"
 
 
 @dataclass(frozen=True)

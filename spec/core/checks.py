@@ -62,11 +62,13 @@ def check(spec: TachometerSpec) -> None:
 
 
 def _check_index_state(spec: TachometerSpec) -> None:
-    if (state := spec.index_state) is None:
+    if spec.index_at is None:
         return
-    kind = spec.encoder.kind
+    kind, state = spec.encoder.kind, spec.index_state
     if not spec.index:
         raise ParameterError("index_at", "must be given together with --index")
+    if state is None:
+        return
     if not kind.cycle:
         raise ParameterError("index_at", f"must be edge for {kind.name}, whose levels are no place")
     if spec.encoder.missing:

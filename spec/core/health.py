@@ -13,9 +13,10 @@ class Fault(IntEnum):
     A_OPEN = 5
     B_OPEN = 6
     Z_OPEN = 7
+    INDEX_MISSED = 8
 
 
-FAULT_WIDTH = 3  # bits of a code
+FAULT_WIDTH = 4  # bits of a code
 FAULTS_WIDTH = 8  # bits of the number of faults, which stays at its end
 FAULT_TEXTS = {
     Fault.A_STANDS: "line a stands while b has edges: broken or shorted",
@@ -25,5 +26,6 @@ FAULT_TEXTS = {
     Fault.A_OPEN: "line a equals its complement a_n: an open circuit",
     Fault.B_OPEN: "line b equals its complement b_n: an open circuit",
     Fault.Z_OPEN: "line z equals its complement z_n: an open circuit",
+    Fault.INDEX_MISSED: "z comes and goes without the state of --index-at",
 }
 OPEN = {"a": Fault.A_OPEN, "b": Fault.B_OPEN, "z": Fault.Z_OPEN}  # of lines that have a complement

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from tachometry.spec.core.compare import COUNT_WIDTH
 from tachometry.spec.core.health import FAULT_TEXTS, FAULT_WIDTH, FAULTS_WIDTH, OPEN
 from tachometry.spec.core.stream import READY, stream_ports
-from tachometry.spec.language.port import COMPARE, INDEX, TICK, UPDATE, WIDE, Port, held, pin, strobe
+from tachometry.spec.language.port import COMPARE, INDEX, MISSED, TICK, UPDATE, WIDE, Port, held, pin, strobe
 
 if TYPE_CHECKING:
     from tachometry.spec.core.tachometer import TachometerSpec
@@ -19,12 +19,12 @@ BOUNDS = {"velocity_lower": -1, "velocity_upper": 1}
 
 def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
     """Return all ports of a core, in the order of the exported module; those of options and methods come last."""
-    place = "the first tooth after a gap" if spec.encoder.missing else "the rising edge of z"
+    place = "the first tooth after a gap" if spec.encoder.missing else "the index"
     return (
         pin("clk", "Clock; all outputs change at its rising edge."),
         pin("rst", "Synchronous reset, active high."),
         *(pin(line, help) for line, help in zip(spec.encoder.kind.lines, spec.encoder.kind.pins, strict=True)),
-        *_if("z" in spec.lines, pin("z", "Index line, asynchronous; its rising edge captures the position.")),
+        *_if("z" in spec.lines, pin("z", "Index line, asynchronous; the index captures the position.")),
         *(pin(f"{line}_n", f"Complement of line {line.upper()}, asynchronous.") for line in spec.complemented),
         *_if(
             spec.external_tick,
@@ -107,17 +107,10 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
                 INDEX,
                 "One clock for every first tooth after a gap."
                 if spec.encoder.missing
-                else "One clock for every rising edge of z; with --index-at, for every rise of z in its state.",
+                else "One clock for every index: z rises in the state of --index-at, or rises at all with edge.",
             ),
         ),
-        *_if(
-            spec.index_state,
-            strobe(
-                WIDE,
-                "One clock: z stayed high from the state of --index-at to the same state a period further, so the "
-                "index is at two places.",
-            ),
-        ),
+        *_index_strobes(spec),
         *_if(
             spec.index,
             held(
@@ -172,6 +165,15 @@ def _wrong(spec: TachometerSpec) -> str:
     if spec.encoder.missing:
         return "the gap was not where it had to be, as of a tooth lost or extra; the next gap is taken."
     return spec.encoder.kind.wrong
+
+
+def _index_strobes(spec: TachometerSpec) -> Iterable[Port]:
+    if spec.index_state is None:
+        return
+    text = "One clock: z stayed high from the state of --index-at to the same state a period further, so the index is "
+    yield strobe(WIDE, text + "at two places.")
+    text = "One clock, with the first count after z has fallen: z came and went in one direction of counts without the "
+    yield strobe(MISSED, text + "state of --index-at, so the index was not taken.")
 
 
 def _probe_pins(spec: TachometerSpec) -> Iterable[Port]:

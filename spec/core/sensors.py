@@ -8,6 +8,7 @@ from tachometry.spec.language.option import ParameterError
 
 Levels = tuple[int, ...]  # of the lines, 0 or 1
 EDGE = "edge"  # where an index is taken that is not taken in a state of the lines
+USUAL_STATE = "A=1,B=1"  # where it is taken in quadrature, unless it is said
 
 
 def packed_levels(levels: Levels) -> int:

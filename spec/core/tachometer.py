@@ -18,7 +18,7 @@ from tachometry.spec.core.ports import bound_ports, ports_of
 from tachometry.spec.core.probe import PROBE_HELP, edges_of, parse_probes
 from tachometry.spec.core.recovery import Recovery
 from tachometry.spec.core.scale import Scale
-from tachometry.spec.core.sensors import EDGE, Levels, parse_modulo, parse_state
+from tachometry.spec.core.sensors import EDGE, USUAL_STATE, Levels, parse_modulo, parse_state
 from tachometry.spec.core.stream import STREAM_HELP, Stream
 from tachometry.spec.core.times import Times
 from tachometry.spec.core.timing import Timing, parse_clocks, parse_filter
@@ -102,17 +102,18 @@ class TachometerSpec:
         parse_at=parse_filter,
         tests=("", "1", "5"),
     )
-    index: bool = option(False, "Index line z: its rising edge captures the position in index_position.")
-    index_reset: bool = option(False, "The rising edge of z also sets the position to 0 (with --index).", needs="index")
-    index_at: str = option(
-        EDGE,
-        "Where the index is taken (with --index): edge, where z rises, which is another place backward than forward, "
-        "or a state of the lines, such as A=1,B=1, while z is high: one place in both directions. Output index_wide "
-        "tells if z meets it twice.",
+    index: bool = option(False, "Index line z: the index captures the position in index_position.")
+    index_reset: bool = option(False, "The index also sets the position to 0 (with --index).", needs="index")
+    index_at: str | None = option(
+        None,
+        "Where the index is taken (with --index): in a state of the lines, such as A=1,B=1, while z is high, which is "
+        "one place in both directions, or edge, where z rises, which is another place backward than forward. Outputs "
+        "index_missed and index_wide tell if z comes without its state, or meets it twice.",
         metavar="[edge|A=1,B=1]",
+        shown=f"{USUAL_STATE}; edge for sensors other than quadrature",
         parse=parse_state,
         needs="index",
-        tests=("A=1,B=1", "A=0,B=1"),
+        tests=("edge", "A=0,B=1"),
         tacit=True,
     )
     index_once: bool = option(
@@ -322,8 +323,10 @@ class TachometerSpec:
 
     @property
     def index_state(self) -> Levels | None:
-        """Levels of the lines in which the index is taken; None: it is where Z rises."""
-        return None if self.index_at == EDGE else tuple(int(word[-1]) for word in self.index_at.split(","))
+        """Levels of the lines in which the index is taken; None: it is where Z rises, or there is none."""
+        usual = USUAL_STATE if self.index and self.encoder.sensor == "quadrature" else EDGE
+        at = self.index_at or usual
+        return None if at == EDGE else tuple(int(word[-1]) for word in at.split(","))
 
     @property
     def index_place(self) -> int:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 TICK, UPDATE, INDEX, COMPARE = "tick", "velocity_valid", "index_valid", "compare_valid"
-WIDE = "index_wide"
+WIDE, MISSED = "index_wide", "index_missed"
 STREAM = "m_axis"  # names of ports of a stream begin with it
 
 

@@ -40,7 +40,7 @@ _STROBES = {
     TICK: "One clock for every axis and every sampling period, axis 0 first.",
     "decode_error": "One clock: both lines of an axis changed at once, so the direction is unknown and nothing was "
     "counted.",
-    INDEX: "One clock for every rising edge of z of an axis.",
+    INDEX: "One clock for every index of an axis.",
     "tick_error": "One clock: an external tick was missing, and the core made one, or it came too early and was left "
     "out.",
 }
@@ -129,7 +129,7 @@ class AxesLatency(_OfAxes):
 
     @property
     def index(self) -> int:
-        """Clocks from the look that sees the rise of an index line to `index_valid`."""
+        """Clocks from the look that sees an index to `index_valid`."""
         return self.count + 1 + self.spec.parallel
 
 

@@ -11,7 +11,7 @@ from typing import Any, cast
 from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.core.times import Times
 from tachometry.spec.core.timing import Timing
-from tachometry.spec.language.port import WIDE, Ports
+from tachometry.spec.language.port import MISSED, WIDE, Ports
 
 MAX_AXES = 64
 # What is counted is back in memory before the same axis is looked at again.
@@ -112,8 +112,8 @@ class OneAxis(TachometerSpec):
 
     @cached_property
     def ports(self) -> Ports:
-        """Ports of the core, less the count of the glitch filter and the width of the index, which no axis has."""
-        return Ports(port for port in super().ports if port.name not in ("swallowed_edges", WIDE))
+        """Ports of the core, less the count of the glitch filter and what tells of a wrong index, which no axis has."""
+        return Ports(port for port in super().ports if port.name not in ("swallowed_edges", WIDE, MISSED))
 
     @property
     @abstractmethod

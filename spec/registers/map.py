@@ -23,7 +23,7 @@ from typing import Any
 from tachometry.spec.control import AnySpec
 from tachometry.spec.core.probe import packed_edges
 from tachometry.spec.core.tachometer import TachometerSpec
-from tachometry.spec.language.port import INDEX, UPDATE, WIDE, Port
+from tachometry.spec.language.port import INDEX, MISSED, UPDATE, WIDE, Port
 from tachometry.spec.registers.field import WORD, Draft, Field, Register
 from tachometry.spec.registers.manifest import manifest
 
@@ -105,7 +105,7 @@ class RegisterMap:
         """Events that raise the interrupt, each with its meaning; none without an interrupt."""
         if not self.irq:
             return {}
-        found = {"index": "A rising edge of the index line."} if self.spec.index else {}
+        found = {"index": "An index was taken."} if self.spec.index else {}
         found["overflow"] = "A tick at more than the maximum speed: its pulse_count was saturated."
         found["stall"] = "The shaft has come to rest: stalled rises."
         late = ", or an external tick was missing or came too early" if self.spec.external_tick else ""
@@ -138,7 +138,7 @@ class RegisterMap:
     def events(self) -> dict[str, str]:
         """Flags that say that something has happened since the capture before, each with the input that says it."""
         found = {"updated": UPDATE} | ({"indexed": INDEX} if self.spec.index else {})
-        return found | ({WIDE: WIDE} if self.spec.index_state else {})
+        return found | ({WIDE: WIDE, MISSED: MISSED} if self.spec.index_state else {})
 
     @cached_property
     def status(self) -> tuple[Register, ...]:
@@ -350,6 +350,7 @@ class RegisterMap:
         events = {f"updated{suffix}": "There was an update of the velocity since the capture before."}
         events[f"indexed{suffix}"] = "There was an index since the capture before."
         events[WIDE] = "z was wider than a period since the capture before, so the index is at two places."
+        events[MISSED] = "z came and went without the state of --index-at since the capture before."
         flags = [(name, help) for name, help in events.items() if name in self.events]
         flags += [(port.name, port.help) for port in ports if port.width == 1]
         for place, (name, help) in enumerate(flags):

@@ -381,13 +381,13 @@ def check_ports(expected: Expected, ports: list[dict[str, Any]]) -> None:
         ),
         **({"index_position": settings.position_bits} if settings.flag("index") else {}),
         **({"compare_position": settings.position_bits, "compare_count": 16} if "compare" in settings.words else {}),
-        **({"health": 3, "faults": 8} if settings.flag("health") else {}),
+        **({"health": 4, "faults": 8} if settings.flag("health") else {}),
         **({"index_error": settings.position_bits} if settings.flag("health") and settings.flag("index") else {}),
         **({"swallowed_edges": 16} if settings.filter else {}),
     }
     single = ["velocity_valid", "forced", "tick", "decode_error", "overflow", "stalled"]
     single += ["velocity_overflow"] * (not own) + ["bounds_valid"] * settings.flag("bounds")
-    single += ["out_of_range"] * beyond + ["index_valid"] * settings.flag("index")
+    single += ["out_of_range"] * beyond + ["index_valid", "index_missed", "index_wide"] * settings.flag("index")
     single += ["compare", "compare_valid"] * ("compare" in settings.words)
     single += ["over_speed"] * ("over-speed" in settings.words)
     single += ["fault"] * settings.flag("health") + ["tick_error"] * settings.external

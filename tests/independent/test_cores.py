@@ -100,6 +100,9 @@ def check_front(
         captured = [(row["clock"] - late, row["index_position"]) for row in rows if row["index_valid"]]
         assert captured == [pair for pair in index_positions(settings, front) if pair[0] + late < n]
         assert captured
+        assert [row["clock"] - late for row in rows if row["index_missed"]] == [
+            at for at in front.missed if at + late < n
+        ]
     if settings.external:
         assert [row["clock"] - late for row in rows if row["tick_error"]] == [at for at in wrong if at + late < n]
         assert wrong

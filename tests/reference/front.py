@@ -19,8 +19,8 @@ class Front:
     ----------
     steps : dict of int to int
         Counts by the clock in whose window they belong.
-    errors, index, rises : list of int
-        Clocks of illegal transitions, of rises of Z and of the external tick.
+    errors, index, missed, rises : list of int
+        Clocks of illegal transitions, of the index, of what tells that it was missed, of rises of the external tick.
     glitches : list of int
         Clocks in which a line went back before it was believed.
     changes : list of (int, str)
@@ -31,6 +31,7 @@ class Front:
     steps: dict[int, int] = field(default_factory=dict)
     errors: list[int] = field(default_factory=list)
     index: list[int] = field(default_factory=list)
+    missed: list[int] = field(default_factory=list)
     rises: list[int] = field(default_factory=list)
     glitches: list[int] = field(default_factory=list)
     changes: list[tuple[int, str]] = field(default_factory=list)
@@ -93,7 +94,34 @@ def conditioned(settings: Settings, play: Play, latency: int) -> Front:
     # The first level of a line is no rise.
     front.index, front.rises = ([at for at in list(line)[1:] if line[at]] for line in lines[2:])
     front.index = [at + latency for at in front.index]
+    if settings.words.get("index-at") != "edge":
+        front.index, front.missed = in_state(lines[:3], front, latency)
     return front
+
+
+def in_state(lines: list[dict[int, int]], front: Front, latency: int) -> tuple[list[int], list[int]]:
+    """Return clocks in which Z is high in A=1,B=1 anew, and in which it is told that it came and went without that."""
+    start = max(min(line) for line in lines)
+    level = [line[max(at for at in line if at <= start)] for line in lines]
+    taken, missed, before = [], [], list(level)
+    directions = [1, *(front.steps[at] for at in sorted(front.steps) if at <= start + latency)]
+    came: int | None = None  # the direction with which it came
+    met = False
+    for at in range(start + 1, front.n_clocks):
+        level = [line.get(at, old) for line, old in zip(lines, before, strict=True)]
+        if step := front.steps.get(at + latency, 0):
+            if came is not None and not (level[2] or before[2]):
+                if not met and came == directions[-1] == step:
+                    missed.append(at + latency)
+                came = None
+            directions.append(step)
+        if level[2] > before[2] and came is None:
+            came, met = directions[-1], False
+        met = met or all(level)
+        if all(level) and not all(before):
+            taken.append(at + latency)
+        before = level
+    return taken, missed
 
 
 def external_ends(rises: Iterable[int], n_clocks: int, fewest: int, most: int) -> tuple[list[int], list[int]]:
@@ -183,7 +211,7 @@ def faults(settings: Settings, front: Front, late: int) -> list[tuple[int, int, 
             found.append((at, 2 if lines == "a" else 1, 0))
             alone = 0
     if settings.flag("index"):
-        found += _turns(settings, front, late)
+        found += _turns(settings, front, late) + [(at + late, 8, 0) for at in front.missed]
     return sorted(found)
 
 

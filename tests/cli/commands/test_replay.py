@@ -69,7 +69,7 @@ def test_what_contradicts_itself_is_warned_of(
     level = {"a": "0110", "b": "0011"}
     lines = [f"time,{','.join(rows)}"]
     for k in range(361):
-        of = {name: cycle[k % 4] for name, cycle in level.items()} | {"x": "0", "y": "1", "z": str(+(k % 100 == 99))}
+        of = {name: cycle[k % 4] for name, cycle in level.items()} | {"x": "0", "y": "1", "z": str(+(k % 100 == 98))}
         lines.append(",".join([f"{k / 2000:.6f}", *(of[name] for name in rows)]))
     (tmp_path / "c.csv").write_text("\n".join(lines) + "\n")
     index = ["--index"] if rows == "abz" else []
@@ -78,7 +78,7 @@ def test_what_contradicts_itself_is_warned_of(
     assert (f"WARNING: {said}" in told) == (options != "--ppr 25")
     if index:
         assert "lines a from a, b from b, z from z captured 0.18 s, 360 changes of the lines speed min " in told
-        assert "index 3 times, the last at position 299, 100 counts apart" in told
+        assert "index 3 times, the last at position 298, 100 counts apart" in told
         assert re.search(r"PASS: .*[0-9]+ values\), which says nothing of wiring and --ppr", told)
 
 
@@ -102,10 +102,15 @@ def test_an_index_at_two_places_is_warned_of(
     shaft = [*range(61), *range(60, 19, -1), *range(20, 61)]
     rows = [f"{k / 2000:.6f},{'0110'[n % 4]},{'0011'[n % 4]},{int(n in high)}" for k, n in enumerate(shaft)]
     (tmp_path / "c.csv").write_text("\n".join(["time,a,b,z", *rows, ""]))
-    assert run("replay", tmp_path / "c.csv", *CORE, "--index") == 0
+    assert run("replay", tmp_path / "c.csv", *CORE, *"--index --index-at edge".split()) == 0
     told = " ".join(capsys.readouterr().out.split())
     assert ("WARNING" in told) == (said is not None)
     assert f"WARNING: to and fro, the index is found {said}" in told or said is None
+    if said is None:  # by default it is missed
+        assert run("replay", tmp_path / "c.csv", *CORE, "--index") == 0
+        told = " ".join(capsys.readouterr().out.split())
+        assert "index 0 times; passed by without the state of --index-at 3 times" in told
+        assert "it is mostly high in A=0,B=0: type --index-at A=0,B=0, or edge" in told
 
 
 def test_channels_are_chosen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -87,7 +87,7 @@ def case() -> tuple[TachometerSpec, PinTrace]:
 
 def program(spec: TachometerSpec) -> str:
     registers = RegisterMap(spec)
-    names = [port.name for port in spec.ports.outputs if not port.is_strobe] + ["updated", "indexed"]
+    names = [port.name for port in spec.ports.outputs if not port.is_strobe] + [*registers.events]
     shown = [f'  printf("{name} %" PRId64 "\\n", (int64_t)now.{name});' for name in names]
     counted = [f'  printf("{name} %d\\n", counters.{name});' for name in registers.counted]
     return (

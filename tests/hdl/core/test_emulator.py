@@ -14,6 +14,7 @@ from tachometry.spec.core.health import Fault
 from tachometry.spec.registers.emulator import LATENCY, EmulatorSettings
 
 CLOCKS, SEEDS = 3000, range(8)
+PLACE = 2  # of the index
 
 
 def random_changes(seed: int) -> list[Change]:
@@ -45,7 +46,7 @@ def emulated(changes: list[Change], n_clocks: int, lines_per_rev: int | None) ->
         if change.jump:
             rows[change.clock]["jump"] = 1
     names = ["a", "b", *["z"] * (lines_per_rev is not None)]
-    seen = clock_by_clock(emulator.EncoderEmulator(lines_per_rev), rows, names)
+    seen = clock_by_clock(emulator.EncoderEmulator(lines_per_rev, PLACE), rows, names)
     return [tuple(row[name] for name in names) for row in seen]
 
 
@@ -55,7 +56,7 @@ def test_lines_are_those_of_the_golden_model(seed: int) -> None:
 
 
 def check(changes: list[Change], lines_per_rev: int | None) -> None:
-    trace = GoldenEmulator(lines_per_rev).trace(changes, CLOCKS)
+    trace = GoldenEmulator(lines_per_rev, PLACE).trace(changes, CLOCKS)
     row = np.searchsorted(trace.clock, np.arange(CLOCKS), side="right") - 1
     levels = np.stack(list(trace.lines.values()), axis=1)[row].tolist()
     for clock, (got, wanted) in enumerate(zip(emulated(changes, CLOCKS, lines_per_rev), levels, strict=True)):
@@ -69,6 +70,7 @@ def edges(settings: EmulatorSettings, n_clocks: int) -> tuple[np.ndarray, np.nda
 
 
 PERIOD = 4096
+
 STEADY = EmulatorSettings(speed=(1 << 32) // PERIOD)
 
 

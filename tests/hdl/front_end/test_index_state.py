@@ -5,8 +5,10 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support.nightly import only
+from proofs.source import mutant
+from support.nightly import nightly, only
 
+from tachometry.hdl.front_end import index_state
 from tachometry.hdl.front_end.index_state import IndexState
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
@@ -17,6 +19,7 @@ from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.sim.signals.run import compare
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import TachometerSpec, of_texts, with_axes
+from tachometry.spec.core.health import Fault
 from tachometry.spec.core.sensors import SENSORS
 
 BASE = {"ppr": "8", "clock": "1MHz", "tick": "40us", "max-time": "400us", "index": "yes"}
@@ -56,14 +59,14 @@ def places(run_index: NDArray[np.int64]) -> set[int]:
 @pytest.mark.parametrize(("width", "decoding"), [(1, "4"), (2, "2"), (3, "1"), (4, "4")])
 def test_ten_thousand_reversals_find_one_place(width: int, decoding: str) -> None:
     trace = over_the_index(width, 10_000, width)
-    spec = spec_of(decoding=decoding, index_at="A=1,B=1")
-    run = golden.run(spec, trace)
+    run = golden.run(spec_of(decoding=decoding), trace)  # by default
     assert len(run.index) > 3000
     assert places(run.index.index_position) == {{"4": 2, "2": 1, "1": 1}[decoding]}
     assert len(run.tables["index_wide"]) == 0
+    assert len(run.tables["index_missed"]) < 20  # Z that comes early each time knows the direction before the turn
     # The edge is at several.
     if decoding == "4":
-        assert len(places(golden.run(spec_of(), trace).index.index_position)) > 1
+        assert len(places(golden.run(spec_of(index_at="edge"), trace).index.index_position)) > 1
 
 
 @pytest.mark.parametrize("state", ["A=0,B=0", "A=1,B=0", "A=1,B=1", "A=0,B=1"])
@@ -92,12 +95,75 @@ def test_a_wide_index_is_told(seed: int, texts: dict[str, str]) -> None:
     clock = np.append(0, np.cumsum(rng.integers(1, 6, 900)))
     drift = np.repeat(rng.choice([1, -1], 30), 31)[: len(clock)]
     level = quadrature(np.cumsum(np.where(rng.random(len(clock)) < 0.8, drift, rng.integers(-1, 3, len(clock)))))
-    z = (np.cumsum(rng.random(len(clock)) < 0.06) & 1).astype(np.uint8)
+    z = (np.cumsum(rng.random(len(clock)) < np.where(clock < clock[600], 0.06, 0.5)) & 1).astype(np.uint8)
     trace = PinTrace(clock, level & np.uint8(1), level >> np.uint8(1), int(clock[-1]) + 50, z)
     found = lockstep(spec, trace, PySim())
     assert found.n_mismatches == 0, found.first
     assert len(found.actual.tables["index_wide"]) > 3
+    assert len(found.actual.tables["index_missed"]) > 3 or "sensor" in texts
     assert len(found.actual.index) > 10
+
+
+def passing(quarter: NDArray[np.int64], begin: int, width: int, late: int = 0, *, noise: bool = False) -> PinTrace:
+    """Return a shaft in these quarters, nine clocks each, and an index from `begin` on, `late` clocks late.
+
+    With noise it falls back for two clocks after each edge.
+    """
+    clock = 10 + np.arange(len(quarter)) * 9
+    slot = (quarter >= begin) & (quarter < begin + width)
+    edges = clock[1:][np.diff(slot)] + late
+    edges = np.concatenate([edges, edges + 2, edges + 4]) if noise else edges
+    every = np.union1d(np.append(0, clock), edges)
+    level = quadrature(quarter[np.maximum(np.searchsorted(clock, every, side="right") - 1, 0)])
+    z = (np.searchsorted(np.sort(edges), every, side="right") & 1).astype(np.uint8)
+    return PinTrace(every, level & np.uint8(1), level >> np.uint8(1), int(every[-1]) + 60, z)
+
+
+@pytest.mark.parametrize("decoding", ["4", "1"])
+@pytest.mark.parametrize(("begin", "width"), [(0, 1), (3, 1), (-1, 3), (2, 1), (1, 4)])
+def test_an_index_beside_its_state_is_told_each_time_and_one_in_it_never(begin: int, width: int, decoding: str) -> None:
+    """The state of A=1,B=1 is quarter 2; a shaft that turns back in the index has not passed it, in time or late."""
+    late = SKEW * (begin == 0)
+    passes = np.concatenate([np.arange(-9, 13), np.arange(12, -10, -1), np.arange(-9, 13)])
+    back = np.concatenate([np.arange(-9, begin + 1), np.arange(begin, -10, -1)])
+    for quarter, times in ((passes, 3), (back, 0)):
+        found = lockstep(spec_of(decoding=decoding), passing(quarter, begin, width, late), PySim())
+        assert found.n_mismatches == 0, found.first
+        there = begin <= 2 < begin + width
+        assert len(found.actual.tables["index_missed"]) == (0 if there else times)
+        assert len(found.actual.index) == (0 if not there else 1 if begin == 2 and not times else times)
+
+
+def test_levels_of_z_with_no_count_between_them_are_one_index() -> None:
+    """As where its edges have noise, before the state and after it. A fault of --health tells that it is missed."""
+    for begin, width, missed in ((2, 1, 0), (1, 2, 0), (3, 1, 1)):
+        found = lockstep(spec_of(health="yes"), passing(np.arange(-4, 9), begin, width, noise=True), PySim())
+        assert found.n_mismatches == 0, found.first
+        assert len(found.actual.tables["index_missed"]) == missed
+        assert found.actual.ticks.health[-1] == (Fault.INDEX_MISSED if missed else 0)
+
+
+@nightly  # it asks what the tests above notice
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("& ~met", ""),
+        ("(entered == last)", "1"),
+        ("(last == self.step[1])", "1"),
+        ("& ~self.level_z & ~was_z", "& ~self.level_z"),
+        ("met & passing", "met"),
+        ("Mux(passing, entered, latest)", "latest"),
+        ("Mux(self.step[0], self.step[1], last)", "last"),
+    ],
+)
+def test_mutants_are_noticed(right: str, wrong: str) -> None:
+    with mutant(index_state.IndexState, right, wrong), pytest.raises(AssertionError):
+        _told_of_three()
+
+
+def _told_of_three() -> None:
+    for seed in range(3):
+        test_a_wide_index_is_told(seed, {})
 
 
 def test_an_index_of_eight_quarters_is_told_in_both_directions_and_one_of_four_never() -> None:

@@ -119,7 +119,7 @@ def test_a_preset_moves_the_position_alone_and_by_no_count_too_many(method: str)
 
 
 def test_the_index_is_taken_once_after_each_time_that_it_is_asked_for() -> None:
-    spec = spec_of({"index": "yes", "index-once": "yes", "index-reset": "yes"})
+    spec = spec_of({"index": "yes", "index-at": "edge", "index-once": "yes", "index-reset": "yes"})
     trace = turning(1000).with_pulses("home", np.array([1000, 2400, 2500]))
     run = golden.run(spec, trace)
     at = [(first * 32 + 3) * 10 + spec.latency.pin_to_count + spec.latency.tick for first in (4, 8)]

@@ -136,7 +136,7 @@ def _case(
     return Case(f"{method}, {name}", spec, mutants, max_table)
 
 
-_FRONT: dict[str, Any] = {"filter_clocks": 2, "index": True, "index_reset": True}
+_FRONT: dict[str, Any] = {"filter_clocks": 2, "index": True, "index_at": "edge", "index_reset": True}
 
 # Ticks of an odd number of clocks: inverters in a loop would cancel over an even one.
 CASES = [

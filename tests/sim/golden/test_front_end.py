@@ -39,7 +39,7 @@ def trace_of(n_clocks: int, *, a: tuple[int, ...] = (), z: tuple[int, ...] = ())
 def test_without_an_index_its_line_is_not_looked_at() -> None:
     trace = trace_of(60, a=(5, 25), z=(7, 9, 30))
     assert decoded(spec_of(), trace).index.tolist() == []
-    assert decoded(spec_of(index="yes"), trace).index.tolist() == [7 + 2, 30 + 2]
+    assert decoded(spec_of(index="yes", index_at="edge"), trace).index.tolist() == [7 + 2, 30 + 2]
 
 
 def test_the_position_of_an_index_before_and_after_counts() -> None:

@@ -106,20 +106,20 @@ def test_replay_takes_the_index_along(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("direction", [1, -1])
-def test_the_index_is_a_quarter_wide_and_begins_at_angle_0(direction: int) -> None:
+def test_the_index_is_the_third_quarter_of_a_turn(direction: int) -> None:
     recording = record(f"constant:{direction}rev/s:3s", start_angle_rad=-10.5 * PITCH, index=True).recording
     assert recording.z is not None
     time, change = recording.time[1:], np.diff(recording.z.astype(int))
     ends = -10.5 + direction * np.stack([time[change > 0], time[change < 0]]) * 4 * PPR  # in pitches
-    np.testing.assert_allclose(ends[0] % (4 * PPR), 0 if direction > 0 else 1, atol=1e-6)
+    np.testing.assert_allclose(ends[0] % (4 * PPR), 2 if direction > 0 else 3, atol=1e-6)
     np.testing.assert_allclose(ends[1] - ends[0], direction, atol=1e-6)
     assert ends.shape == (2, 3)
-    assert set(np.unique(recording.level)) == {0, 1, 2, 3, 4}
+    assert set(np.unique(recording.level)) == {0, 1, 2, 3, 7}
     assert decode(recording, 4)[1] == 0
 
 
 def test_a_shaft_at_rest_on_the_index_shows_it() -> None:
-    assert rows(record("stop:1s", index=True).recording) == [(0, 0, 1)]
+    assert rows(record("stop:1s", index=True, start_angle_rad=2.5 * PITCH).recording) == [(1, 1, 1)]
     assert rows(record("stop:1s", index=True, start_angle_rad=4.5 * PITCH).recording) == [(0, 0, 0)]
 
 
@@ -143,5 +143,5 @@ def test_the_index_is_gated_and_leaves_the_lines_alone(seed: int) -> None:
     assert np.array_equal(indexed.time[kept], bare.time)
     assert np.array_equal(lines[kept], bare.level)
     assert indexed.z is not None
-    assert not np.any(lines[indexed.z == 1])
-    assert np.count_nonzero(np.diff(indexed.z)) >= (10, 5, 0)[seed % 3]
+    assert np.all(lines[indexed.z == 1] == 3)
+    assert np.count_nonzero(np.diff(indexed.z)) >= (10, 2, 0)[seed % 3]

@@ -108,7 +108,7 @@ def test_before_the_first_update_only_the_velocity_is_defined() -> None:
 
 def test_flags_of_events_are_of_the_time_since_the_capture_before() -> None:
     """Updates are in clocks 12, 22, …; the index rises in clock 29 of the pins, and its strobe comes four later."""
-    bank = Bank(pins(z=(6, 8)), index="yes", average="2")  # whose interval is no flag
+    bank = Bank(pins(z=(6, 8)), index="yes", index_at="edge", average="2")  # whose interval is no flag
     clocks = [10, 11, 12, 13, 21, 22, 23, 32, 33, 34, 45]
     asked = [(clock, "VELOCITY" if not part else "STATUS", None) for clock in clocks for part in (0, 1)]
     words = bank.ask(*asked)[1::2]

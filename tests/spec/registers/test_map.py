@@ -25,7 +25,7 @@ def bits(registers: RegisterMap, name: str) -> list[tuple[str, int, int]]:
 
 def test_what_has_more_than_a_bit_has_a_register() -> None:
     assert "INTERVAL" not in [one.name for one in map_of("m", average="1")]
-    assert ("interval", 2, 1) in bits(map_of("m", average="1", index="yes"), "STATUS")
+    assert ("interval", 2, 1) in bits(map_of("m", average="1", index="yes", index_at="edge"), "STATUS")
     assert bits(map_of("m", average="2"), "INTERVAL") == [("value", 0, 32)]
 
 
@@ -63,7 +63,7 @@ def test_registers_follow_each_other() -> None:
 
 
 def test_bits_of_control_counters_and_status() -> None:
-    registers = map_of(external_tick="yes", index="yes")
+    registers = map_of(external_tick="yes", index="yes", index_at="edge")
     assert bits(registers, "CONTROL") == [("clear", 0, 1), ("hold", 1, 1)]
     assert [(one.access, one.reset) for one in registers["CONTROL"].fields] == [("wo", 0), ("rw", 0)]
     assert bits(registers, "COUNTERS") == [

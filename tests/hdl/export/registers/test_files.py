@@ -155,8 +155,8 @@ def check_client(registers: RegisterMap, text: str, folder: Path) -> None:
             value = values.get(field.port, 1)
             memory[one.offset] |= (value >> field.shift & (1 << field.width) - 1) << field.low
     snapshot = Client(memory.__getitem__, memory.__setitem__, described).snapshot()
-    assert dict(snapshot) == values | {"updated": 1} | ({"indexed": 1} if spec.index else {})
-    assert snapshot.flags.keys() == flags(spec) | {"updated"} | ({"indexed"} if spec.index else set())
+    assert dict(snapshot) == values | dict.fromkeys(RegisterMap(spec).events, 1)
+    assert snapshot.flags.keys() == flags(spec) | RegisterMap(spec).events.keys()
     assert snapshot.velocity_rad_per_s == values["velocity"] * spec.scale.rad_per_s_per_lsb
 
 
@@ -165,7 +165,7 @@ def check_driver(registers: RegisterMap, text: str, folder: Path) -> None:
     struct = text[text.index("struct spindle_snapshot {") :]
     members = dict(reversed(row) for row in re.findall(r"^  (\w+) (\w+);$", struct[: struct.index("};")], re.MULTILINE))
     spec = registers.spec
-    expected = {"updated": "bool"} | ({"indexed": "bool"} if spec.index else {})
+    expected = dict.fromkeys(RegisterMap(spec).events, "bool")
     for port in spec.ports.outputs:
         if not port.is_strobe:
             bits = 64 if port.width > 32 else 32
