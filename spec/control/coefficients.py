@@ -1,6 +1,7 @@
 """The coefficients of a control loop, from its gains, its motor and the units of its core."""
 
 import math
+from collections.abc import Sequence
 from fractions import Fraction
 
 from tachometry.spec.control import form
@@ -18,12 +19,12 @@ from tachometry.spec.control.units import Units
 from tachometry.spec.language.units import PI
 
 
-def ratios_of(units: Units) -> dict[Term, list[Fraction]]:
+def ratios_of(units: Units) -> dict[Term, Sequence[Fraction]]:
     """Return what each term is multiplied by, in units of its result for one of its word."""
     law = units.law
     observed = form.ratios(law.observer, units.seconds, units.longest)
     per_current = law.torque_constant / (law.inertia * law.observer) * units.amperes / units.fine
-    found = {
+    found: dict[Term, Sequence[Fraction]] = {
         Term.OBSERVER: observed,
         Term.CURRENT: [one * per_current / n for n, one in enumerate(observed, 1)],
         **{term: [_gain(law, term) * _of_one(units, term)] for term in GAINS},
@@ -50,7 +51,7 @@ def _of_one(units: Units, term: Term) -> Fraction:
     return law.inertia / law.torque_constant / part * words[term]
 
 
-def control_form(units: Units, ratios: dict[Term, list[Fraction]], *, inputs: bool) -> ControlForm:
+def control_form(units: Units, ratios: dict[Term, Sequence[Fraction]], *, inputs: bool) -> ControlForm:
     """Return formats and coefficients, for gains that are inputs or fixed."""
     bits = form.factor_bits(list(ratios.values()))
     gain_bits = min(bits, MOST_GAIN_BITS) if inputs else 0

@@ -39,7 +39,8 @@ from dataclasses import dataclass, replace
 from decimal import Decimal, localcontext
 from enum import IntEnum
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
+from itertools import accumulate, repeat
 from typing import Self
 
 from tachometry.spec.language.units import ceil_log2, signed_width
@@ -85,15 +86,7 @@ class Term(IntEnum):
 GAINS = tuple(term for term in Term if not term.tabled)
 
 
-_LONGEST = Fraction(177)  # e^−177 > 2^−256
-
-
-def decay(exponent: Fraction) -> Fraction:
-    """Return e^−exponent to 60 digits, and never less than 2^−256, far below what a coefficient shows."""
-    exponent = min(exponent, _LONGEST)
-    with localcontext() as context:
-        context.prec = 70
-        return Fraction((-Decimal(exponent.numerator) / Decimal(exponent.denominator)).exp())
+_LONGEST = Fraction(177)  # e^−177 > 2^−256, which is far below what a coefficient shows
 
 
 @dataclass(frozen=True)
@@ -274,9 +267,15 @@ class ControlForm:
         return max(signed_width(self.most_total), self.position_width + self.position_bits)
 
 
-def ratios(rate: Fraction, seconds: Fraction, longest: int) -> list[Fraction]:
-    """Return c(n) for n from 1 to `longest`, eq. (22)."""
-    return [1 - decay(rate * seconds * n) for n in range(1, longest + 1)]
+@lru_cache(64)
+def ratios(rate: Fraction, seconds: Fraction, longest: int) -> tuple[Fraction, ...]:
+    """Return c(n) for n from 1 to `longest`, eq. (22), to 60 digits."""
+    exponent = min(rate * seconds, _LONGEST)
+    with localcontext() as context:
+        context.prec = 80
+        one, least = ((-Decimal(e.numerator) / Decimal(e.denominator)).exp() for e in (exponent, _LONGEST))
+        decays = accumulate(repeat(one, longest), lambda before, one: max(before * one, least))
+        return tuple(1 - Fraction(decay) for decay in decays)
 
 
 def extra_bits(*least: Fraction) -> int:

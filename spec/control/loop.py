@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -152,7 +153,7 @@ class LoopSpec(Law):
         return spec.timing.tick_cycles - 1 + spec.latency.tick + spec.latency.tick_to_velocity + 1
 
     @cached_property
-    def ratios(self) -> dict[Term, list[Fraction]]:
+    def ratios(self) -> dict[Term, Sequence[Fraction]]:
         """The factor of each term, in units of its result for one of its word."""
         return ratios_of(self.units)
 

@@ -73,8 +73,8 @@ class Units:
     def extra_bits(self) -> int:
         """f: bits of y and of w below an LSB of the velocity."""
         law = self.law
-        least = [rate * self.seconds for rate in (law.observer, law.filter) if rate is not None]
-        return form.extra_bits(*(1 - form.decay(one) for one in least))
+        rates = [rate for rate in (law.observer, law.filter) if rate is not None]
+        return form.extra_bits(*(form.ratios(rate, self.seconds, 1)[0] for rate in rates))
 
     @property
     def fine(self) -> Fraction:
