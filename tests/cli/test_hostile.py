@@ -100,16 +100,16 @@ def outcome(line: str) -> tuple[int, str, str]:
     return code, out.buffer.getvalue().decode(), err.buffer.getvalue().decode()
 
 
-def wrong(row: Row, folder: Path) -> str | None:
-    """Return what is wrong with what a row does."""
-    before = contents(folder)
+def wrong(row: Row, folder: Path, before: dict[str, tuple[int, int]]) -> str | None:
+    """Return what is wrong with what a row does; `before` are the contents of the folder."""
     code, out, err = outcome(row.line)
     told = err.removesuffix("\n")
     if (code, out) != (2, "") or not told.startswith("tachometry: error: ") or not told.isprintable():
         return f"status {code}, {out[-300:]!r}, {err[-600:]!r}"
     if row.message not in told or len(told) > 3000:
         return f"must say {row.message!r}, not {told!r}"
-    return None if contents(folder) == before else f"leaves {set(contents(folder)) ^ set(before) or 'other contents'}"
+    after = contents(folder)
+    return None if after == before else f"leaves {set(after) ^ set(before) or 'other contents'}"
 
 
 def limit() -> None:
@@ -128,8 +128,9 @@ def in_a_child(rows: list[Row], folder: Path) -> Iterator[int]:
         try:
             os.chdir(folder)
             limit()
+            before = contents(folder)
             for row in rows:
-                os.write(write, json.dumps(wrong(row, folder)).encode() + b"\n")
+                os.write(write, json.dumps(wrong(row, folder, before)).encode() + b"\n")
         finally:
             os._exit(0)
     os.close(write)

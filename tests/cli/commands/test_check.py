@@ -128,9 +128,8 @@ def test_what_other_versions_wrote_is_proved(
 
 
 def test_the_core_that_lies_there_is_simulated(generated: Generated, capsys: pytest.CaptureFixture[str]) -> None:
+    """That of the manifest agrees with its golden model in the jobs below."""
     folder = generated("core", *CORES["s"].split())
-    assert run("check", folder) == 0  # its bench writes no register
-    capsys.readouterr()
     wrong = folder / "netlist.v"
     text = (folder / "core.v").read_text()
     wrong.write_text(re.sub(r" - ", " + ", text, count=1))

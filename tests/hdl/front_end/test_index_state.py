@@ -221,7 +221,7 @@ def test_the_index_of_the_virtual_encoder_is_about_its_state(texts: dict[str, st
 def test_of_many_axes_each_finds_its_own() -> None:
     alone = of_texts("s", BASE | {"index-at": "A=0,B=1"})
     spec = with_axes(alone, 2, parallel=False)
-    found = lockstep(spec, stress_of(spec, 2, 40), PySim())
+    found = lockstep(spec, stress_of(spec, 2, 25), PySim())
     assert found.n_mismatches == 0, found.first
     assert len(found.expected.tables["index_valid"]) > 2
 
