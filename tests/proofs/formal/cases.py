@@ -7,6 +7,7 @@ from unittest.mock import patch
 from proofs.formal.axes import COUNTS_OF_AXES, POSITIONS_OF_AXES
 from proofs.formal.buses import ON_BUSES, RECORDS
 from proofs.formal.control import CONTROL
+from proofs.formal.outputs import OUTPUTS
 from proofs.formal.probes import STANDSTILL_PROBES, counting, within
 from proofs.formal.prove import Proof
 from proofs.formal.timed import mt_after_upset, timed
@@ -242,6 +243,7 @@ QUICK = [
     "stream",
     "control loop",
     "control loop, any gains",
+    "outputs",
 ]
 
 PROOFS = [
@@ -294,4 +296,5 @@ PROOFS = [
     *ON_BUSES,
     RECORDS,
     *CONTROL,
+    *OUTPUTS,
 ]

@@ -20,8 +20,13 @@ from tachometry.hdl.control.controller import Controller
 from tachometry.hdl.control.update_window import UpdateWindow
 from tachometry.hdl.front_end.conditioner import InputConditioner
 from tachometry.hdl.front_end.decoder import QuadratureDecoder
+from tachometry.hdl.front_end.encoder_watch import EncoderWatch
 from tachometry.hdl.front_end.glitch_filter import GlitchFilter
+from tachometry.hdl.front_end.index_capture import IndexCapture
+from tachometry.hdl.front_end.modulo_counter import ModuloCounter
+from tachometry.hdl.front_end.open_circuit import OpenCircuit
 from tachometry.hdl.front_end.position_counter import PositionCounter
+from tachometry.hdl.front_end.probe_latch import ProbeLatch
 from tachometry.hdl.front_end.pulse_counter import PulseCounter
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.methods.alteration import AlterationDetector
@@ -33,6 +38,8 @@ from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
 from tachometry.hdl.methods.rairan import RairanMethod
 from tachometry.hdl.methods.rairan_counters import RairanCounters
 from tachometry.hdl.methods.tick_counts import TickCounts
+from tachometry.hdl.output.compare_output import CompareOutput
+from tachometry.hdl.output.over_speed import OverSpeed
 from tachometry.hdl.output.record_stream import RecordStream
 from tachometry.hdl.output.standstill import Standstill
 from tachometry.hdl.output.update_age import UpdateAge
@@ -277,4 +284,27 @@ MUTANTS = [
         "form.current_limit, self.current_limit, self.current_limit)",
     ),
     Mutant("control loop", "pc_n", UpdateWindow, "self.n + 1", "self.n + 2", 52),
+    Mutant("outputs", "po_modulo", ModuloCounter, "Mux(late[1], self._modulus - 1, 0)", "0"),
+    Mutant("outputs", "po_range", ModuloCounter, "Mux(late[1], 0, self._modulus - 1)", "self._modulus"),
+    Mutant("outputs", "po_position", PositionCounter, "Mux(self.load, self.value, self.position)", "self.position"),
+    Mutant("outputs", "po_trip", OverSpeed, "(above | below)", "above"),
+    Mutant("outputs", "po_open", OpenCircuit, "~self.equal | self.clear", "~self.equal"),
+    Mutant("outputs", "po_health", EncoderWatch, "with m.If(self.health == 0):", "with m.If(1):"),
+    Mutant("outputs", "po_faults", EncoderWatch, "self.faults.eq(self.faults + 1)", "self.faults.eq(1)"),
+    Mutant(
+        "outputs", "po_line", EncoderWatch, "return last & change_b, last & change_a", "return last, last & change_a"
+    ),
+    Mutant("outputs", "po_home", IndexCapture, "seen & armed", "seen"),
+    Mutant("outputs", "po_homed", IndexCapture, "armed.eq(1), self.homed.eq(0)", "armed.eq(1)"),
+    Mutant("outputs", "po_index", IndexCapture, "self.index_position.eq(self.position)", "self.index_position.eq(0)"),
+    Mutant("outputs", "po_latches", ProbeLatch, "edge & ~self.probed", "edge"),
+    Mutant("outputs", "po_probed", ProbeLatch, "(self.probed | edge) & ~self.arm", "self.probed | edge"),
+    Mutant("outputs", "po_latched", ProbeLatch, ".eq(self.position)", ".eq(0)"),
+    Mutant("outputs", "po_since", ProbeLatch, "since + ~since.all()", "since + 1"),
+    Mutant("outputs", "po_pulse", CompareOutput, "left.eq(left - 1)", "left.eq(0)"),
+    Mutant("outputs", "po_place", CompareOutput, "(self.position == awaited)", "1"),
+    Mutant("outputs", "po_edge", CompareOutput, "(self.position + back)", "self.position"),
+    Mutant("outputs", "po_due", CompareOutput, "awaited.eq(awaited + compare.apart)", "awaited.eq(awaited)"),
+    Mutant("outputs", "po_grid", CompareOutput, "number.eq(Mux(back, number - 1, number + 1))", "number.eq(1)"),
+    Mutant("upset, outputs", "po_open", OpenCircuit, "~self.equal | self.clear", "self.clear"),
 ]

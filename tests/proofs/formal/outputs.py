@@ -1,0 +1,73 @@
+"""These proofs are about what follows position and velocity, and what watches lines: a box each, side by side."""
+
+from amaranth import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In
+from proofs.formal.prove import Proof
+
+from tachometry.hdl.front_end import (
+    encoder_watch,
+    index_capture,
+    modulo_counter,
+    open_circuit,
+    position_counter,
+    probe_latch,
+)
+from tachometry.hdl.output import compare_output, over_speed
+from tachometry.spec import Encoder, STachometer
+from tachometry.spec.core.compare import Compare
+
+OPEN, MODULUS, LIMIT, PULSE, APART = 3, 5, 5, 2, 3
+_WIDTH = 4  # of positions
+_PROBES = {
+    "core_awaited": "compare.awaited",
+    "core_armed": "home.armed",
+    "core_since": "probe.since",
+    "core_number": "both.number",
+    "core_next": "both.awaited",
+}
+
+
+class Outputs(wiring.Component):
+    """Has boxes that share nothing; a port has the name of its box in front."""
+
+    def __init__(self) -> None:
+        # By the names in their modules, where a mutant takes its place.
+        self._boxes: dict[str, wiring.Component] = {
+            "modulo": modulo_counter.ModuloCounter(MODULUS),
+            "position": position_counter.PositionCounter(_WIDTH, preset=0),
+            "home": index_capture.IndexCapture(_WIDTH, once=True),
+            "probe": probe_latch.ProbeLatch(1, 1, _WIDTH, 3),
+            "trip": over_speed.OverSpeed(LIMIT, _WIDTH),
+            "open": open_circuit.OpenCircuit(OPEN),
+            "watch": encoder_watch.EncoderWatch(second=6, edges=2, errors=1),
+            "compare": compare_output.CompareOutput(Compare(1, APART, 2, "2clk"), PULSE, _WIDTH),
+            "both": compare_output.CompareOutput(Compare(1, APART, 2, "2clk", "both"), PULSE, _WIDTH),
+        }
+        super().__init__(
+            {
+                f"{name}_{port}": flow
+                for name, box in self._boxes.items()
+                for port, flow in box.signature.members.items()
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        for name, box in self._boxes.items():
+            m.submodules[name] = box
+            for port, member in box.signature.members.items():
+                inner, outer = getattr(box, port), getattr(self, f"{name}_{port}")
+                m.d.comb += inner.eq(outer) if member.flow == In else outer.eq(inner)
+        return m
+
+
+def _outputs(name: str, recovers: int = 0) -> Proof:
+    """Return PO; from any state, once what an upset has changed is cleared, armed, set, or taken anew."""
+    parameters = {"OPEN": OPEN, "MODULUS": MODULUS, "LIMIT": LIMIT, "APART": APART, "UPSET": int(recovers > 0)}
+    spec = STachometer(encoder=Encoder(1))
+    depth = 1 if recovers else OPEN + 4
+    return Proof(name, spec, "outputs", parameters, _PROBES, depth, box=Outputs, recovers=recovers)
+
+
+OUTPUTS = [_outputs("outputs"), _outputs("upset, outputs", recovers=10)]
