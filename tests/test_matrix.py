@@ -49,7 +49,7 @@ def check(words: tuple[str, ...], folder: Path, motions: int, left: int) -> None
     rare = {"--min-time", "--lowpass"} & {*words}
     trace = stress(spec, 1, 400 if rare else 300 if spec.timing.tick_cycles < 100 else 200)
     n_clocks = trace.n_clocks + min(left, motions * stress(spec, 2, EDGES).n_clocks)
-    verilator = LintingVerilator(folder, few=n_clocks < 500_000)
+    verilator = LintingVerilator(folder, few=n_clocks < 3_000_000)
     engine: CompiledEngine = verilator
     if trace.n_clocks > 2e7:  # which would take Verilator long
         verilator.text(Design(spec, list(spec.ports.pins)))

@@ -98,14 +98,13 @@ def test_the_fine_position_wraps_as_the_position_does() -> None:
     assert golden(SPEC, steps, last) != golden(replace(SPEC, position_width=16), steps, last)
 
 
-# The quick unit takes half a minute to be compiled; tests/test_matrix.py and test_track_machine.py have it daily.
-@pytest.mark.parametrize(
-    "spec", [SPEC, EXTERNAL, pytest.param(replace(EXTERNAL, multiplier="block"), marks=nightly)], ids=range(3)
-)
+# tests/test_matrix.py has external ticks and the quick unit daily, which takes half a minute to be compiled here.
+@pytest.mark.parametrize("spec", only([SPEC], [SPEC, EXTERNAL, replace(EXTERNAL, multiplier="block")]), ids=range(3))
 def test_hostile_counts(spec: TrackTachometer) -> None:
     check(spec, *motions(spec, np.random.default_rng(3), 200))
 
 
+@nightly  # tests/test_matrix.py has external ticks daily
 def test_latency() -> None:
     """An update comes `datapath_latency` clocks after every tick, whatever was in it, and with the next one."""
     steps, last = motions(EXTERNAL, np.random.default_rng(5), 40)

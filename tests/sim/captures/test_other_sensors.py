@@ -77,7 +77,7 @@ def said(capsys: pytest.CaptureFixture[str]) -> set[str]:
 def test_a_text_with_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = [f"{k / 1000},{k & 1}" for k in range(101)]
     (tmp_path / "wheel.csv").write_text("\n".join(["Time [s],crank", *rows, ""]))
-    core = "--method s --ppr 18 --clock 100kHz --tick 1ms --max-time 100ms --sensor pulses".split()
+    core = "--method s --ppr 18 --clock 100kHz --tick 1ms --max-time 100ms --sensor pulses --engine pysim".split()
     assert run("replay", tmp_path / "wheel.csv", *core) == 0
     assert "counts out 100" in said(capsys)
 
@@ -100,7 +100,7 @@ def test_halls_of_a_capture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     states = [*cycle, "1,0,1", "1,1,1", "1,0,1"]
     rows = [f"{k},{state}\n" for k, state in enumerate(states)]
     (tmp_path / "halls.csv").write_text("Time [ms],A,B,C\n" + "".join(rows))
-    core = "--method s --pole-pairs 4 --clock 100kHz --tick 1ms --max-time 100ms --sensor hall".split()
+    core = "--method s --pole-pairs 4 --clock 100kHz --tick 1ms --max-time 100ms --sensor hall --engine pysim".split()
     assert run("replay", tmp_path / "halls.csv", *core) == 0
     assert {"counts out 60", "errors flagged 1"} <= {line.partition(" (")[0] for line in said(capsys)}
 
