@@ -4,7 +4,7 @@ import pytest
 from proofs.formal.mutants import RECURSIVE_SUM
 from proofs.source import mutant
 from proofs.upset import axes, loops
-from proofs.upset.campaign import UPSET, upsets
+from proofs.upset.campaign import OUTPUTS, UPSET, upsets
 from support.nightly import nightly
 
 from tachometry.hdl.control.control_clock import ControlClock
@@ -12,12 +12,12 @@ from tachometry.hdl.methods.m import MovingSum
 
 
 @nightly
-@pytest.mark.parametrize("method", UPSET)
-def test_outputs_are_right_again_in_time(method: str) -> None:
+@pytest.mark.parametrize("name", [*UPSET, OUTPUTS])
+def test_outputs_are_right_again_in_time(name: str) -> None:
     """Every bit once."""
-    campaign = upsets(method, 700)
+    campaign = upsets(name, 1000)
     assert campaign.fine
-    assert len(campaign.bits) < 700
+    assert len(campaign.bits) < 1000
     assert (campaign.clocks == 0).any()
     assert campaign.clocks.max() > campaign.spec.timing.tick_cycles
 

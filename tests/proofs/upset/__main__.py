@@ -10,13 +10,13 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from proofs.upset import axes, loops
-from proofs.upset.campaign import UPSET, Campaign, by_register, upsets
+from proofs.upset.campaign import OUTPUTS, UPSET, Campaign, by_register, upsets
 from rich.console import Console
 from rich.progress import track
 from support.report import Table, arguments, chosen
 
 SUBJECTS: dict[str, Callable[[int], Campaign]] = {
-    **{method: partial(upsets, method) for method in UPSET},
+    **{name: partial(upsets, name) for name in (*UPSET, OUTPUTS)},
     "axes": axes.upsets,
     **{name: partial(loops.upsets, name) for name in loops.LOOPS},
 }

@@ -13,36 +13,35 @@ from tachometry.sim import golden
 from tachometry.sim.signals.axes import Trace
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.sim.signals.run import Run
-from tachometry.spec import METHODS, Encoder, TachometerSpec, Timing
+from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
 from tachometry.spec.control import AnySpec
+from tachometry.spec.core.compare import Compare
 
 TICK_CYCLES, MAX_TICKS = 100, 20
 _OPTIONS: dict[str, dict[str, Any]] = {"m": {"average": 10}}
 # Of `track` the rounding, and the noise and the offsets that it learns gradually, outlive every rest: after an upset it
 # is not equal in all bits again.
 UPSET = [method for method in METHODS if method != "track"]
-# And what stays until it is cleared.
-_OF_POSITION = (
-    "position",
-    "index_position",
-    "swallowed_edges",
-    "health",
-    "faults",
-    "fault",
-    "index_error",
-    "over_speed",
-)
+# What a core of M may have beside, which must not keep the velocity from recovering; proofs are about these outputs.
+OUTPUTS = "m, outputs"
+_OUTPUTS = {
+    **{"index": True, "index_once": True, "preset": 0, "position_modulo": "7", "probe": "both", "health": True},
+    **{"complements": 4, "over_speed": Speed.parse("1rad/s"), "compare": Compare(2, 3, 0, "7clk", "both")},
+}
 
 
-def spec_of(method: str) -> TachometerSpec:
-    """Return a core like the default one, with shorter ticks and a shorter maximum time, so that the campaign ends."""
+def spec_of(name: str) -> TachometerSpec:
+    """Return a core like the default one, with shorter ticks and a shorter maximum time, so that the campaign ends; of
+    a method, or `OUTPUTS`.
+    """
+    method = name.split(",")[0]
     options: dict[str, Any] = {
         "encoder": Encoder(500, 4),
         "timing": Timing(5_000_000, TICK_CYCLES, MAX_TICKS),
         "age": True,
         "bounds": METHODS[method].facts.bounds,
     }
-    return METHODS[method](**options | _OPTIONS.get(method, {}))
+    return METHODS[method](**options | _OPTIONS.get(method, {}) | (_OUTPUTS if name == OUTPUTS else {}))
 
 
 def motion(spec: TachometerSpec, n_cycles: int, seed: int) -> PinTrace:
@@ -71,11 +70,12 @@ def motion(spec: TachometerSpec, n_cycles: int, seed: int) -> PinTrace:
                 turns.append(int(np.sign(speed)))
         now += cycles * rng.uniform(longest + 2, longest + 8)
     level, one = quadrature(np.cumsum(turns)), np.uint8(1)
-    return PinTrace(np.round(clocks).astype(np.int64), level & one, level >> one, int(now))
+    z = (np.cumsum(turns) % 40 == 0).astype(np.uint8) if spec.index else None
+    return PinTrace(np.round(clocks).astype(np.int64), level & one, level >> one, int(now), z).completed(spec)
 
 
 def dense(spec: TachometerSpec, run: Run) -> dict[str, NDArray[np.int64]]:
-    """Return what is shown in every clock, by output, but for the position; shape (n_clocks,).
+    """Return what is shown in every clock, by output; shape (n_clocks,).
 
     The age is that of the clocks of ticks, 0 in others.
     """
@@ -90,7 +90,7 @@ def dense(spec: TachometerSpec, run: Run) -> dict[str, NDArray[np.int64]]:
         return found
 
     ticks, updates = run.ticks, run.updates
-    found = {name: held(ticks.clock, values) for name, values in ticks.columns.items() if name not in _OF_POSITION}
+    found = {name: held(ticks.clock, values) for name, values in ticks.columns.items()}
     found |= {name: held(updates.clock, values) for name, values in updates.columns.items()}
     found["tick"], found["velocity_valid"] = high(ticks.clock), high(updates.clock)
     found["decode_error"] = high(run.errors)
@@ -142,7 +142,8 @@ def _expected(spec: TachometerSpec, trace: PinTrace, phase: int) -> NDArray[np.i
 
 
 def _compared(spec: TachometerSpec) -> list[str]:
-    return [port.name for port in spec.ports if port.direction == "output" and port.name not in _OF_POSITION]
+    plain = spec_of(spec.method)
+    return [port.name for port in plain.ports if port.direction == "output" and port.name != "position"]
 
 
 def allowed(spec: TachometerSpec, trace: PinTrace, clock: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -162,12 +163,12 @@ def allowed(spec: TachometerSpec, trace: PinTrace, clock: NDArray[np.int64]) -> 
     return np.append(last, trace.n_clocks)[found] + rest + spec.latency.tick_to_velocity - clock
 
 
-def upsets(method: str, n: int, seed: int = 1) -> Campaign:
+def upsets(name: str, n: int, seed: int = 1) -> Campaign:
     """Flip every bit as often as any other, at random clocks, `n` times in all, and see how long that is seen.
 
     Right are the outputs that the golden model gives for these pins with the core's own ticks.
     """
-    spec = spec_of(method)
+    spec = spec_of(name)
     trace = motion(spec, 40, seed)
     core = Upsettable(spec, trace)
     end = allowed(spec, trace, np.arange(trace.n_clocks))
@@ -188,7 +189,7 @@ def upsets(method: str, n: int, seed: int = 1) -> Campaign:
         right = expected[phase][clock : clock + len(shown)]
         return (shown != right).any(axis=1)
 
-    return play(method, spec, core, trace, n, end, seed, wrong)
+    return play(name, spec, core, trace, n, end, seed, wrong)
 
 
 def play(
