@@ -17,14 +17,19 @@ from tachometry.hdl.methods import DATAPATHS
 from tachometry.sim.golden.methods import MODELS
 
 
+def modules() -> list[types.ModuleType]:
+    """Return all modules of `hdl`."""
+    found = pkgutil.walk_packages(tachometry.hdl.__path__, "tachometry.hdl.")
+    return [importlib.import_module(one.name) for one in found]
+
+
 @contextmanager
 def mutant(box: Any, right: str, wrong: str) -> Iterator[None]:
     """Yield within this context, `right` in the source of the class `box` reads `wrong`, wherever the class is used.
 
     The text must stand in the source of its module exactly once.
     """
-    for found in pkgutil.walk_packages(tachometry.hdl.__path__, "tachometry.hdl."):  # one loaded within would keep it
-        importlib.import_module(found.name)
+    modules()  # one loaded within would keep it
     module = sys.modules[box.__module__]
     source = inspect.getsource(module)
     assert source.count(right) == 1, f"{right!r} stands {source.count(right)} times in {module.__name__}"

@@ -1,14 +1,13 @@
 """A few upsets of every method's flip-flops, and of other cores'; `make upset` has thousands."""
 
 import pytest
-from proofs.formal.mutants import RECURSIVE_SUM
+from proofs.formal.mutants import MUTANTS
 from proofs.source import mutant
 from proofs.upset import axes, loops
 from proofs.upset.campaign import OUTPUTS, UPSET, upsets
 from support.nightly import nightly
 
 from tachometry.hdl.control.control_clock import ControlClock
-from tachometry.hdl.methods.m import MovingSum
 
 
 @nightly
@@ -24,7 +23,8 @@ def test_outputs_are_right_again_in_time(name: str) -> None:
 
 @nightly
 def test_sum_that_is_carried_along_is_noticed() -> None:
-    with mutant(MovingSum, *RECURSIVE_SUM):
+    (carried,) = [one for one in MUTANTS if one.proof == "upset, M of 4"]
+    with mutant(carried.box, carried.right, carried.wrong):
         assert not upsets("m", 700).fine
 
 
