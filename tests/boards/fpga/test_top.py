@@ -15,6 +15,7 @@ from amaranth.lib import io, wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.sim import Simulator
 from support.nightly import only_rows
+from support.simulate import clock_by_clock
 
 from tachometry.boards.fpga.board import Board
 from tachometry.boards.fpga.boards import BOARDS
@@ -85,19 +86,8 @@ class Loop(wiring.Component):  # type: ignore[misc]
 
 def captures(levels: str) -> str:
     """Return what a capture pin says of levels, clock by clock."""
-    pin, found = CapturePin(), []
-
-    async def bench(ctx: Any) -> None:
-        for level in levels:
-            ctx.set(pin.pin, int(level))
-            found.append(str(ctx.get(pin.capture)))
-            await ctx.tick()
-
-    simulator = Simulator(pin)
-    simulator.add_clock(1e-6)
-    simulator.add_testbench(bench)
-    simulator.run()
-    return "".join(found)
+    seen = clock_by_clock(CapturePin(), [{"pin": int(level)} for level in levels], ["capture"])
+    return "".join(str(row["capture"]) for row in seen)
 
 
 def test_ports_are_on_their_pins() -> None:

@@ -1,14 +1,11 @@
 """The whole core: latencies of the manifest, hand-over, reset, position."""
 
 import itertools
-from typing import Any
 
 import numpy as np
 import pytest
-from amaranth import Module, ResetInserter, Signal
-from amaranth.lib.wiring import Component, In, Out
-from amaranth.sim import Simulator
 from support.nightly import only
+from support.simulate import Resettable, clock_by_clock
 
 from tachometry.hdl import Tachometer
 from tachometry.sim.engines.pysim import PySim
@@ -72,53 +69,13 @@ def test_position_is_the_sum_of_the_pulse_numbers_while_tick_is_high() -> None:
     assert np.array_equal(np.cumsum(run.ticks.pulse_count), run.ticks.position)
 
 
-class Resettable(Component):
-    """A tachometer whose reset can be driven."""
-
-    def __init__(self, spec: STachometer) -> None:
-        self.core = Tachometer(spec)
-        super().__init__({"reset": In(1), "quarter": In(2), "position": Out(32), "tick": Out(1), "velocity": Out(32)})
-
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
-        m.submodules.core = ResetInserter(self.reset)(self.core)
-        a, b = Signal(), Signal()
-        m.d.comb += [
-            a.eq(self.quarter[0] ^ self.quarter[1]),
-            b.eq(self.quarter[1]),
-            self.core.a.eq(a),
-            self.core.b.eq(b),
-            self.position.eq(self.core.position),
-            self.tick.eq(self.core.tick),
-            self.velocity.eq(self.core.velocity),
-        ]
-        return m
-
-
 def test_reset_in_the_middle_starts_over() -> None:
-    spec = make_spec(4)
-    seen: list[list[tuple[int, ...]]] = []
-
-    async def bench(ctx: Any) -> None:
-        for _ in range(2):
-            rows = []
-            for clock in range(200):
-                ctx.set(dut.reset, 0)
-                ctx.set(dut.quarter, (2 + clock // 3) % 4)
-                rows.append(tuple(int(ctx.get(signal)) for signal in (dut.tick, dut.position, dut.velocity)))
-                await ctx.tick()
-            seen.append(rows)
-            ctx.set(dut.reset, 1)
-            ctx.set(dut.quarter, 2)
-            await ctx.tick().repeat(3)
-
-    dut = Resettable(spec)
-    simulator = Simulator(dut)
-    simulator.add_clock(1e-6)
-    simulator.add_testbench(bench)
-    simulator.run()
-    assert seen[0] == seen[1]
-    assert any(position for _, position, _ in seen[0])
+    outputs = ("tick", "position", "velocity")
+    turning = [dict(zip("ab", QUARTERS[(2 + clock // 3) % 4], strict=True)) | {"rst": 0} for clock in range(200)]
+    reset = [{"a": 1, "b": 1, "rst": 1}] * 3
+    seen = list(clock_by_clock(Resettable(Tachometer(make_spec(4))), [*turning, *reset, *turning], outputs))
+    assert seen[:200] == seen[203:]
+    assert any(row["position"] for row in seen[:200])
 
 
 def test_every_component_says_what_its_limits_are() -> None:

@@ -1,12 +1,8 @@
 """Ticks from outside: windows between rises, neither too short nor too long."""
 
-from typing import Any
-
 import numpy as np
 import pytest
-from amaranth import Module, ResetInserter, Signal
-from amaranth.sim import Simulator
-from support.simulate import clock_by_clock
+from support.simulate import Resettable, clock_by_clock
 
 from tachometry.hdl.front_end.external_tick import ExternalTick
 from tachometry.sim.golden.sampling import external_windows
@@ -61,20 +57,6 @@ def test_a_line_that_rests_high_has_not_risen() -> None:
 
 def test_a_rise_before_reset_is_released_is_none() -> None:
     """The synchroniser has no reset: what it holds then is not a level of this run."""
-    dut = ResetInserter(reset := Signal())(ExternalTick(2, 1000))
-    seen: list[int] = []
-
-    async def bench(ctx: Any) -> None:
-        for clock in range(60):
-            ctx.set(reset, clock < 30)
-            ctx.set(dut.tick_in, clock in (20, 27, 28, 29, 40))
-            seen.append(int(ctx.get(dut.last)))
-            await ctx.tick()
-
-    top = Module()
-    top.submodules.dut = dut
-    simulator = Simulator(top)
-    simulator.add_clock(1e-6)
-    simulator.add_testbench(bench)
-    simulator.run()
-    assert [clock for clock, last in enumerate(seen) if last and clock >= 30] == [42]
+    rows = [{"rst": clock < 30, "tick_in": clock in (20, 27, 28, 29, 40)} for clock in range(60)]
+    seen = clock_by_clock(Resettable(ExternalTick(2, 1000)), rows, ["last"])
+    assert [clock for clock, row in enumerate(seen) if row["last"] and clock >= 30] == [42]

@@ -1,15 +1,12 @@
 """The M method's datapath, with injected ticks."""
 
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 import pytest
-from amaranth import Module, ResetInserter, Signal
-from amaranth.sim import Simulator
 from reference.sequences import rounded
 from support.nightly import only
-from support.simulate import clock_by_clock
+from support.simulate import Resettable, clock_by_clock
 
 from tachometry.hdl.methods import m as m_method
 from tachometry.spec import Encoder, MTachometer, Timing
@@ -54,22 +51,8 @@ def test_step_by_step_where_there_is_time() -> None:
 
 def test_reset_forgets() -> None:
     """Counts before a reset are forgotten, though the memory keeps them."""
-    dut = ResetInserter(reset := Signal())(m_method.MovingSum(5, count_width=4, sum_width=7))
-    seen: list[int] = []
-
-    async def bench(ctx: Any) -> None:
-        for clock in range(40):
-            ctx.set(reset, clock == 20)
-            ctx.set(dut.tick, clock != 20)
-            ctx.set(dut.m_e, 7 if clock < 20 else 1)
-            seen.append(int(ctx.get(dut.total)))
-            await ctx.tick()
-
-    top = Module()
-    top.submodules.dut = dut
-    simulator = Simulator(top)
-    simulator.add_clock(1e-6)
-    simulator.add_testbench(bench)
-    simulator.run()
+    rows = [{"rst": clock == 20, "tick": clock != 20, "m_e": 7 if clock < 20 else 1} for clock in range(40)]
+    sums = clock_by_clock(Resettable(m_method.MovingSum(5, count_width=4, sum_width=7)), rows, ["total"])
+    seen = [row["total"] for row in sums]
     assert seen[:7] == [7, 14, 21, 28, 35, 35, 35]
     assert seen[21:28] == [1, 2, 3, 4, 5, 5, 5]
