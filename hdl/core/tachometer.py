@@ -35,7 +35,7 @@ from tachometry.spec import TachometerSpec
 from tachometry.spec.core.compare import LIST_PINS
 from tachometry.spec.core.probe import packed_edges
 from tachometry.spec.core.stream import READY, flags_of, parts_of, size_of
-from tachometry.spec.language.port import MISSED, UPDATE, WIDE
+from tachometry.spec.language.port import FINE, MISSED, UPDATE, WIDE
 
 
 class Tachometer(wiring.Component):
@@ -78,8 +78,17 @@ class Tachometer(wiring.Component):
             self.index_state = IndexState(spec.index_state, after, spec.latency.tick)
         self.probe_latch: ProbeLatch | None = None
         if spec.probe:
-            widths = spec.position_width, spec.times.probe_width
-            self.probe_latch = ProbeLatch(packed_edges(spec.probe), len(spec.probes), *widths, spec.latency.tick)
+            fine = {port.name: port.width for port in spec.method_ports}.get(FINE, 0)
+            self.probe_latch = ProbeLatch(
+                packed_edges(spec.probe),
+                len(spec.probes),
+                spec.position_width,
+                spec.times.probe_width,
+                spec.latency.tick,
+                fine_width=fine,
+                age_width=spec.times.probe_age_width if fine else 0,
+                update_latency=spec.latency.tick + spec.latency.tick_to_velocity,
+            )
         self.watch: EncoderWatch | None = None
         if spec.health:
             self.watch = EncoderWatch(
@@ -345,6 +354,8 @@ class Tachometer(wiring.Component):
             latch.position.eq(self.position_counter.next),
             latch.arm.eq(self.probe_arm),
         ]
+        if hasattr(latch, "fine"):
+            m.d.comb += [latch.fine.eq(getattr(self, FINE)), latch.update.eq(self.velocity_valid)]
         follow(m, self, latch, latch.latched)
 
     def _compare(self, m: Module) -> None:

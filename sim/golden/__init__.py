@@ -55,7 +55,7 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
     measured = golden.updates(ticks, steps, trace.n_clocks)
     measured = measured.having(cause=measured.clock - spec.latency.datapath)
     updates = in_unit(spec, filtered(spec, ticks, measured))
-    probes = probe.latched(spec, steps, trace)
+    probes = probe.latched(spec, steps, trace, updates)
     ticks = probe.with_probed(spec, ticks, probes)
     tripped, pulses = trips(spec, updates), compare.pulses(spec, steps, trace)
     ticks = ticks.having(**compare.shown(spec, pulses, ticks.clock))

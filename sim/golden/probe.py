@@ -10,11 +10,12 @@ from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.probe import FALLING, RISING, packed_edges
+from tachometry.spec.language.port import FINE
 
 Ints = NDArray[np.int64]
 
 
-def latched(spec: TachometerSpec, steps: Steps, trace: PinTrace) -> dict[str, Table]:
+def latched(spec: TachometerSpec, steps: Steps, trace: PinTrace, updates: Table) -> dict[str, Table]:
     """Return what each probe latches, by strobes, and as `probed` when one of them has latched, or not any more."""
     found, flags = {}, []
     for number, (seen, level) in enumerate(steps.probes):
@@ -35,9 +36,20 @@ def latched(spec: TachometerSpec, steps: Steps, trace: PinTrace) -> dict[str, Ta
             {
                 f"probe_position_{number}": positions_at(spec, steps, clock - spec.latency.tick),
                 f"probe_time_{number}": np.minimum(since, end),
+                **_fine(spec, number, clock, updates),
             },
         )
     return found | {"probed": _together(flags)} if spec.probe else {}
+
+
+def _fine(spec: TachometerSpec, number: int, clock: Ints, updates: Table) -> dict[str, Ints]:
+    """Return the fine position of the latest update before these clocks, and its age, if there is one."""
+    if FINE not in updates.columns:
+        return {}
+    row = np.searchsorted(updates.clock, clock)
+    fine, cause = np.append(0, updates[FINE])[row], np.append(0, updates["cause"])[row]
+    age = np.where(row > 0, clock - cause, (1 << spec.times.probe_age_width) - 1)
+    return {f"probe_fine_{number}": fine, f"probe_age_{number}": age}
 
 
 def _while_armed(number: int, edges: Ints, trace: PinTrace) -> tuple[Ints, list[tuple[int, int]]]:

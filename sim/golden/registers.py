@@ -283,7 +283,7 @@ class GoldenBank:
         }
         pins = PinTrace(clock, low, low, self._trace.n_clocks, more=lines)
         if self._map.spec.probe:
-            self._tables |= probe.latched(self._map.spec, self._steps, pins)
+            self._tables |= probe.latched(self._map.spec, self._steps, pins, self._tables[UPDATE])
         if "compare_next" in lines:
             self._tables |= compare.pulses(self._map.spec, self._steps, pins)
 

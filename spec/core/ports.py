@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from tachometry.spec.core.compare import COUNT_WIDTH
-from tachometry.spec.core.health import FAULT_TEXTS, FAULT_WIDTH, FAULTS_WIDTH, OPEN
+from tachometry.spec.core.health import FAULT_TEXTS, FAULT_WIDTH, FAULTS_WIDTH, OPEN, Fault
 from tachometry.spec.core.stream import READY, stream_ports
-from tachometry.spec.language.port import COMPARE, INDEX, MISSED, TICK, UPDATE, WIDE, Port, held, pin, strobe
+from tachometry.spec.language.port import COMPARE, FINE, INDEX, MISSED, TICK, UPDATE, WIDE, Port, held, pin, strobe
 
 if TYPE_CHECKING:
     from tachometry.spec.core.tachometer import TachometerSpec
@@ -194,6 +194,13 @@ def _probe_ports(spec: TachometerSpec) -> Iterable[Port]:
         yield held(valid, f"probe_position_{number}", spec.position_width, signed=True, unit="counts", help=text)
         text = f"Clocks from the last count to the latched edge of probe {number}; it stays at its end."
         yield held(valid, f"probe_time_{number}", spec.times.probe_width, unit="clocks", help=text)
+        for fine in (port for port in spec.method_ports if port.name == FINE):
+            text = f"Fine position that was shown when probe {number} latched: that of the end of a sampling period."
+            yield held(valid, f"probe_fine_{number}", fine.width, signed=True, unit=fine.unit, help=text)
+            text = (
+                f"Clocks from the end of that period to the latched edge of probe {number}; all ones: there was none."
+            )
+            yield held(valid, f"probe_age_{number}", spec.times.probe_age_width, unit="clocks", help=text)
 
 
 def _list_pins(spec: TachometerSpec) -> Iterable[Port]:
@@ -226,6 +233,7 @@ def _health_ports(spec: TachometerSpec) -> Iterable[Port]:
     if not spec.health:
         return
     absent = {fault for line, fault in OPEN.items() if line not in spec.complemented}
+    absent |= {Fault.INDEX_MISSED} if spec.index_state is None else set()
     codes = "; ".join(f"{code}: {text}" for code, text in FAULT_TEXTS.items() if code not in absent)
     now = "It changes between the ticks as well, and a capture takes what it is then."
     yield held(TICK, "health", FAULT_WIDTH, help=f"The first fault of the encoder since it was cleared; {codes}. {now}")

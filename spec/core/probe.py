@@ -5,7 +5,8 @@ from tachometry.spec.language.option import ParameterError
 MOST_PROBES = 8
 PROBE_HELP = (
     "N inputs probe, 1 to 8, each of which latches the position and the time since the last count at a rising "
-    "edge; or the edges of each, such as rising,falling,both. A probe waits until it is armed again."
+    "edge, with method track also the fine position; or the edges of each, such as rising,falling,both. A probe waits "
+    "until it is armed again."
 )
 TIME_WIDTH = 32  # bits of the time since a count, at most
 RISING, FALLING = 1, 2  # bits of the edges that latch

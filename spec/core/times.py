@@ -70,6 +70,11 @@ class Times(Follows[S]):
         return min(self.longest.bit_length(), TIME_WIDTH)
 
     @property
+    def probe_age_width(self) -> int:
+        """Bits of the time from the end of a period whose update is shown to a probe."""
+        return (self.longest_tick + self.spec.latency.tick_to_velocity + 2).bit_length()
+
+    @property
     def standstill_ticks(self) -> int:
         """Ticks from that of the last count to the update that reads 0, at most."""
         return self.spec.timing.max_ticks

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 TICK, UPDATE, INDEX, COMPARE = "tick", "velocity_valid", "index_valid", "compare_valid"
 WIDE, MISSED = "index_wide", "index_missed"
+FINE = "position_fine"
 STREAM = "m_axis"  # names of ports of a stream begin with it
 
 

@@ -15,7 +15,9 @@ from support.verilog import play_native
 from tachometry.hdl.front_end import probe_latch
 from tachometry.sim import golden
 from tachometry.sim.captures.sigrok import write_sr
+from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.stress import stress
+from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines.pysim import PySim
 from tachometry.sim.golden.registers import Access, GoldenBank
 from tachometry.sim.signals.recording import PinTrace
@@ -24,8 +26,9 @@ from tachometry.spec import TachometerSpec, of_texts
 from tachometry.spec.registers.map import RegisterMap
 
 BASE = {"ppr": "25", "clock": "1MHz", "tick": "20clk", "max-time": "60clk", "probe": "rising,falling,both"}
-SEEN = ["probed", *(f"probe_{name}_{k}" for k in range(2) for name in ("valid", "position", "time"))]
+SEEN = ["probed", *(f"probe_{name}_{k}" for k in range(2) for name in ("valid", "position", "time", "fine", "age"))]
 END = 15  # of a time of four bits
+LATE, OLD = 7, 31  # clocks to an update, and the end of an age of five bits
 
 
 def check(seed: int, latency: int) -> None:
@@ -38,12 +41,14 @@ def check(seed: int, latency: int) -> None:
         held |= {"level": int(rng.integers(4))} if rng.random() < 0.3 else {}
         step = int(rng.choice([-1, 1])) if rng.random() < (0.5 if clock % 100 < 50 else 0.03) else 0
         arm = int(rng.integers(4)) if rng.random() < 0.2 else 0
+        held |= {"update": int(rng.random() < (0.08 if clock % 200 < 120 else 0)), "fine": int(rng.integers(-32, 32))}
         rows.append({**held, "ready": 3 if clock > 5 else 0, "step": step, "arm": arm})
     sums = np.cumsum([row["step"] for row in rows])
     for clock, row in enumerate(rows):  # the position of the next clock has the steps up to that of `latency` − 1 ago
         at = clock - latency + 1
         row["position"] = int(sums[at] + 16) % 32 - 16 if at >= 0 else 0
-    seen = clock_by_clock(probe_latch.ProbeLatch(0b0110, 2, 5, 4, latency), rows, SEEN)
+    box = probe_latch.ProbeLatch(0b0110, 2, 5, 4, latency, fine_width=6, age_width=5, update_latency=LATE)
+    seen = clock_by_clock(box, rows, SEEN)
     probed, wanted = [0, 0], dict.fromkeys(SEEN, 0)
     for clock in range(1, len(rows)):
         known, at = clock - 1, clock - latency  # the clock before, and that of the edge
@@ -60,10 +65,13 @@ def check(seed: int, latency: int) -> None:
                 wanted[f"probe_valid_{probe}"] = 1
                 wanted[f"probe_position_{probe}"] = position
                 wanted[f"probe_time_{probe}"] = min(at - counts[-1], END) if counts else END
+                ends = [row - LATE for row in range(known + 1) if rows[row]["update"]]
+                wanted[f"probe_fine_{probe}"] = rows[known]["fine"]
+                wanted[f"probe_age_{probe}"] = min(at - ends[-1], OLD) if ends else OLD
             probed[probe] = int((probed[probe] or edge) and not rows[known]["arm"] >> probe & 1)
         wanted["probed"] = probed[0] | probed[1] << 1
         assert seen[clock] == wanted, (seed, latency, clock)
-    assert position
+    assert min(len({row[f"probe_{name}_0"] for row in seen}) for name in ("position", "fine", "age")) > 2
 
 
 @pytest.mark.parametrize("latency", [2, 3])
@@ -83,6 +91,9 @@ def test_every_clock_is_as_the_rules_say(latency: int) -> None:
         ("~level & past & falling", "~level & past & rising"),
         ("Mux(step, 0,", "Mux(step, 1,"),
         ("ready & (", "("),
+        ("self._update_latency + 1 - self._latency", "self._update_latency + 2 - self._latency"),
+        ("age + ~age.all()", "age + 1"),
+        ('"age": shown}', '"age": age}'),
     ],
 )
 def test_mutants_are_noticed(right: str, wrong: str) -> None:
@@ -106,8 +117,24 @@ def test_an_edge_of_a_probe_and_a_count_of_the_same_clock_are_in_order(clocks: i
         assert latched.clock.tolist() == [at + spec.latency.entries["pin_to_probe"]]
 
 
+def test_fine_position_and_velocity_say_where_an_even_shaft_was() -> None:
+    """At 3 rev/s of 100 counts: within 0.03 counts, wherever between two ticks the probe rises."""
+    spec = of_texts("track", BASE | {"clock": "10MHz", "tick": "600clk", "max-time": "99ms", "probe": "1"})
+    trace = VirtualEncoder(25).record(parse_motion("constant:3rev/s:2s")).recording.place(10_000_000)
+    rises = np.arange(15_000_000, 19_900_000, 123_457)
+    run = golden.run(spec, trace.with_pulses("probe_0", rises, 9).completed(spec))
+    latched = run.tables["probe_valid_0"]
+    assert len(latched) == len(rises)
+    late = spec.latency.entries["pin_to_probe"]
+    assert latched.clock.tolist() == (rises + late).tolist()
+    shown = latched.probe_fine_0 / 64 + 3 * 100 * latched.probe_age_0 / 10e6
+    assert np.ptp(shown - 3 * 100 * rises / 10e6) < 0.03
+    assert np.ptp(latched.probe_age_0) > 500
+
+
 CORES = {
     "s": ("s", {"index": "yes", "index-reset": "yes"}),
+    "track": ("track", {"tick": "500clk", "max-time": "2000clk", "preset": "40", "unit": "rpm", "lowpass": "100Hz"}),
     "filter": ("m", {"filter": "3clk", "max-speed": "100rev/s", "position-width": "8"}),
 }
 
@@ -116,9 +143,13 @@ CORES = {
 def test_hardware_is_the_golden_model(case: str) -> None:
     method, more = CORES[case]
     spec = of_texts(method, BASE | more)
-    found = lockstep(spec, stress(spec, seed=1, n_edges=40), PySim())
+    found = lockstep(
+        spec,
+        stress(spec, seed=1, n_edges=10 if case == "track" else 40).until(20_000 if case == "track" else 9000),
+        PySim(),
+    )
     assert found.n_mismatches == 0, found.first
-    assert all(len(found.actual.tables[f"probe_valid_{probe}"]) > 10 for probe in range(3))
+    assert all(len(found.actual.tables[f"probe_valid_{probe}"]) > 1 for probe in range(3))
 
 
 def case_on_a_bus() -> tuple[TachometerSpec, RegisterMap, PinTrace, list[Access]]:
