@@ -191,7 +191,8 @@ def _compared(
     captured = [(number, register) for number, register in enumerate(registers) if register.captured]
     at = [register.name for _, register in captured].index("TIME")
     n_clocks = max(words[at] for words in seen) + 1
-    emulator = GoldenEmulator(spec.encoder.pulses_per_rev if spec.index else None, spec.index_place)
+    index = spec.encoder.pulses_per_rev if spec.index else None
+    emulator = GoldenEmulator(index, spec.index_place, spec.complemented)
     trace = emulator.trace(changes, n_clocks)
     if spec.external_tick:
         trace = trace.with_tick_in(np.arange(1, n_clocks, spec.timing.tick_cycles))

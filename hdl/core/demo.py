@@ -37,7 +37,8 @@ class Demo(wiring.Component):
         self._map = registers
         self.core = RegisterCore(registers)
         self._lines = [pin.name for pin in spec.ports.pins if pin.name in ENCODER_LINES]
-        self.emulator = EncoderEmulator(spec.encoder.pulses_per_rev if spec.index else None, spec.index_place)
+        index = spec.encoder.pulses_per_rev if spec.index else None
+        self.emulator = EncoderEmulator(index, spec.index_place, spec.complemented)
         self.bridge = bridge_on(registers, bus)
         self.telemetry: TelemetrySender | None = None
         if isinstance(self.bridge, UartBridge):
@@ -85,7 +86,10 @@ class Demo(wiring.Component):
         """Give the core its pins, or the lines of the emulator and a tick in each period."""
         core, emulator, bank = self.core, self.emulator, self.core.bank
         follow(m, emulator, bank, (field.port for field in self._map.emulated))
-        for pin in self._map.spec.ports.pins:
+        for line in self._map.spec.complemented:
+            name = f"{line}_n"
+            m.d.comb += getattr(core, name).eq(Mux(bank.emulated, getattr(emulator, name), ~getattr(self, line)))
+        for pin in (pin for pin in self._map.spec.ports.pins if hasattr(self, pin.name)):
             emulated = getattr(emulator, pin.name) if pin.name in self._lines else period  # the external tick
             if pin.name in self._map.spec.controls:
                 emulated = getattr(self, pin.name)

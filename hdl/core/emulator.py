@@ -40,6 +40,8 @@ class EncoderEmulator(wiring.Component):
         Periods in a revolution, for the index line; None: there is none.
     index_place : int
         Quarter of its period in which the index is high, 0 to 3.
+    complemented : tuple of str
+        Lines whose complements are there as well, which no broken wire harms.
 
     Members
     -------
@@ -64,11 +66,16 @@ class EncoderEmulator(wiring.Component):
     a, b : Out(1)
     z : Out(1)
         High in one quarter of a period in each revolution; only with `lines_per_rev`.
+    a_n, b_n, z_n : Out(1)
+        Of `complemented`.
     """
 
-    def __init__(self, lines_per_rev: int | None = None, index_place: int = 0) -> None:
+    def __init__(
+        self, lines_per_rev: int | None = None, index_place: int = 0, complemented: tuple[str, ...] = ()
+    ) -> None:
         self._lines_per_rev = lines_per_rev
         self._index_place = index_place
+        self._complemented = complemented
         super().__init__(
             {
                 "speed": In(signed(PHASE_WIDTH)),
@@ -84,6 +91,7 @@ class EncoderEmulator(wiring.Component):
                 "a": Out(1),
                 "b": Out(1),
                 **({} if lines_per_rev is None else {"z": Out(1)}),
+                **{f"{line}_n": Out(1) for line in complemented},
             }
         )
 
@@ -140,7 +148,7 @@ class EncoderEmulator(wiring.Component):
         low, high = NOISE_BIT + NOISE_WIDTH, NOISE_BIT + 2 * NOISE_WIDTH
         noise = ~random[low:high].any() & (random[NOISE_BIT:low] < self.glitches)
         for k, name in enumerate(starts):
-            m.submodules[f"line_{name}"] = line = EmulatedLine()
+            m.submodules[f"line_{name}"] = line = EmulatedLine(whole=name in self._complemented)
             since = Signal(FINE_WIDTH, name=f"since_{name}")
             m.d.comb += [
                 since.eq(fine - moved - starts[name]),
@@ -152,6 +160,8 @@ class EncoderEmulator(wiring.Component):
                 getattr(self, name).eq(line.line),
             ]
             m.d.sync += line.ideal.eq(since < _HALF + ends[name])
+            if name in self._complemented:
+                m.d.comb += getattr(self, f"{name}_n").eq(~line.whole)
 
     def _index(self, m: Module, fine: Signal, turns: object) -> None:
         """Drive the index line, in a quarter of the first period."""
@@ -167,3 +177,5 @@ class EncoderEmulator(wiring.Component):
         with m.If(~self.stuck[2]):
             m.d.sync += z.eq(index)
         m.d.comb += self.z.eq(z | self.broken[2])
+        if "z" in self._complemented:
+            m.d.comb += self.z_n.eq(~z)

@@ -27,9 +27,11 @@ class EmulatedLine(wiring.Component):
     broken : In(1)
         The line is high.
     line : Out(1)
+    whole : Out(1)
+        The line as it would be if it were not broken. Only if it is asked for.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, whole: bool = False) -> None:
         super().__init__(
             {
                 "ideal": In(1),
@@ -39,6 +41,7 @@ class EmulatedLine(wiring.Component):
                 "noise": In(1),
                 "broken": In(1),
                 "line": Out(1),
+                **({"whole": Out(1)} if whole else {}),
             }
         )
 
@@ -47,11 +50,14 @@ class EmulatedLine(wiring.Component):
         before = Signal()
         level = Signal()
         left = Signal(BOUNCE_WIDTH)
+        whole = level ^ (left.any() & self.random) ^ self.noise
         m.d.sync += [
             before.eq(self.ideal),
             left.eq(Mux(left == 0, 0, left - 1)),
-            self.line.eq(level ^ (left.any() & self.random) ^ self.noise | self.broken),
+            self.line.eq(whole | self.broken),
         ]
+        if hasattr(self, "whole"):
+            m.d.sync += self.whole.eq(whole)
         with m.If((self.ideal ^ before) & ~self.drop):
             m.d.sync += [level.eq(self.ideal), left.eq(self.bounce)]
         return m

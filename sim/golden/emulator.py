@@ -77,11 +77,15 @@ class _Line:
 
     def __init__(self, k: int, random: _Random) -> None:
         self._k, self._random = k, random
-        self._ideal = self._before = self._level = self._line = 0
+        self._ideal = self._before = self._level = self._line = self._whole = 0
         self._until = 0  # the line bounces in all clocks before this one
 
-    def play(self, clock: NDArray[np.int64], ideal: NDArray[np.uint8], settings: EmulatorSettings) -> NDArray[np.uint8]:
-        """Return levels in these clocks; `ideal` is what the flip-flop takes at their ends."""
+    def play(
+        self, clock: NDArray[np.int64], ideal: NDArray[np.uint8], settings: EmulatorSettings
+    ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """Return levels in these clocks, and what they would be if no wire were broken; `ideal` is what the flip-flop
+        takes at their ends.
+        """
         seen = np.append(np.uint8(self._ideal), ideal)
         edges = np.flatnonzero(seen[:-1] != np.append(np.uint8(self._before), seen[:-2]))
         dropped = self._random.number(clock[edges], DROP_BITS[self._k], DROP_WIDTH) < settings.drop
@@ -97,11 +101,13 @@ class _Line:
         if settings.glitches:
             noise = self._random.number(clock, NOISE_BIT, 2 * NOISE_WIDTH) < settings.glitches
             after ^= noise.astype(np.uint8)
+        whole = np.append(np.uint8(self._whole), after[:-1])
+        self._whole = int(after[-1])
         after |= np.uint8(settings.broken >> self._k & 1)
         found = np.append(np.uint8(self._line), after[:-1])
         self._ideal, self._before = int(seen[-1]), int(seen[-2])
         self._level, self._until, self._line = int(level[-1]), int(until[-1]), int(after[-1])
-        return found
+        return found, whole
 
 
 class GoldenEmulator:
@@ -113,11 +119,16 @@ class GoldenEmulator:
         Periods in a revolution, for the index line; None: there is none.
     index_place : int
         Quarter of its period in which the index is high, 0 to 3.
+    complemented : tuple of str
+        Lines whose complements are there as well.
     """
 
-    def __init__(self, lines_per_rev: int | None = None, index_place: int = 0) -> None:
+    def __init__(
+        self, lines_per_rev: int | None = None, index_place: int = 0, complemented: tuple[str, ...] = ()
+    ) -> None:
         self._lines_per_rev = lines_per_rev
         self._index_place = index_place
+        self._complemented = complemented
         self._random = _Random()
         self._lines = [_Line(k, self._random) for k in range(2)]
         self._clock = self._speed = self._moved = self._turned = 0
@@ -150,7 +161,8 @@ class GoldenEmulator:
             self._total ^= jump << PHASE_WIDTH - 1
         every = np.concatenate(levels)
         a, b, z = (every >> np.uint8(bit) & np.uint8(1) for bit in range(3))
-        return PinTrace(np.concatenate(clocks), a, b, n_clocks, None if self._lines_per_rev is None else z)
+        more = {f"{line}_n": every >> np.uint8(bit) & np.uint8(1) for bit, line in enumerate(self._complemented, 3)}
+        return PinTrace(np.concatenate(clocks), a, b, n_clocks, None if self._lines_per_rev is None else z, more=more)
 
     def _speeds(self, n: int, target: int, rate: int) -> NDArray[np.int64]:
         """Return speeds in n clocks and in the one after; they change every second clock, by the finding before."""
@@ -193,9 +205,10 @@ class GoldenEmulator:
         since_a = (fine - moved[:n] - _TURN // 4) % _TURN
         since_b = (fine - moved[:n] - _TURN // 2 - settings.phase_error) % _TURN
         ideal = [since_a < _TURN // 2 + settings.duty_a, since_b < _TURN // 2 + settings.duty_b]
-        a, b = (
+        (a, whole_a), (b, whole_b) = (
             line.play(clock, high.astype(np.uint8), settings) for line, high in zip(self._lines, ideal, strict=True)
         )
+        whole = {"a": whole_a, "b": whole_b}
         level = a | b << np.uint8(1)
         if self._lines_per_rev is not None:
             index = ((total[:n] >> PHASE_WIDTH) % self._lines_per_rev == 0) & (fine * 4 // _TURN == self._index_place)
@@ -203,5 +216,8 @@ class GoldenEmulator:
             if settings.stuck & 4:
                 z[:-1] = z[0]
             self._z = z[-2:].tolist()
+            whole["z"] = z[:-2]
             level |= (z[:-2] | np.uint8(settings.broken >> 2)) << np.uint8(2)
+        for bit, name in enumerate(self._complemented, 3):
+            level |= (whole[name] ^ np.uint8(1)) << np.uint8(bit)
         return level

@@ -48,8 +48,6 @@ class DemoMap(RegisterMap):
         if not self.spec.encoder.plain:
             raise ParameterError("sensor", "must be quadrature with a demo, its lines as they come: it emulates these")
 
-        if self.spec.complements is not None:
-            raise ParameterError("complements", "must be left out of a demo, which emulates lines without complements")
         if self.spec.probe:
             raise ParameterError("probe", "must be left out of a demo, which emulates an encoder and no probe")
         if self.spec.stream:
@@ -60,6 +58,12 @@ class DemoMap(RegisterMap):
         """Outputs of the core that are captured, and the time."""
         time = held(TICK, "time", WORD, unit="clocks", help="Time of the capture, since the last restart; it wraps.")
         return (*super().ports, time)
+
+    @property
+    def inputs(self) -> list[Port]:
+        """Inputs, but for complements, which a demo makes of the lines, as boards have no pins for them."""
+        made = {f"{line}_n" for line in self.spec.complemented}
+        return [port for port in self.core_ports if port.direction == "input" and port.name not in made]
 
     @property
     def emulated(self) -> tuple[Field, ...]:
@@ -139,7 +143,7 @@ def _(spec: LoopSpec) -> DemoMap:
 
 def demo_ports(registers: DemoMap, bus: Bus) -> tuple[Port, ...]:
     """Return all ports of a demo on a bus."""
-    inputs = [port for port in registers.core_ports if port.direction == "input"]
+    inputs = registers.inputs
     of_loop = [port for port in registers.core_ports if port.name == DRIVE]
     emulated = [
         Port(f"emulated_{pin.name}", "output", help=f"Line {pin.name.upper()} of the emulated encoder.")

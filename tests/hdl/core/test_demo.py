@@ -17,8 +17,11 @@ from tachometry.spec.registers.demo import DemoMap, demo_manifest, demo_map
 from tachometry.spec.registers.emulator import EmulatorSettings, fastest, rate_of, speed_of
 
 _COMMON = {"ppr": "16", "clock": "8MHz", "tick": "20us"}
+WATCHED = {"health": "yes", "complements": "9"}
 CORES = {
-    "index, filter, age": of_texts("s", {**_COMMON, "max-time": "2ms", "index": "yes", "age": "yes", "filter": "2"}),
+    "index, filter, age": of_texts(
+        "s", {**_COMMON, "max-time": "2ms", "index": "yes", "age": "yes", "filter": "2"} | WATCHED
+    ),
     "external tick, bounds": of_texts("m", {**_COMMON, "max-time": "1ms", "external-tick": "yes", "bounds": "yes"}),
     "index that resets": of_texts("rairan", {**_COMMON, "max-time": "2ms", "index": "yes", "index-reset": "yes"}),
 }

@@ -45,9 +45,14 @@ def emulated(changes: list[Change], n_clocks: int, lines_per_rev: int | None) ->
             rows[change.clock + 1] |= asdict(change.settings)
         if change.jump:
             rows[change.clock]["jump"] = 1
-    names = ["a", "b", *["z"] * (lines_per_rev is not None)]
-    seen = clock_by_clock(emulator.EncoderEmulator(lines_per_rev, PLACE), rows, names)
+    lines = lines_of(lines_per_rev)
+    names = [*lines, *(f"{line}_n" for line in lines)]
+    seen = clock_by_clock(emulator.EncoderEmulator(lines_per_rev, PLACE, lines), rows, names)
     return [tuple(row[name] for name in names) for row in seen]
+
+
+def lines_of(lines_per_rev: int | None) -> tuple[str, ...]:
+    return ("a", "b") if lines_per_rev is None else ("a", "b", "z")
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -56,7 +61,7 @@ def test_lines_are_those_of_the_golden_model(seed: int) -> None:
 
 
 def check(changes: list[Change], lines_per_rev: int | None) -> None:
-    trace = GoldenEmulator(lines_per_rev, PLACE).trace(changes, CLOCKS)
+    trace = GoldenEmulator(lines_per_rev, PLACE, lines_of(lines_per_rev)).trace(changes, CLOCKS)
     row = np.searchsorted(trace.clock, np.arange(CLOCKS), side="right") - 1
     levels = np.stack(list(trace.lines.values()), axis=1)[row].tolist()
     for clock, (got, wanted) in enumerate(zip(emulated(changes, CLOCKS, lines_per_rev), levels, strict=True)):
@@ -137,14 +142,21 @@ def test_lines_at_fault() -> None:
 
 @pytest.mark.parametrize(
     ("fault", "code"),
-    [({"broken": 1}, Fault.A_STANDS), ({"stuck": 2}, Fault.B_STANDS), ({"glitches": 99}, Fault.ILLEGAL)],
+    [
+        ({"broken": 1}, Fault.A_STANDS),
+        ({"stuck": 2}, Fault.B_STANDS),
+        ({"glitches": 99}, Fault.ILLEGAL),
+        ({"broken": 2}, Fault.B_OPEN),
+    ],
 )
 def test_a_core_tells_them(fault: dict[str, int], code: Fault) -> None:
     """Within twice as many edges of the line that still works as make a fault, as docs/guides/encoder.md has it."""
     words = {"ppr": "25", "clock": "1MHz", "tick": "100us", "health": "yes", "health-edges": "5", "health-errors": "3"}
+    spec = of_texts("m", words | ({"complements": "3"} if code == Fault.B_OPEN else {}))
     begins = 20 * PERIOD
     changes = [Change(-1, STEADY), Change(begins, replace(STEADY, **fault))]
-    found = tables(of_texts("m", words), GoldenEmulator().trace(changes, 60 * PERIOD))["fault"]
+    emulated = GoldenEmulator(complemented=spec.complemented)
+    found = tables(spec, emulated.trace(changes, 60 * PERIOD))["fault"]
     assert found["code"][0] == code
     assert 0 < found.clock[0] - begins < 10 * PERIOD // 2
 
