@@ -31,6 +31,8 @@ from tachometry.spec.core.stream import Stream
 from tachometry.spec.registers.buses import BUSES, bus_of, ports_on
 from tachometry.spec.registers.demo import DemoMap, demo_manifest, demo_ports
 
+FINE = Compare.parse("compare", "100.5:12.5:0:10us:fine")
+
 
 @dataclass(frozen=True)
 class Configuration:
@@ -193,6 +195,8 @@ CONFIGURATIONS = (
     Configuration("preset", "position is set by an input", replace(REFERENCE, preset=0)),
     Configuration("probe", "a probe latches position and time", replace(REFERENCE, probe="rising")),
     Configuration("compare", "pulses at positions", replace(REFERENCE, compare=Compare(100, 100, 50, "10us"))),
+    Configuration("compare-both", "both ways", replace(REFERENCE, compare=Compare(100, 100, 50, "10us", "both"))),
+    Configuration("compare-list", "of a list of 64", replace(REFERENCE, compare=Compare(0, 0, 0, "10us", "both", 64))),
     Configuration("stream", "AXI4-Stream of records", replace(REFERENCE, stream=Stream())),
     Configuration("over-speed", "trips at 900 rad/s", replace(REFERENCE, over_speed=Speed.parse("900rad/s"))),
     Configuration("health", "faults of lines and index", replace(REFERENCE, index=True, health=True)),
@@ -282,6 +286,12 @@ CONFIGURATIONS = (
     *variants("mt", "M/T method", MTTachometer(**COMMON), TIMED_BARS),
     Configuration(
         "mt-whole-cycles", "M/T method, whole cycles", MTTachometer(**COMMON, whole_cycles=True), is_option=False
+    ),
+    Configuration(
+        "track-compare-fine",
+        "and pulses between counts",
+        TrackTachometer(**COMMON, max_speed=MAX_SPEED, multiplier="serial", compare=FINE),
+        is_option=False,
     ),
     Configuration(
         "track",

@@ -20,7 +20,8 @@ from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
 from tachometry.sim.golden.front_end import decode
 from tachometry.sim.signals.run import Run
 from tachometry.sim.signals.tables import HeldVelocity, held_velocity, velocity_error
-from tachometry.spec import Encoder, STachometer, Timing
+from tachometry.spec import Encoder, STachometer, Timing, TrackTachometer
+from tachometry.spec.core.compare import Compare
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "measured"
 
@@ -31,6 +32,15 @@ CORE = STachometer(encoder=Encoder(500), timing=Timing.parse("1MHz", "100us", "1
 FAST, SLOW = 3.27, 0.307  # counts of x4 per tick
 DURATION_S, SETTLED_S = 0.5, 0.05
 SHOWN = slice(600, 616)  # ticks
+
+# Pulses at positions: every seventh is at another phase of a line.
+TIMING = {"clock": "48MHz", "tick": "100us", "max_time": "100ms"}
+PULSES = ("3:7:0:1us", "3:7:0:1us:fine")
+PULSE_MOTIONS = ("constant:10rad/s:500ms", "constant:100rad/s:500ms", "ramp:50rad/s:150rad/s:500ms")
+DISCS: dict[str, dict[str, Any]] = {
+    "ideal": {},
+    "real": {"jitter": 0.05, "nonuniformity": 0.1, "phase_error_deg": 10},
+}
 
 # The picture: periods of an encoder with two in a turn, a seed that shows one lost pulse and one illegal, and pixels.
 PULSES_PER_REV, PERIODS, SEED = 2, 4, 17
@@ -126,6 +136,30 @@ def table() -> str:
     return markdown(head, list(map(measure, EXAMPLES)))
 
 
+def pulses(motion: str, disc: dict[str, Any], fine: bool) -> str:
+    """Return how far pulses of the compare output are from their places, in counts: the mean, and RMS about it."""
+    spec = TrackTachometer(encoder=Encoder(500), timing=Timing.parse(**TIMING), compare=Compare.parse("", PULSES[fine]))
+    encoder = VirtualEncoder(500, start_angle_rad=math.pi / 2000, seed=SEED, **disc)  # amid position 0
+    moved = parse_motion(motion)
+    found = golden.run(spec, encoder.record(moved).recording.place(spec.timing.clock_hz)).tables["compare_valid"]
+    seconds = found.clock / spec.timing.clock_hz
+    # A position begins at an edge, half a count before the place of its name.
+    wanted = found.compare_position / (1 << spec.fine_bits) if fine else found.compare_position - 0.5
+    off = (moved.angle(seconds) * 1000 / math.pi - wanted)[seconds > SETTLED_S]
+    return f"{off.mean():+.3f} ± {off.std():.4f}"
+
+
+def pulse_table() -> str:
+    """Return markdown."""
+    head = ["disc", "motion", "on counts", "on `position_fine`"]
+    rows = [
+        [name, f"`{motion}`", *(pulses(motion, disc, fine) for fine in (False, True))]
+        for name, disc in DISCS.items()
+        for motion in PULSE_MOTIONS
+    ]
+    return markdown(head, rows)
+
+
 def staircase(time: FloatArray, value: NDArray[Any], end: float, bottom: float, height: float, colour: str) -> str:
     """Return a line of SVG: each value from its time on, one unit being `height` pixels above `bottom`."""
     x, y = LEFT + np.append(time, end) / end * WIDTH, bottom - value * float(height)
@@ -178,6 +212,7 @@ def main() -> None:
     """Write both."""
     write(DOCS / "encoder.svg", picture())
     write_block(DOCS / "encoder.md", "imperfections", table())
+    write_block(DOCS / "encoder.md", "pulses", pulse_table())
 
 
 if __name__ == "__main__":

@@ -26,6 +26,9 @@ from tachometry.sim.studies.size import CORE, SEEDS, TARGETS, Measurement, measu
 from tachometry.spec import TachometerSpec
 from tachometry.spec.language.units import parse_time
 
+# Options of a core that change its size alone.
+_NO_VELOCITY = ("preset", "index-once", "position-modulo", "probe", "compare", "stream", "over-speed", "health")
+
 
 @click.command(
     cls=GroupedCommand,
@@ -133,6 +136,9 @@ def compare(
     outputs = Outputs({name: path for name, path in files.items() if path is not None}, inputs=inputs)
     named = named_methods(methods, make, BASELINES)
     spec = next((spec for spec in named.specs.values() if spec is not None), None) or make("s", {})
+    for name in () if size else _NO_VELOCITY:
+        if name in spec.options:
+            raise ValueError(f"--{name} must be left out, or given together with --size: it changes no velocity")
     source = _source(record, capture, read, spec)
     earliest = None if start is None else float(parse_time("start", start))
     if earliest is not None and earliest < 0:

@@ -105,7 +105,7 @@ def _none(axis: Axis) -> str:
     assert compare is not None
     if compare.depth:
         return ": its list is empty here, and a program fills it"
-    first = compare.ahead(axis.spec.position_width)
+    first = str(compare).split(":")[0] if compare.fine else compare.ahead(axis.spec.position_width)
     turning = "" if compare.direction == BOTH else f" while the shaft turned {compare.direction}"
     return f": {first} was not reached{turning}, as position was {position.min()} to {position.max()}"
 
@@ -145,7 +145,8 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         rows.append(("health", f"{faults}, first: {FAULT_TEXTS[code]}" if code else "no fault"))
     if spec.compare is not None:
         pulses = run.tables[COMPARE]
-        last = f", the last at position {pulses.compare_position[-1]}" if len(pulses) else _none(axis)
+        one = 1 << getattr(spec, "fine_bits", 0) * spec.compare.fine
+        last = f", the last at position {pulses.compare_position[-1] / one:.15g}" if len(pulses) else _none(axis)
         rows.append(("compare", f"{plural(len(pulses), 'pulse')}{last}"))
     if spec.over_speed is not None:
         tripped = np.flatnonzero(run.ticks.over_speed)

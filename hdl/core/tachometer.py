@@ -22,6 +22,7 @@ from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.methods import DATAPATHS
 from tachometry.hdl.methods.datapath import LongTicks, OwnStandstill, OwnTicks, TickSource
 from tachometry.hdl.output.compare_output import CompareOutput
+from tachometry.hdl.output.fine_compare_output import FineCompareOutput
 from tachometry.hdl.output.low_pass import LowPass
 from tachometry.hdl.output.over_speed import OverSpeed
 from tachometry.hdl.output.record_stream import RecordStream
@@ -31,7 +32,7 @@ from tachometry.hdl.output.update_age import UpdateAge
 from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput, SerialVelocityOutput
 from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import follow, members
-from tachometry.spec import TachometerSpec
+from tachometry.spec import TachometerSpec, TrackTachometer
 from tachometry.spec.core.compare import LIST_PINS
 from tachometry.spec.core.probe import packed_edges
 from tachometry.spec.core.stream import READY, flags_of, parts_of, size_of
@@ -126,7 +127,11 @@ class Tachometer(wiring.Component):
         self.compare_output: CompareOutput | None = None
         if spec.compare is not None:
             clocks = spec.compare.clocks(spec.timing.clock_hz)
-            self.compare_output = CompareOutput(spec.compare, clocks, spec.position_width)
+            if isinstance(spec, TrackTachometer) and spec.compare.fine:
+                given = spec.carrying, spec.widths.native
+                self.compare_output = FineCompareOutput(spec.compare, clocks, spec.position_width, *given)
+            else:
+                self.compare_output = CompareOutput(spec.compare, clocks, spec.position_width)
         self.stream: RecordStream | None = None
         if spec.stream is not None:
             self.stream = RecordStream(parts_of(spec), len(flags_of(spec)) - 1, size_of(spec), spec.stream.packet)
@@ -363,8 +368,14 @@ class Tachometer(wiring.Component):
         if self.compare_output is None:
             return
         m.submodules.compare_output = box = self.compare_output
-        (step,) = delay(m, self.decoder.step, clocks=self._spec.latency.tick)
-        m.d.comb += [box.step.eq(step), box.position.eq(self.position)]
+        if isinstance(box, FineCompareOutput):
+            counter, updates = self.position_counter, self.datapath.updates
+            follow(m, box, updates.p, ("velocity", "position_fine"))
+            jumps = counter.clear if self._spec.preset is None else counter.clear | counter.load
+            m.d.comb += [box.valid.eq(updates.valid), box.tick.eq(self.tick), box.moves.eq(jumps)]
+        else:
+            (step,) = delay(m, self.decoder.step, clocks=self._spec.latency.tick)
+            m.d.comb += [box.step.eq(step), box.position.eq(self.position)]
         shown = ["compare", "compare_valid", "compare_position", "compare_count"]
         if "compare_waiting" in box.signature.members:
             follow(m, box, self, LIST_PINS)

@@ -1,17 +1,18 @@
 """Pulses at positions."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from amaranth import Module, Mux, ResetInserter, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.fifo import SyncFIFOBuffered
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import In, Member, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
 from tachometry.spec.core.compare import BACKWARD, BOTH, COUNT_WIDTH, LIST_PINS, Compare
 
 # A position, whether it is reached, and what follows when it is.
-_Awaited = tuple[Value, Value, list[Any]]
+Awaited = tuple[Value, Value, list[Any]]
 
 
 class CompareOutput(wiring.Component):
@@ -30,6 +31,8 @@ class CompareOutput(wiring.Component):
         Of a pulse.
     width : int
         Bits of a position.
+    taken : mapping of str to Member or None
+        What it is given in place of `position` and `step`.
 
     Members
     -------
@@ -51,7 +54,7 @@ class CompareOutput(wiring.Component):
         Positions in the list, with the one that is awaited.
     """
 
-    def __init__(self, compare: Compare, clocks: int, width: int) -> None:
+    def __init__(self, compare: Compare, clocks: int, width: int, taken: Mapping[str, Member] | None = None) -> None:
         self._compare = compare
         self._clocks = clocks
         position = signed(width)
@@ -59,8 +62,7 @@ class CompareOutput(wiring.Component):
         of_list = {**pins, "compare_waiting": Out(range(compare.depth + 1))} if compare.depth else {}
         super().__init__(
             {
-                "position": In(position),
-                "step": In(signed(2)),
+                **({"position": In(position), "step": In(signed(2))} if taken is None else taken),
                 "compare": Out(1),
                 "compare_valid": Out(1),
                 "compare_position": Out(position),
@@ -77,7 +79,7 @@ class CompareOutput(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         reached = Signal()
-        awaited, there, moves = self._listed(m, reached) if self._compare.depth else self._computed(m)
+        awaited, there, moves = self._awaited(m, reached)
         left = Signal(range(self._clocks + 1))
         m.d.comb += reached.eq(there)
         m.d.comb += self.compare.eq(left.any())
@@ -93,6 +95,10 @@ class CompareOutput(wiring.Component):
             ]
         return m
 
+    def _awaited(self, m: Module, reached: Signal) -> Awaited:
+        """Return what is awaited in this clock."""
+        return self._listed(m, reached) if self._compare.depth else self._computed(m)
+
     def _at(self, awaited: Value) -> Value:
         """Tell whether this step leads to a position, in a direction that counts."""
         back, direction = self.step[1], self._compare.direction
@@ -100,7 +106,7 @@ class CompareOutput(wiring.Component):
             return self.step[0] & ((self.position + back)[: len(awaited)] == awaited.as_unsigned())
         return self.step[0] & (back == (direction == BACKWARD)) & (self.position == awaited)
 
-    def _computed(self, m: Module) -> _Awaited:
+    def _computed(self, m: Module) -> Awaited:
         """Return what is awaited of positions that lie equally apart."""
         compare, back = self._compare, self.step[1]
         awaited = Signal.like(self.position, init=compare.ahead(len(self.position)))
@@ -116,7 +122,7 @@ class CompareOutput(wiring.Component):
             moves.append(number.eq(Mux(back, number - 1, number + 1)))
         return here, there, moves
 
-    def _listed(self, m: Module, reached: Signal) -> _Awaited:
+    def _listed(self, m: Module, reached: Signal) -> Awaited:
         """Return what is awaited of a list."""
         fifo = SyncFIFOBuffered(width=len(self.position), depth=self._compare.depth)
         m.submodules.fifo = ResetInserter(self.compare_clear)(fifo)

@@ -57,7 +57,7 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
     updates = in_unit(spec, filtered(spec, ticks, measured))
     probes = probe.latched(spec, steps, trace, updates)
     ticks = probe.with_probed(spec, ticks, probes)
-    tripped, pulses = trips(spec, updates), compare.pulses(spec, steps, trace)
+    tripped, pulses = trips(spec, updates), compare.pulses(spec, steps, trace, measured)
     ticks = ticks.having(**compare.shown(spec, pulses, ticks.clock))
     found = {
         "tick": with_trip(spec, with_age(spec, ticks, updates), tripped),

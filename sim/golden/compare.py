@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from tachometry.sim.golden.front_end import Steps, positions_at
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
-from tachometry.spec import TachometerSpec
+from tachometry.spec import TachometerSpec, TrackTachometer
 from tachometry.spec.core.compare import BACKWARD, BOTH, COUNT_WIDTH, FORWARD, LIST_PINS, Compare
+from tachometry.spec.formats.carrying import FASTER_BITS
 from tachometry.spec.language.port import COMPARE
 
 _NEVER = 1 << 62
@@ -32,25 +33,82 @@ class _Passes:
         return int(self._clock[row]) if row < end else _NEVER
 
 
-def pulses(spec: TachometerSpec, steps: Steps, trace: PinTrace) -> dict[str, Table]:
-    """Return the first clocks of pulses, and their positions; of a list, which `trace` fills, also how long it is."""
+def pulses(spec: TachometerSpec, steps: Steps, trace: PinTrace, updates: Table) -> dict[str, Table]:
+    """Return the first clocks of pulses, and their positions; of a list, which `trace` fills, also how long it is.
+
+    `updates` have velocity and place as the method has them.
+    """
     if (compare := spec.compare) is None:
         return {}
+    if compare.depth:
+        return listed(spec, steps, trace)
+    if isinstance(spec, TrackTachometer) and compare.fine:
+        return {COMPARE: _table([*_carried(spec, compare, steps, updates, trace.n_clocks)])}
+    return {COMPARE: _table([*_computed(compare, _ways(spec, compare, steps), 1 << spec.position_width - 1)])}
+
+
+def listed(spec: TachometerSpec, steps: Steps, trace: PinTrace) -> dict[str, Table]:
+    """Return the same of a list alone."""
+    assert spec.compare is not None
+    ways = _ways(spec, spec.compare, steps)
+    found, changes = _listed(spec.compare.depth, ways, trace, 1 << spec.position_width - 1)
+    at, level = np.array([(0, 0), *changes], dtype=np.int64).T
+    return {COMPARE: _table(found), _WAITING: Table(at, {_WAITING: np.cumsum(level)})}
+
+
+def _ways(spec: TachometerSpec, compare: Compare, steps: Steps) -> dict[str, _Passes]:
+    """Return where the shaft passes in each direction that counts."""
     half = 1 << spec.position_width - 1
     # Both ways a position is the edge below it, so a step down from it leads over it.
     place = positions_at(spec, steps, steps.clock, reset=True) + ((steps.step < 0) & (compare.direction == BOTH))
     place = (place + half) % (2 * half) - half
     clock = steps.clock + spec.latency.tick
-    ways = {
+    return {
         way: _Passes(clock[rows], place[rows])
         for way, rows in ((FORWARD, steps.step > 0), (BACKWARD, steps.step < 0))
         if compare.direction in (way, BOTH)
     }
-    if not compare.depth:
-        return {COMPARE: _table([*_computed(compare, ways, half)])}
-    found, changes = _listed(compare.depth, ways, trace, half)
-    at, level = np.array([(0, 0), *changes], dtype=np.int64).T
-    return {COMPARE: _table(found), _WAITING: Table(at, {_WAITING: np.cumsum(level)})}
+
+
+def _carried(
+    spec: TrackTachometer, compare: Compare, steps: Steps, updates: Table, n_clocks: int
+) -> Iterator[tuple[int, int]]:
+    """Yield the same of places between counts: that of an update, and eight times its velocity per clock for each clock
+    in which it catches up, then the velocity once a clock.
+    """
+    way = spec.carrying
+    half = 1 << spec.position_width - 1 + way.fine_bits
+    widest = half << way.more_bits
+    jumps = np.concatenate([steps.presets, steps.index[: len(steps.index) * spec.index_reset]]) + spec.latency.tick
+    before = np.searchsorted(np.sort(jumps), updates.clock - spec.latency.datapath, side="right")
+    begins = [*(updates.clock + way.latency).tolist(), n_clocks]
+    columns = (updates.velocity, updates.position_fine, np.diff(before, prepend=0))
+    rows = zip(begins[:-1], begins[1:], *(column.tolist() for column in columns), strict=True)
+    awaited = compare.in_lsb(compare.start, way.fine_bits)
+    armed, number = False, 0
+    for clock, end, velocity, fine, jumped in [(0, begins[0], 0, 0, 0), *rows]:
+        turn, since = way.per_clock.scaled(velocity << way.shift), clock
+        place = (fine << way.more_bits) + (turn * way.adds << FASTER_BITS)
+        armed &= not jumped
+        while clock < end and (number < compare.count or not compare.count):
+            beyond = (place + turn * (clock - since) - (awaited << way.more_bits) + widest) % (2 * widest) - widest
+            ahead = (beyond < 0) == (compare.direction == FORWARD)
+            if ahead or not armed:
+                armed |= ahead
+                clock += _until(beyond, turn, widest)
+            else:
+                yield clock, awaited
+                number += 1
+                awaited = (awaited + compare.in_lsb(compare.apart, way.fine_bits) + half) % (2 * half) - half
+                clock += 1
+
+
+def _until(value: int, turn: int, half: int) -> int:
+    """Return the clocks until a number in two's complement, to which `turn` is added in each, has the other sign."""
+    if not turn:
+        return _NEVER
+    lowest = -half if value < 0 else 0
+    return (value - lowest) // -turn + 1 if turn < 0 else -((value - lowest - half) // turn)
 
 
 def _table(found: Clocks) -> Table:

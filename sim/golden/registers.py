@@ -285,7 +285,7 @@ class GoldenBank:
         if self._map.spec.probe:
             self._tables |= probe.latched(self._map.spec, self._steps, pins, self._tables[UPDATE])
         if "compare_next" in lines:
-            self._tables |= compare.pulses(self._map.spec, self._steps, pins)
+            self._tables |= compare.listed(self._map.spec, self._steps, pins)
 
     @staticmethod
     def _shown(found: dict[str, np.ndarray]) -> dict[str, int]:

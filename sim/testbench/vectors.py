@@ -163,8 +163,8 @@ def _to_compare(spec: TachometerSpec, longest: int) -> list[str]:
     """Return segments over the first three positions of the compare output, if that takes no more clocks."""
     if spec.compare is None or spec.compare.depth:
         return []
-    apart, most = spec.compare.apart, _fastest(spec)
-    start, more = spec.compare.start, 3 + abs(spec.compare.start) // 16  # since illegal transitions lose counts
+    start, apart = (spec.compare.in_lsb(place, 0) for place in (spec.compare.start, spec.compare.apart))
+    most, more = _fastest(spec), 3 + abs(start) // 16  # since illegal transitions lose counts
     ahead = start - int(math.copysign(more, apart))  # whence it is reached in its direction
     ways = [ahead, start + 2 * apart + int(math.copysign(more, apart)) - ahead]
     seconds = [abs(way) / most * float(spec.timing.tick_seconds) for way in ways]

@@ -48,7 +48,7 @@ def check(spec: TachometerSpec) -> None:
         fastest = Fraction(0)
         if spec.max_speed is not None:
             fastest = min(spec.max_speed.counts(spec.encoder.counts_per_rev, spec.times.seconds(1)), Fraction(1))
-        spec.compare.check(spec.timing.clock_hz, spec.position_width, fastest)
+        spec.compare.check(spec.timing.clock_hz, spec.position_width, fastest, getattr(spec, "fine_bits", None))
     if spec.over_speed is not None and spec.scale.over_speed >= spec.scale.full_scale:
         unit = SpeedUnit(spec.over_speed.unit)
         greatest = f"{unit.of(spec.scale.full_scale * spec.scale.rad_per_s_per_lsb):.6g} {unit.name}"

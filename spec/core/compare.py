@@ -14,9 +14,9 @@ MAX_CLOCKS = 1 << 24
 MAX_DEPTH = 1 << 12
 FORWARD, BACKWARD, BOTH = DIRECTIONS = "forward", "backward", "both"
 LIST_PINS = ("compare_next", "compare_append", "compare_clear")  # inputs of a list, which registers have on a bus
-_FORM = re.compile(
-    rf"(?:(-?\d{{1,15}}):(\d{{1,15}}):(\d{{1,15}})|list:(\d{{1,15}})):([^:]+)(?::({'|'.join(DIRECTIONS)}))?", re.ASCII
-)
+FINEST_BITS = 16  # fraction bits of places between counts, as they are asked for
+_PLACES = r"(-?\d{1,15}(?:\.\d{1,16})?):(\d{1,15}(?:\.\d{1,16})?):(\d{1,15})"
+_FORM = re.compile(rf"(?:{_PLACES}|list:(\d{{1,15}})):([^:]+)(?::({'|'.join(DIRECTIONS)}))?(?::(fine))?", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Compare:
     Parameters
     ----------
     start : int
-        The first position.
+        The first position, in counts; with `fine` in 2^-16 of them, as `step` is.
     step : int
         Counts from a position to the next, in the direction of the pulses; with both directions, forward.
     count : int
@@ -37,6 +37,8 @@ class Compare:
         The pulses come while the shaft turns `forward`, `backward`, or whichever way (`both`).
     depth : int
         Positions of a list that a program writes, which stands for the first three; 0: there is none.
+    fine : bool
+        Positions lie between the counts as well: `position_fine` is carried on to the clock of the pulse.
     """
 
     start: int
@@ -45,13 +47,14 @@ class Compare:
     width: str
     direction: str = FORWARD
     depth: int = 0
+    fine: bool = False
 
     @classmethod
     def parse(cls, what: str, text: str) -> Self:
         """Read START:STEP:COUNT:WIDTH, such as 100:100:50:10us, or list:DEPTH:WIDTH, such as list:64:10us.
 
         Behind it may stand :forward, :backward or :both; without it equally distant positions have the first of these,
-        and a list has the last.
+        and a list has the last. Then may stand :fine.
         """
         found = _FORM.fullmatch(text.strip().lower())
         if found is None:
@@ -60,18 +63,36 @@ class Compare:
                 "that go down by STEP, or :both, or list:DEPTH:WIDTH, such as list:64:10us"
             )
             raise ParameterError(what, f"{form}, not {text!r}")
-        start, step, count, depth, width, direction = found.groups()
+        start, step, count, depth, width, direction, fine = found.groups()
         if re.fullmatch(r"[\d.]+", width):
             typed = re.sub(r"(:[\d.]+)(?=$|:[a-z])", r"\1us", text.strip().lower())
             raise ParameterError(what, f"must have a WIDTH with a unit: type {typed}, or clk for clocks, not {text!r}")
         if depth is not None:
-            return cls(0, 0, 0, width, direction or BOTH, int(depth))
-        return cls(int(start), int(step), int(count), width, direction or FORWARD)
+            return cls(0, 0, 0, width, direction or BOTH, int(depth), fine is not None)
+        places = [Fraction(place) * (1 << FINEST_BITS * (fine is not None)) for place in (start, step)]
+        if any(place.denominator > 1 for place in places):
+            kind = f"multiples of 2^-{FINEST_BITS} count" if fine else "whole counts, but with :fine at the end"
+            raise ParameterError(what, f"must have START and STEP in {kind}, not {text!r}")
+        first, apart = map(int, places)
+        return cls(first, apart, int(count), width, direction or FORWARD, fine=fine is not None)
 
     def __str__(self) -> str:
-        places = f"list:{self.depth}" if self.depth else f"{self.start}:{self.step}:{self.count}"
+        places = f"{self._written(self.start)}:{self._written(self.step)}:{self.count}"
         usual = BOTH if self.depth else FORWARD
-        return f"{places}:{self.width}" + f":{self.direction}" * (self.direction != usual)
+        return (
+            (f"list:{self.depth}" if self.depth else places)
+            + f":{self.width}"
+            + f":{self.direction}" * (self.direction != usual)
+            + ":fine" * self.fine
+        )
+
+    def _written(self, place: int) -> str:
+        """Return a place in counts."""
+        if not self.fine:
+            return str(place)
+        whole, part = divmod(abs(place), 1 << FINEST_BITS)
+        digits = f"{part * 10**FINEST_BITS >> FINEST_BITS:0{FINEST_BITS}}".rstrip("0")
+        return f"{'-' * (place < 0)}{whole}{'.' * bool(digits)}{digits}"
 
     @property
     def apart(self) -> int:
@@ -93,12 +114,24 @@ class Compare:
         """Return clocks of a pulse; ParameterError if it has no whole number of them."""
         return whole_clocks("compare", self.width, clock_hz)
 
-    def check(self, clock_hz: int, position_width: int, fastest: Fraction) -> None:
-        """Check that it fits a core whose shaft has at most so many counts in a clock; ParameterError if a position, a
-        number or a time is out of range, or if a pulse would last into the next.
+    def in_lsb(self, place: int, fine_bits: int) -> int:
+        """Return a place, or a distance, in 2^-fine_bits counts if it is fine, else in counts."""
+        return place >> FINEST_BITS - fine_bits if self.fine else place
+
+    def check(self, clock_hz: int, position_width: int, fastest: Fraction, fine_bits: int | None) -> None:
+        """Check that it fits a core whose shaft has at most so many counts in a clock, and whose `position_fine` has so
+        many fraction bits, if there is one; ParameterError if a position, a number or a time is out of range, or if a
+        pulse would last into the next.
         """
-        half = 1 << position_width - 1
+        one = 1 << FINEST_BITS if self.fine else 1
+        half = one << position_width - 1
         clocks = self.clocks(clock_hz)
+        if self.fine and fine_bits is None:
+            raise ParameterError("compare", "must not be fine with this method: position_fine is of --method track")
+        if self.fine and (self.depth or self.direction == BOTH):
+            raise ParameterError("compare", "must have START:STEP:COUNT:WIDTH and one direction to be fine")
+        if self.fine and fine_bits is not None and (self.start | self.step) % (1 << FINEST_BITS - fine_bits):
+            raise ParameterError("compare", f"must have START and STEP in multiples of 2^-{fine_bits}, see --fine-bits")
         ranges = (
             ("start", self.start, -half, half - 1),
             ("step", self.step, 1, half - 1),
@@ -109,9 +142,11 @@ class Compare:
             ("width in clocks", clocks, 1, MAX_CLOCKS),
         ):
             if not least <= value <= most:
+                if name in ("start", "step"):
+                    least, most, value = (self._written(place) for place in (least, most, value))
                 raise ParameterError("compare", f"must have a {name} from {least} to {most} here, not {value}")
-        if not self.depth and fastest and fastest * clocks >= self.step:
-            longest = math.ceil(self.step / fastest) - 1
+        if not self.depth and fastest and fastest * one * clocks >= self.step:
+            longest = math.ceil(Fraction(self.step, one) / fastest) - 1
             raise ParameterError(
                 "compare",
                 f"must have a WIDTH of at most {longest} clocks here, not {clocks}: at --max-speed the shaft is at the "

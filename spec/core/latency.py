@@ -74,7 +74,7 @@ class Latency(Follows[S]):
             "tick_latency": self.tick,
             "tick_to_velocity": self.tick_to_velocity,
         }
-        if self.spec.compare is not None:
+        if self.spec.compare is not None and not self.spec.compare.fine:  # else it is at the place itself
             found["pin_to_compare"] = self.pin_to_count + self.tick + 1
         if self.spec.probe:
             found["pin_to_probe"] = self.pin_to_count + self.tick

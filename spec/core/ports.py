@@ -226,7 +226,9 @@ def _compare_ports(spec: TachometerSpec) -> Iterable[Port]:
         yield held(TICK, "compare_waiting", depth.bit_length(), help=text)
     yield strobe(COMPARE, "The first clock of a pulse of compare.")
     text = "Position of the latest pulse of compare."
-    yield held(COMPARE, "compare_position", spec.position_width, signed=True, unit="counts", help=text)
+    fine = getattr(spec, "fine_bits", 0) * spec.compare.fine
+    unit = f"2^-{fine} counts" if fine else "counts"
+    yield held(COMPARE, "compare_position", spec.position_width + fine, signed=True, unit=unit, help=text)
 
 
 def _health_ports(spec: TachometerSpec) -> Iterable[Port]:

@@ -235,10 +235,12 @@ class TachometerSpec:
         None,
         "Output compare has pulses of WIDTH, a time or clocks, at COUNT positions (0: no end) from START on, STEP "
         "counts apart: 100:100:50:10us. They come while the shaft turns forward; with :backward at the end backward, "
-        "and with :both whichever way. list:DEPTH:WIDTH takes positions that a program writes, up to DEPTH ahead.",
+        "and with :both whichever way. list:DEPTH:WIDTH takes positions that a program writes, up to DEPTH ahead. With "
+        ":fine behind all that START and STEP may lie between counts, where track says that the shaft is.",
         metavar="[START:STEP:COUNT|list:DEPTH]:WIDTH",
         parse=Compare.parse,
-        tests=("", "2:3:0:2clk", "-2:3:40:1clk:backward", "3:4:9:1clk:both", "list:3:2clk"),
+        tests=("", "2:3:0:2clk", "1.5:2.5:0:2clk:fine", "-2:3:40:1clk:backward", "3:4:9:1clk:both", "list:3:2clk"),
+        few=3,
         tacit=True,
     )
     stream: Stream | None = option(  # noqa: RUF009

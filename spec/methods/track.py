@@ -16,10 +16,11 @@ from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.core.timing import Timing, parse_clocks
 from tachometry.spec.core.widths import Widths
 from tachometry.spec.core.words import Words
+from tachometry.spec.formats.carrying import Carrying
 from tachometry.spec.formats.tracking import MOST_MEMORY, RESULT_BITS, WIDTH, Tracking
 from tachometry.spec.formats.tracking_code import Program
 from tachometry.spec.formats.tracking_units import QUICK, Small
-from tachometry.spec.formats.velocity_output import NATIVE
+from tachometry.spec.formats.velocity_output import NATIVE, VelocityOutput
 from tachometry.spec.language.option import ParameterError, option
 from tachometry.spec.language.port import UPDATE, Port, held
 from tachometry.spec.language.units import format_time, next_written_time, short_time, written_time
@@ -221,6 +222,7 @@ class TrackTachometer(TachometerSpec):
                 f"{self.timing.clock_hz / 1e6:g} MHz, not {given}: try --tick {typed} or {other}",
                 f"needs a tick of {shortest} clocks",
             )
+        self._check_fine()
 
     def in_loop(self, velocity_gain: Fraction) -> "TrackTachometer":
         if self.max_memory is not None:
@@ -267,6 +269,25 @@ class TrackTachometer(TachometerSpec):
             if self.multiplier == "serial" or (self.multiplier == "auto" and fits)
             else replace(serial, times=QUICK)
         )
+
+    @cached_property
+    def carrying(self) -> Carrying:
+        """How `position_fine` is carried on to the pulses of a fine compare output."""
+        native, cycles = self.widths.native_frac_bits, self.timing.tick_cycles
+        bits = self.fine_bits + 1 + (2 * self.times.longest_tick).bit_length()
+        shift = max(0, bits - (native + cycles.bit_length() - 3))  # an LSB has to be that of four of the velocity
+        ratio = Fraction(1 << bits, cycles << native + shift)
+        per_clock = VelocityOutput(ratio, self.widths.max_velocity << native + shift, bits + 2)
+        latency = self.latency
+        late = latency.pin_to_count + latency.tick + latency.datapath + per_clock.serial_latency + 3
+        return Carrying(per_clock, shift, self.fine_bits, bits - self.fine_bits, late)
+
+    def _check_fine(self) -> None:
+        """Check that the place of an update is carried on before the next; ParameterError if it is not."""
+        if self.compare is None or not self.compare.fine:
+            return
+        if self.carrying.latency > self.times.shortest_tick:
+            raise ParameterError("compare", "must not be fine here: it takes a longer tick or a shorter --filter")
 
     @property
     def method_ports(self) -> tuple[Port, ...]:

@@ -1,6 +1,7 @@
 """The picture and the table of docs/measured/encoder.md are those of the bench, and say what the guide says."""
 
 import inspect
+import re
 from pathlib import Path
 
 import pytest
@@ -17,9 +18,8 @@ PICTURE = (encoder.DOCS / "encoder.svg").read_bytes()
 
 def test_the_page_is_up_to_date(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(encoder, "DOCS", tmp_path)
-    before, rest = PAGE.split("<!-- imperfections -->\n")
-    after = rest[rest.index("<!-- end of") :]
-    (tmp_path / "encoder.md").write_text(f"{before}<!-- imperfections -->\n{after}", "utf-8")
+    empty = re.sub(r"(<!-- (imperfections|pulses) -->\n).*?(?=<!-- end)", r"\1", PAGE, flags=re.DOTALL)
+    (tmp_path / "encoder.md").write_text(empty, "utf-8")
     encoder.main()
     assert (tmp_path / "encoder.md").read_text("utf-8") == PAGE
     assert (tmp_path / "encoder.svg").read_bytes() == PICTURE
@@ -42,3 +42,11 @@ def test_what_the_page_says_of_the_core() -> None:
         assert (int(table[option][3]) > 1000) == ("--filter" in option)
     assert off["--lost 0.01"] % 4 == 0
     assert off["--illegal 0.01"] == -2 * errors["--illegal 0.01"]
+
+
+def test_what_the_pages_say_of_pulses() -> None:
+    rows = [line.strip("| \n").split(" | ") for line in PAGE.split("<!-- pulses -->")[1].splitlines()[3:-1]]
+    assert len(rows) == 6
+    for disc, _, *cells in rows:
+        counts, fine = (float(cell.split(" ± ")[1]) for cell in cells)
+        assert fine < counts / 10 if disc == "real" else counts < fine

@@ -1,0 +1,130 @@
+"""Pulses between counts against their rules, clock by clock, and against where the shaft is."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from proofs.source import mutant
+from support.nightly import nightly
+from support.simulate import clock_by_clock
+
+from tachometry.hdl.output import fine_compare_output
+from tachometry.sim import golden
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.stress import stress
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.engines.cxxrtl import Cxxrtl
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.studies.lockstep import lockstep
+from tachometry.spec import of_texts
+from tachometry.spec.core.compare import Compare
+from tachometry.spec.formats.carrying import Carrying
+from tachometry.spec.formats.velocity_output import VelocityOutput
+
+SEEN = ["compare", "compare_valid", "compare_position", "compare_count"]
+CARRYING = Carrying(VelocityOutput(Fraction(1, 10), 200, 12), shift=1, fine_bits=2, more_bits=2, late=12)
+SPACING = CARRYING.latency + 4
+WIDTH, HALF = 5, 1 << 8  # bits of a position in counts; of the place that is carried on, without its sign
+
+
+def wrapped(value: int, half: int) -> int:
+    return (value + half) % (2 * half) - half
+
+
+def check(asked: str) -> None:
+    """Play updates whose places follow from each other more or less, with jumps now and then."""
+    compare = Compare.parse("compare", asked)
+    rng = np.random.default_rng(1)
+    rows, fine, velocity = [], 0, 0
+    for clock in range(3000):
+        if valid := int(clock % SPACING == 10):
+            velocity = int(rng.integers(-100, 101)) if rng.random() < 0.5 else velocity
+            fine = wrapped(fine + SPACING * velocity // 20 + int(rng.integers(-3, 4)), HALF >> 2)
+        row = {"valid": valid, "velocity": velocity, "position_fine": fine, "moves": int(rng.random() < 0.005)}
+        rows.append({**row, "tick": int(clock % SPACING == 5)})
+    box = fine_compare_output.FineCompareOutput(compare, 3, WIDTH, CARRYING, 8)
+    seen = clock_by_clock(box, rows, SEEN)
+    sign = -1 if compare.direction == "backward" else 1
+    awaited, apart = compare.start >> 14, sign * compare.step >> 14
+    place, turn, begun = 0, 0, list[int]()
+    armed = of_tick = of_update = moved = False
+    wanted = dict.fromkeys(SEEN, 0)
+    for clock, row in enumerate(rows):
+        wanted["compare"] = int(bool(begun) and clock - begun[-1] < 3)
+        wanted["compare_valid"] = int(bool(begun) and clock == begun[-1])
+        assert seen[clock] == wanted, (asked, clock)
+        if row["tick"]:
+            of_tick, moved = moved, False
+        moved = moved or bool(row["moves"])
+        of_update = of_tick if row["valid"] else of_update
+        beyond = wrapped((place >> 2) - awaited, HALF >> 2)
+        ahead = beyond < 0 if sign > 0 else beyond >= 0
+        if armed and not ahead and (not compare.count or len(begun) < compare.count):
+            begun.append(clock + 1)
+            wanted |= {"compare_position": awaited, "compare_count": len(begun)}
+            awaited = wrapped(awaited + apart, HALF >> 2)
+        armed = armed or ahead
+        place = wrapped(place + turn, HALF)
+        update = clock + 1 - CARRYING.latency
+        if update >= 0 and rows[update]["valid"]:  # it is the place from the next clock on
+            turn = CARRYING.per_clock.scaled(2 * rows[update]["velocity"])
+            place = wrapped((rows[update]["position_fine"] << 2) + 8 * turn * CARRYING.adds, HALF)
+            armed = armed and not of_update
+    assert len(begun) == compare.count or len(begun) > 20
+
+
+CASES = ["1.25:2.5:0:3clk:fine", "-3:0.75:30:3clk:backward:fine"]
+
+
+@pytest.mark.parametrize("asked", CASES)
+def test_every_clock_is_as_the_rules_say(asked: str) -> None:
+    check(asked)
+
+
+def check_all() -> None:
+    for asked in CASES:
+        check(asked)
+
+
+@nightly  # it asks what the test above notices
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("catching <= carrying.adds", "catching < carrying.adds"),
+        ("Mux(loads, late, place + speed)", "Mux(loads, late, place + new)"),
+        ("beyond[-1] ^ (compare.direction == BACKWARD)", "beyond[-1]"),
+        ("~(loads & of_update)", "1"),
+        ("self.moves | (moved & ~self.tick)", "self.moves | moved"),
+        ("there = armed & ~ahead", "there = ~ahead"),
+        ("self.compare_count != compare.count", "self.compare_count != compare.count + 1"),
+    ],
+)
+def test_mutants_are_noticed(right: str, wrong: str) -> None:
+    with mutant(fine_compare_output.FineCompareOutput, right, wrong), pytest.raises(AssertionError):
+        check_all()
+
+
+@pytest.mark.parametrize("speed", [30, -100])
+def test_pulses_come_where_the_shaft_is(speed: int) -> None:
+    """An ideal disc at constant speed: what the core takes to know of an edge is compensated."""
+    way = ":backward" if speed < 0 else ""
+    spec = of_texts(
+        "track", {"ppr": "500", "clock": "20MHz", "tick": "50us", "compare": f"{-3 if way else 3}:7.25:0:1us{way}:fine"}
+    )
+    encoding = VirtualEncoder(500, start_angle_rad=np.pi / 2000).record(parse_motion(f"constant:{speed}rad/s:200ms"))
+    pulses = golden.run(spec, PinTrace.of(encoding.recording, spec)).tables["compare_valid"]
+    # It starts amid position 0.
+    late = pulses.clock / 20e6 * speed * 1000 / np.pi - pulses.compare_position / 2**6
+    settled = late[len(late) // 2 :]
+    assert len(settled) > 50
+    assert abs(settled).max() < 0.03
+
+
+@nightly  # a build takes seconds; the matrix has another core
+def test_hardware_is_the_golden_model() -> None:
+    texts = {"ppr": "20", "clock": "1MHz", "tick": "1000clk", "max-time": "4000clk", "fine-bits": "3"}
+    more = {"position-width": "8", "index": "yes", "index-reset": "yes", "preset": "3"}
+    spec = of_texts("track", {**texts, **more, "compare": "1.5:1.25:40:1clk:fine"})
+    found = lockstep(spec, stress(spec, 1, 60), Cxxrtl())
+    assert found.n_mismatches == 0, found.first
+    assert len(found.actual.tables["compare_valid"]) > 20
