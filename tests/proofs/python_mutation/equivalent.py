@@ -349,7 +349,7 @@ _argue(
 )
 for _where in ("form.py: ControlForm._most_error_of_gains", "coefficients.py: control_form"):
     _argue(f"spec/control/{_where}", "A gain has one coefficient.", "0 → -1 #2")
-_argue("spec/registers/emulator.py: ", "Any of the random bits does.", *("3 → 4 #2", "22 → 23"))
+_argue("spec/registers/emulator.py: ", "Any of the random bits does.", *("3 → 4 #2", "17 → 18", "22 → 23"))
 _argue(
     "hdl/export/registers/rdl.py: described",
     "The end of a line is a space to who reads it.",
@@ -374,3 +374,9 @@ _argue(
 )
 _argue("sim/golden/command_generator.py: Gains", "Nothing assigns to it, and nothing hashes it.", "True → False")
 _argue("sim/golden/control.py: Control.set", "There are as many gains as terms.", "True → False")
+_argue("hdl/export/targets/vivado.py: vivado", "No registers take more than 4096 bytes.", "1 → 0")
+_argue(
+    "sim/golden/methods/track_recursion.py: Recursion._first",
+    "A velocity of 1 is far below what is shown.",
+    "0 → 1 #3",
+)

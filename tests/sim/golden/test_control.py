@@ -10,8 +10,9 @@ import pytest
 from support.shaft import Double, Fixed, run
 
 from tachometry.sim.golden import control
+from tachometry.sim.golden.control import Command
 from tachometry.sim.signals.run import Table
-from tachometry.spec import Encoder, Speed, STachometer, Timing
+from tachometry.spec import METHODS, Encoder, Speed, STachometer, Timing, of_texts
 from tachometry.spec.control import LoopSpec
 
 CORE = STachometer(
@@ -52,6 +53,20 @@ def check_side_by_side(spec: LoopSpec) -> None:
     assert z < lsb / 2 + 2**-12 * 30
     steepness = float(spec.inertia / spec.torque_constant) * float(spec.velocity_gain + spec.observer)
     assert current < amperes + steepness * (y + z) + 2**-12 * 20
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_only_an_update_of_tracking_may_be_no_measurement(method: str) -> None:
+    """Such as the one of a tick without a count."""
+    core = of_texts(method, {"ppr": "500", "max-speed": "1000rad/s"})
+    spec, clock = LoopSpec(tachometer=core), np.arange(0, 48_000, 4800)
+
+    def filtered(forced: int) -> list[int]:
+        columns = {"velocity": np.arange(10) << 12, "forced": np.full(10, forced)}
+        shown = control.control(spec, clock, np.zeros_like(clock), Table(clock + 1, columns), [Command()] * 10)
+        return shown["filtered_velocity"].tolist()
+
+    assert (filtered(0) == filtered(1)) == (method != "track")
 
 
 def control_of(spec: LoopSpec) -> Fixed:

@@ -141,6 +141,14 @@ def test_a_constant_speed_is_settled_upon(start: str) -> None:
         assert np.abs(velocity) == pytest.approx(np.full(300, counts_per_tick), rel=2e-3), counts_per_tick
 
 
+def test_a_ramp_has_its_acceleration() -> None:
+    spec, count = core(), np.arange(1, 1500)
+    clock = np.round(spec.timing.tick_cycles * np.sqrt(750 * count)).astype(np.int64)
+    shown = golden.run(spec, trace_of(clock, count)).updates.acceleration[-100:] * spec.acceleration.rad_per_s2_per_lsb
+    right = 2 / 750 / float(spec.timing.tick_seconds) ** 2 * 2 * np.pi / spec.encoder.counts_per_rev
+    assert shown == pytest.approx(np.full(100, right), rel=1e-4)
+
+
 WORDS = ("noise", "noises", "turn", 0, 1, 2, 3)  # what outlives a rest; numbers are those of offsets
 _SETTLED, _RIGHT, _END = 900, 1300, 2400  # counts until an upset, after which all is right again, that are played
 
