@@ -39,7 +39,7 @@ class Client:
     def __init__(self, read: Read, write: Write, manifest: Mapping[str, Any]) -> None:
         self.registers = registers = HostRegisters(manifest)
         self._read, self._write = read, write
-        self._hold, self._clear = (registers.mask("CONTROL", name) for name in ("hold", "clear"))
+        self._hold = registers.mask("CONTROL", "hold")
         found = self._word("IDENTIFICATION")
         if found != registers.identification:
             raise WrongBoard(
@@ -66,8 +66,26 @@ class Client:
         return self.registers.fields("COUNTERS", self._word("COUNTERS"))
 
     def clear(self) -> None:
-        """Set all counters to 0."""
-        self._write(self.registers.offset("CONTROL"), self._word("CONTROL") & self._hold | self._clear)
+        """Set all counters to 0, and what the core keeps of its faults and of swallowed edges."""
+        self.control("clear")
+
+    def control(self, field: str) -> None:
+        """Write 1 to a field of CONTROL, such as `preset` or `home`; KeyError if the core does not have it."""
+        mask = self.registers.mask("CONTROL", field)
+        self._write(self.registers.offset("CONTROL"), self._word("CONTROL") & self._hold | mask)
+
+    def write(self, name: str, value: int) -> None:
+        """Write a register, such as PRESET or PROBE_EDGES, or two of its name.
+
+        Raises
+        ------
+        KeyError
+            If the core has none that is written.
+        ValueError
+            If the value does not fit; then nothing is written.
+        """
+        for offset, word in self.registers.written(name, value):
+            self._write(offset, word)
 
     def hold(self, on: bool) -> None:
         """Let only the input `capture` of the core capture (True), or `snapshot`, too (False, as after reset)."""

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable
 
 from tachometry.hdl.export.registers import rdl
-from tachometry.hdl.export.registers.values import captured_values, in_unit, is_whole, sentences
+from tachometry.hdl.export.registers.values import captured_values, in_unit, is_whole, sentences, written_values
 from tachometry.hdl.export.render import render, render_files
 from tachometry.spec.core.stream import flags_of, parts_of, size_of
 from tachometry.spec.registers.field import Field, Register
@@ -34,6 +34,7 @@ def register_files(registers: RegisterMap, name: str) -> dict[str, str]:
         registers=registers,
         spec=registers.spec,
         values=captured_values(registers),
+        written=written_values(registers),
         in_unit=in_unit,
         word=lambda value: f"UINT32_C(0x{value:08X})",
         pi=math.pi,

@@ -1,4 +1,4 @@
-"""Programs read a value for every port from the captured registers, whether it takes one register or two."""
+"""Programs read and write values of ports, whether they take one register or two."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,13 +8,13 @@ from tachometry.spec.registers.map import RegisterMap
 
 
 @dataclass(frozen=True)
-class CapturedValue:
-    """Describes a port of several bits as its registers show it.
+class Value:
+    """Describes what one register shows or takes, or two.
 
     Parameters
     ----------
     name : str
-        Of the port.
+        Of the port, or of what is written.
     words : tuple of Register
         Its registers, the lowest bits first.
     """
@@ -35,7 +35,7 @@ class CapturedValue:
     @property
     def c_type(self) -> str:
         """Its type in C."""
-        return f"{'' if self.field.signed else 'u'}int{self.bits}_t"
+        return f"{'' if self.words[-1].fields[0].signed else 'u'}int{self.bits}_t"
 
     def joined(self, name: str) -> str:
         """Return the value in C, of what was read of its registers; functions begin with `name`."""
@@ -45,14 +45,24 @@ class CapturedValue:
         return words[0] if len(words) == 1 else f"(uint64_t){words[1]} << 32 | {words[0]}"
 
 
-def captured_values(registers: RegisterMap) -> tuple[CapturedValue, ...]:
+def captured_values(registers: RegisterMap) -> tuple[Value, ...]:
     """Return values that a capture takes, the first of them that whose first register captures."""
     found: dict[str, list[Register]] = {}
     for register in registers:
         for field in register.fields:
             if register.captured and field.port and field.width == WORD:
                 found.setdefault(field.port, []).append(register)
-    return tuple(CapturedValue(name, tuple(words)) for name, words in found.items())
+    return tuple(Value(name, tuple(words)) for name, words in found.items())
+
+
+def written_values(registers: RegisterMap) -> tuple[Value, ...]:
+    """Return values that a program writes, less those of CONTROL and of the interrupt."""
+    found: dict[str, list[Register]] = {}
+    for register in registers:
+        if register.writable and register.name != "CONTROL" and not register.name.startswith("INTERRUPT"):
+            name = register.name.removesuffix("_LOW").removesuffix("_HIGH").lower()
+            found.setdefault(name, []).append(register)
+    return tuple(Value(name, tuple(words)) for name, words in found.items())
 
 
 def is_whole(register: Register) -> bool:

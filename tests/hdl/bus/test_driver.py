@@ -12,12 +12,14 @@ from support.lockstep import random_case
 from support.native import HEADER, NAME, check_golden, library, logged, snapshots, write_trace
 from support.script import load
 
+from tachometry.boards.host.client import Client
 from tachometry.hdl.export.registers.files import register_files, tables
 from tachometry.sim import build, golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TachometerSpec, of_texts
+from tachometry.spec.registers.manifest import manifest
 from tachometry.spec.registers.map import RegisterMap
 
 STRICT = ("-x", "c", "-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion")
@@ -168,6 +170,74 @@ def test_what_the_driver_says_is_what_the_golden_bank_says(tmp_path: Path) -> No
     assert min(one["position"] for one in shown) < 0
     for name in ("interval", "age", "velocity_lower", "velocity_upper", "updated"):
         assert any(one[name] for one in shown), name
+
+
+_WRITES = """
+#include <inttypes.h>
+#include <stdio.h>
+#include "spindle_driver.h"
+static uint32_t reads(void *context, uint32_t offset) {
+  (void)context;
+  (void)offset;
+  return SPINDLE_CONTROL_HOLD_MASK;
+}
+static void writes(void *context, uint32_t offset, uint32_t value) {
+  (void)context;
+  printf("%" PRIu32 " %" PRIu32 "\\n", offset, value);
+}
+int main(void) {
+  const struct spindle_bus bus = {reads, writes, 0};
+CALLS
+  return 0;
+}
+"""
+WRITTEN = [
+    ("preset", -5 - (1 << 33)),
+    ("modulo_offset", 1999),
+    ("probe_arm", 2),
+    ("probe_edges", 9),
+    ("compare_next", 7),
+]
+
+
+def test_what_is_written_in_c_is_what_the_client_in_python_writes(tmp_path: Path) -> None:
+    texts = {"ppr": "500", "preset": "5", "position-width": "40", "index": "yes", "index-once": "yes", "probe": "2"}
+    spec = of_texts("s", texts | {"position-modulo": "rev", "health": "yes", "compare": "list:3:2clk"})
+    registers = RegisterMap(spec)
+    places = {one.name: one.offset for one in registers}
+    calls = [f"  spindle_write_{name}(&bus, {value});" for name, value in WRITTEN]
+    calls += [f"  spindle_{name}(&bus);" for name in ("preset", "home", "clear")]
+    files = {**register_files(registers, NAME), "main.c": _WRITES.replace("CALLS", "\n".join(calls))}
+    for file, text in files.items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    build.run([*build.compiler(), *STRICT, "main.c", "-o", "main"], "compiler", tmp_path)
+    lines = build.run([tmp_path / "main"], "main").splitlines()
+    words = {places["IDENTIFICATION"]: registers["IDENTIFICATION"].reset, places["CONTROL"]: 2}
+    words |= {places["CONFIGURATION"]: registers.configuration}
+    done: list[tuple[int, int]] = []
+    described = manifest(spec, "spindle") | {"registers": registers.described()}
+    client = Client(words.__getitem__, lambda offset, value: done.append((offset, value)), described)
+    for name, value in WRITTEN:
+        client.write(name.upper(), value)
+    for name in ("preset", "home"):
+        client.control(name)
+    client.clear()
+    assert [tuple(map(int, line.split())) for line in lines] == done
+    assert done[:3] == [
+        (places["PRESET_LOW"], 0xFFFFFFFB),
+        (places["PRESET_HIGH"], 0xFFFFFFFD),
+        (places["MODULO_OFFSET"], 1999),
+    ]
+    assert done[-3:] == [(places["CONTROL"], bit | 2) for bit in (4, 8, 1)]
+    most = (1 << 39) - 1
+    for name, value, error in (
+        ("PRESET", most + 1, f"PRESET must be from {-most - 1} to {most}, not {most + 1}"),
+        ("MODULO_OFFSET", 2000, "MODULO_OFFSET must be from 0 to 1999, not 2000"),
+        ("PROBE_EDGES", 16, "PROBE_EDGES must be from 0 to 15, not 16"),
+        ("VELOCITY", 0, "there is no register 'VELOCITY' that is written"),
+    ):
+        with pytest.raises((ValueError, KeyError), match=re.escape(error)):
+            client.write(name, value)
 
 
 # A word of a driver's unit in rad/s, from school.

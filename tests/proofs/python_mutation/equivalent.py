@@ -282,7 +282,7 @@ _argue(
     *("1 → 2", "8 → 9"),
 )
 _argue("spec/registers/buses.py: ", "32 // 7 is 4, as 32 // 8 is.", *("8 → 7 #2", "8 → 7 #3"))
-_argue("hdl/export/registers/values.py: CapturedValue.joined", "Of one word the last is the first.", "0 → -1")
+_argue("hdl/export/registers/values.py: Value.joined", "Of one word the last is the first.", "0 → -1")
 _argue("hdl/export/registers/rdl.py: described", "No word of a text is as long as a line.", "False → True")
 _argue(
     "sim/golden/output.py: in_unit",
@@ -317,7 +317,7 @@ _argue(
 _argue(f"{_RAIRAN}: Model._regime", "It is only asked whether it is 1.", "0 → -1")
 
 _argue("spec/methods/axes.py: nearest_ticks", "No tick of one clock has a turn of an axis.", "0 → 1")
-_argue("hdl/export/registers/values.py: CapturedValue.field", "A register of a value has one field.", "0 → -1 #2")
+_argue("hdl/export/registers/values.py: Value.field", "A register of a value has one field.", "0 → -1 #2")
 _argue("spec/methods/mt.py: MTForm.max_interval", "A window takes a period at least anyway.", "0 → -1")
 for _where in ("_narrowest", "_fewest"):
     _argue(f"spec/formats/reciprocal.py: {_where}", "There are as many fractions as divisors.", "True → False")
