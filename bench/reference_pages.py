@@ -35,6 +35,18 @@ EVERYTHING: dict[str, str | None] = {
     "velocity-width": "20",
 }
 EXTERNAL = {"external-tick": "yes"}
+# What counts on positions, and watches.
+PLACE = {
+    "ppr": "500",
+    "index": "yes",
+    "index-once": "yes",
+    "preset": "0",
+    "position-modulo": "rev",
+    "probe": "1",
+    "compare": "list:8:1us",
+    "health": "yes",
+    "over-speed": "100rad/s",
+}
 # The core whose registers are shown: that of docs/guides/integration.md.
 SPEED = {
     "ppr": "2500",
@@ -51,6 +63,15 @@ SPEED = {
 _HEADER = ["port", "when", "kind", "meaning"]
 _LOOP = LoopSpec(tachometer=of_texts("s", {"ppr": "500", "max-speed": "1000rad/s"}))
 _STREAM = of_texts("track", {"ppr": "500", "max-speed": "1000rad/s", "stream": "axi"})
+_OF_PLACES = f"""
+## Of positions and of health
+
+The tables are of `{" ".join(f"--{name}" + f" {text}" * (text != "yes") for name, text in PLACE.items())}`,
+where offsets are other ones than those above. In C each register that is written has a function, such as
+`NAME_write_preset` and `NAME_write_probe_arm`, and fields of CONTROL have `NAME_preset`, `NAME_home` and `NAME_clear`.
+In Python these are `client.write("PRESET", -5)` and `client.control("home")`.
+
+"""
 _INTERRUPT = """
 ## An interrupt
 
@@ -356,20 +377,32 @@ def registers() -> str:
     instead = [one for one in generating if one.name not in known]
     with_irq = RegisterMap(of_texts("s", SPEED | {"index": "yes", "health": "yes", "over-speed": "3000rpm"}), irq=True)
     interrupting = [one for one in with_irq if one.name.startswith("INTERRUPT")]
-    of_all, of_irq, of_loop, of_generator = (
+    alone = {one.name for one in RegisterMap(of_texts("s", {"ppr": "500"}))} - {"CONTROL", "STATUS"}
+    placing = [one for one in RegisterMap(of_texts("s", PLACE)) if one.name not in alone]
+    of_all, of_place, of_irq, of_loop, of_generator = (
         re.sub("^## ", "### ", tables(each), flags=re.MULTILINE)
-        for each in (RegisterMap(of_texts("s", SPEED)), interrupting, added, instead)
+        for each in (RegisterMap(of_texts("s", SPEED)), placing, interrupting, added, instead)
     )
     end = "\nWith `--command generator` there are these instead of the commands, and the others behind them.\n\n"
     return (
-        _REGISTERS.replace("@BUSES@", buses) + of_all + _INTERRUPT + of_irq + _OF_LOOPS + of_loop + end + of_generator
+        _REGISTERS.replace("@BUSES@", buses)
+        + of_all
+        + _OF_PLACES
+        + of_place
+        + _INTERRUPT
+        + of_irq
+        + _OF_LOOPS
+        + of_loop
+        + end
+        + of_generator
     )
 
 
 def _cores(method: str) -> list[TachometerSpec]:
     """Return cores that have among them every port of a method."""
     everything = EVERYTHING if METHODS[method].facts.bounds else EVERYTHING | {"bounds": None}
-    cores = [of_texts(method, everything)]
+    cores = [of_texts(method, everything), of_texts(method, PLACE)]
+    cores.append(of_texts(method, {name: PLACE[name] for name in ("ppr", "index", "health")}))
     if not METHODS[method].facts.own_ticks:
         cores.append(of_texts(method, everything | EXTERNAL))
     if method == "rairan":
