@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 from support.lockstep import random_case
 from support.rdl import read_rdl
 from support.simulate import clock_by_clock
@@ -21,7 +22,7 @@ from tachometry.spec.registers.map import RegisterMap
 
 # Among them every register and every field shows something else than after reset.
 CASES = [("rairan", 6), ("m", 21), ("s", 1), ("rairan", 9), ("m", 1), ("s", 5), ("t", 5)]
-WIDE = ("m", 1)  # its velocity takes two registers
+WIDE = ("m", 1)  # its velocity takes two registers, and its index is anywhere
 BACKWARD = ("s", 5)  # its positions take two registers, and a turn is wrong by less than 0
 CLOCKS, ROUND = 2400, 160
 ONES = (1 << 32) - 1
@@ -31,7 +32,10 @@ ONES = (1 << 32) - 1
 def case(method: str, seed: int) -> tuple[RegisterMap, PinTrace, list[dict[str, int]]]:
     """Return a random core, its pins, and these as rows of clocks."""
     spec, _, trace = random_case(seed, method)
-    spec = replace(spec, velocity_width=40) if (method, seed) == WIDE else spec
+    if (method, seed) == WIDE:
+        spec = replace(spec, velocity_width=40)
+        toggles = np.random.default_rng(seed).random(len(trace.clock)) < 0.2
+        trace = replace(trace, z=(np.cumsum(toggles) & 1).astype(np.uint8))
     if (method, seed) == BACKWARD:
         spec = replace(spec, position_width=40, encoder=replace(spec.encoder, reverse=not spec.encoder.reverse))
     n_clocks = min(trace.n_clocks, CLOCKS)
