@@ -380,3 +380,10 @@ _argue(
     "A velocity of 1 is far below what is shown.",
     "0 → 1 #3",
 )
+_argue("hdl/export/kit.py: _bench", "The smoke test only holds its pins for longer.", "min → max")
+_argue("spec/formats/tracking_code.py: _longest_of", "No way of one count is longer than that of two.", "1 → 0")
+_argue(
+    "sim/golden/tooth_wheel.py: filled",
+    "The first tooth leaves nothing known either way, and a period is not read before it is.",
+    "0 → -1",
+)

@@ -268,6 +268,8 @@ def test_a_tracking_core_has_no_filter() -> None:
     (told,) = (about for about in options_of(LoopSpec) if about.field == "velocity_filter")
     assert told.parse is not None
     assert [told.parse("x", text) for text in ("none", " NONE ", "40rad/s")] == [0, 0, 40]
+    with pytest.raises(ParameterError, match=r"^x must be greater than 0, not 0$"):
+        told.parse("x", "0rad/s")
     assert replace(LoopSpec(tachometer=CORE), observer=Fraction(80)).period == 960
 
 
