@@ -106,8 +106,9 @@ def test_every_option_is_in_the_manifest(tmp_path: Path) -> None:
     assert manifest["external_tick_cycles"] == {"min": manifest["external_tick_cycles"]["min"], "max": 1440}
     inputs = [port["name"] for port in manifest["ports"] if port["direction"] == "input"]
     assert inputs == ["clk", "rst", "a", "b", "z", "tick_in"]
-    options_of_output = ["velocity_overflow", "index_valid", "index_position", "tick_error", "swallowed_edges"]
-    assert [port["name"] for port in manifest["ports"]][-5:] == options_of_output
+    of_index = ["index_valid", "index_wide", "index_missed", "index_position"]
+    options_of_output = ["velocity_overflow", *of_index, "tick_error", "swallowed_edges"]
+    assert [port["name"] for port in manifest["ports"]][-7:] == options_of_output
 
 
 def test_lsb_and_fraction_bits_are_two_words_for_one_thing(tmp_path: Path) -> None:
