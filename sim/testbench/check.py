@@ -210,7 +210,8 @@ def _again(spec: AnySpec, name: str, vectors: Path) -> dict[str, str]:
                 for pin, row in lines.items()
             }
             of_axis.setdefault("b", np.zeros(len(clock), dtype=np.uint8))  # of a sensor of one line
-            traces.append(PinTrace.of_lines(clock, int(there["clocks"]), of_axis))
+            trace = PinTrace.of_lines(clock, int(there["clocks"]), of_axis)
+            traces.append(trace.completed(spec.tachometer))
         return bench_of(spec, name, traces)
     except (ValueError, KeyError, TypeError, IndexError, OverflowError, MemoryError):
         return cocotb_bench(spec, name)  # it is none that was made for this core

@@ -61,6 +61,13 @@ def test_what_is_generated_is_right_and_a_change_of_any_file_is_found(core: str,
         path.write_bytes(before)
 
 
+def test_a_bench_of_a_motion_is_that_of_inputs_that_a_program_writes(generated: Generated) -> None:
+    options = "s --probe 2 --compare list:2:1ms --testbench cocotb --motion constant:9rad/s:30ms"
+    folder = generated("core", *f"{SMALL} {options}".split())
+    make = Make(cache(export), targets_for, ci_files, file_names)
+    assert check(folder / "core.json", make, simulation=False).right
+
+
 def test_a_motion_that_is_not_the_one_that_was_written_is_found(generated: Generated) -> None:
     """Even one that gives the same outputs."""
     folder = generated("core", *CORES["external ticks"].split())
