@@ -48,7 +48,9 @@ def test_without_an_index_or_an_external_tick_there_are_no_rows() -> None:
 
 
 def core() -> TachometerSpec:
-    return of_texts("s", {"ppr": "8", "clock": "1MHz", "tick": "10clk", "max-time": "100clk", "index": "yes"})
+    return of_texts(
+        "s", {"ppr": "8", "clock": "1MHz", "tick": "10clk", "max-time": "100clk", "index": "yes", "index-at": "edge"}
+    )
 
 
 def test_a_run_is_read_from_the_ports() -> None:
