@@ -16,8 +16,8 @@ def test_a_capture_keeps_index_and_tick(tmp_path: Path, capsys: pytest.CaptureFi
     files = ["--save-capture", captured, "--trace", tmp_path / "1.csv", "--vcd", tmp_path / "x.vcd"]
     assert run("simulate", *CORE, *LINES, *unit, *motion, *files) == 0
     told = " ".join(capsys.readouterr().out.split())
-    # Upwards at 96 counts, which is then 0, and there again on the way back.
-    assert " index 2 times, the last at position 0, 0 counts apart " in told
+    # Upwards at 2 counts and a turn further, which is then 0, and there again on the way back.
+    assert " index 3 times, the last at position 0, 0 to 96 counts apart " in told
     assert " counts in 96 counts out 96 " in told
     assert " tick errors 0 (external tick too early or missing) " in told
     assert " velocity overflow " in told  # 600 rpm are 4800 LSB, and twelve bits hold 2047
