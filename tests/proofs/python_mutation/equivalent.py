@@ -336,11 +336,6 @@ _argue(
     "The error is held within ±(2^k − 1), and 2^k + 1 has as many bits as 2^k.",
     "1 → 2",
 )
-_argue(
-    "spec/control/form.py: decay",
-    "Coefficients have 40 bits at most, and one digit of e^−x more or less in 60 does not change them.",
-    *("70 → 71", "70 → 69"),
-)
 _argue("spec/control/form.py: extra_bits", "No c(1) is more than 1, so 4/c(1) is 4 at least.", "2 → 1")
 _argue(
     "spec/control/form.py: ControlForm.most_error",
