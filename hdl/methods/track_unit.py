@@ -122,7 +122,7 @@ class Unit(wiring.Component):
 
 
 class QuickUnit(Unit):
-    """A multiplier of the FPGA, and a barrel shifter in two stages; `tracking_code.QUICK` has its times."""
+    """A multiplier for half a word, and a barrel shifter in two stages; `tracking_units.QUICK` has their times."""
 
     def _work(self, m: Module) -> None:
         bits, doing, how = self._bits, self.doing, self.how_done
@@ -135,25 +135,33 @@ class QuickUnit(Unit):
         by_power = Mux(places[-1] | ~places.any(), 1, places[:6] | nothing.replicate(6))
         by_product = (named + _LOW - self.places)[:6]
         by_shift = Mux(how == BY_FACTOR, self.places, named)
-        # What is shifted.
         size = (self.sum ^ ((doing == Start.LOG) & self.sum[-1]).replicate(WIDTH))[:WIDTH]
         left = Signal(3)
         last = Signal(Start)
         latencies = Array(C(max(getattr(self._program.times, item.name.lower(), 1) - 1, 0), 3) for item in Start)
         m.d.comb += self.busy.eq(left.any())
         m.d.sync += [left.eq(Mux(left.any(), left - 1, latencies[self.start])), last.eq(doing)]
-        # A product; or a power, a clock later, so that its last bit is that of 2^36.
+        # A product, of the lower half of the word and then of the upper; or a power: its last bit is that of 2^36.
+        half = WIDTH // 2
         product = Signal(signed(WIDTH + bits), reset_less=True)
         distance = Signal(6, reset_less=True)
-        multiplied = last == Start.TIMES
-        raised = Signal()
+        low, carried = Signal(half, reset_less=True), Signal(bits, reset_less=True)
+        upper = Signal(signed(half), reset_less=True)
+        begins = doing == Start.TIMES
+        part = Mux(begins, self.sum[:half], upper) * self.factor
+        ready, multiplied = Signal(), Signal()
         power = Cat(C(0, CHANCE_BITS + RESULT_BITS - POWER_BITS - _LOW), self.table.data[:POWER_BITS], C(1, 1))
-        m.d.sync += [raised.eq(last == Start.EXP), product.eq(Mux(last == Start.EXP, power, self.sum * self.factor))]
-        with m.If((doing == Start.TIMES) | (doing == Start.EXP)):
+        m.d.sync += [
+            Cat(low, carried).eq(Mux(begins, part, 0)),
+            upper.eq(self.sum[half:]),
+            product.eq(Mux(last == Start.EXP, power, Cat(low, part + carried).as_signed())),
+            multiplied.eq(last == Start.TIMES),
+            ready.eq((last == Start.TIMES) | (last == Start.EXP)),
+        ]
+        with m.If(begins | (doing == Start.EXP)):
             m.d.sync += distance.eq(Mux(doing == Start.EXP, by_power, by_product))
         # First stage: by 32, 16 and 8.
         finds, factor = (doing == Start.LOG) | (doing == Start.BY), doing == Start.BY
-        ready = multiplied | raised
         value = Signal(signed(width))
         places = Signal(6)
         begin = bits - 1 - CHANCE_BITS  # from here on a factor is too large
@@ -184,7 +192,7 @@ class QuickUnit(Unit):
         ]
         ranges = (second[place : place + 8] for place in (bits - 1, CHANCE_BITS))
         last_places = Mux(second_finds, self.highest([*Mux(second_factor, *ranges)]), rest[:3])
-        shifted = self.shifted(m, second, last_places, (2, 1, 0))
+        shifted = self.shifted(m, second, last_places, (0, 1, 2))
         whole = Cat(last_places[:3], rest[3:])
         with m.If(second_factor):
             m.d.sync += [self.factor.eq(shifted), self.places.eq(whole)]
@@ -264,9 +272,8 @@ class SmallUnit(Unit):
         steps = Signal(range(small.digits + 1), reset_less=True)
         pairs = Signal(signed(6), reset_less=True)  # of places that it went; below 0 those that it is still to go
         names = ("log", "factor", "product", "read", "doubled", "nothing")
-        is_log, is_factor, is_product, is_read, doubled, nothing = (
-            Signal(name=f"is_{name}", reset_less=True) for name in names
-        )
+        flags = (Signal(name=f"is_{name}", reset_less=True) for name in names)
+        is_log, is_factor, is_product, is_read, doubled, nothing = flags
         seeks = is_log | is_factor
         begins = (doing != Start.NONE) & (doing != Start.CHANCE)
         reads, adds, shifts = (state == item for item in (State.READS, State.ADDS, State.SHIFTS))
@@ -313,7 +320,6 @@ class SmallUnit(Unit):
         m.d.comb += total.eq((Cat(C(1, 1), work[low:]).as_signed() + Cat(minus, addend).as_signed()) >> 1)
         # Where it goes.
         by_8, by_2, ends, large = (Signal(name=name) for name in ("by_8", "by_2", "ends", "large"))
-        # A factor ends below `bits`, a logarithm at bit 8; both ask for what is far beyond, so that is told once.
         far = work[bits + 7 :].any()
         beyond_8 = (seeks & far) | (is_log & work[CHANCE_BITS + 8 : bits + 7].any())
         beyond_2 = (seeks & (far | work[bits + 1 : bits + 7].any())) | (is_log & work[CHANCE_BITS + 2 : bits + 1].any())
@@ -359,7 +365,6 @@ class SmallUnit(Unit):
             m.d.sync += operand.eq(Cat(C(0, small.table_place), table[:POWER_BITS], C(1, 1)))
         with m.Elif(begins):
             m.d.sync += operand.eq(self.sum)
-        # What comes out.
         with m.If(ends & ~is_log):
             m.d.sync += self.up.eq((work[:CHANCE_BITS] + self.chance)[-1] & ~large)
         with m.If(ends & is_factor):

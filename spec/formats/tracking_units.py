@@ -54,7 +54,7 @@ class Times:
         return getattr(self, start.name.lower(), 0)
 
 
-QUICK = Times(log=4, exp=5, over=3, gain=3, by=2, times=4)
+QUICK = Times(log=4, exp=5, over=3, gain=3, by=2, times=5)
 
 
 @dataclass(frozen=True)
