@@ -161,8 +161,9 @@ class TrackMachine(wiring.Component):
         coming, valid = data.View(layout, fetch.data), fetched
         address, word = self._at(self._chosen(m, coming.word)), read.data
         if program.times.stages > 1:
-            m.d.sync += (held := Signal.like(Value.cast(address), reset_less=True)).eq(Mux(hold, held, address))
-            m.d.sync += (word := Signal(signed(WIDTH), reset_less=True)).eq(Mux(hold, word, read.data))
+            held = Signal.like(Value.cast(address), reset_less=True)
+            word = Signal(signed(WIDTH), reset_less=True)
+            m.d.sync += [held.eq(Mux(hold, held, address)), word.eq(Mux(hold, word, read.data))]
             address = held
         m.d.comb += [
             place.eq(Mux(taken, Cat(now.how, now.store), pc)),
@@ -173,7 +174,8 @@ class TrackMachine(wiring.Component):
             go.eq(active & ~hold),
         ]
         for _ in range(program.times.stages - 1):
-            following, follows = Signal(layout, reset_less=True), Signal()
+            following = Signal(layout, reset_less=True)
+            follows = Signal()
             with m.If(~hold):
                 m.d.sync += [following.eq(coming), follows.eq(valid & ~taken & ~stop)]
             coming, valid = following, follows

@@ -145,11 +145,13 @@ class QuickUnit(Unit):
         half = WIDTH // 2
         product = Signal(signed(WIDTH + bits), reset_less=True)
         distance = Signal(6, reset_less=True)
-        low, carried = Signal(half, reset_less=True), Signal(bits, reset_less=True)
+        low = Signal(half, reset_less=True)
+        carried = Signal(bits, reset_less=True)
         upper = Signal(signed(half), reset_less=True)
         begins = doing == Start.TIMES
         part = Mux(begins, self.sum[:half], upper) * self.factor
-        ready, multiplied = Signal(), Signal()
+        ready = Signal()
+        multiplied = Signal()
         power = Cat(C(0, CHANCE_BITS + RESULT_BITS - POWER_BITS - _LOW), self.table.data[:POWER_BITS], C(1, 1))
         m.d.sync += [
             Cat(low, carried).eq(Mux(begins, part, 0)),

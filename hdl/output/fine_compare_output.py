@@ -62,7 +62,9 @@ class FineCompareOutput(CompareOutput):
             with m.If(catching <= carrying.adds):
                 m.d.sync += late.eq(late + (new << FASTER_BITS))
         # What moved the position since the tick before is of the next tick, and of its update.
-        moved, of_tick, of_update = Signal(), Signal(), Signal()
+        moved = Signal()
+        of_tick = Signal()
+        of_update = Signal()
         m.d.sync += moved.eq(self.moves | (moved & ~self.tick))
         with m.If(self.tick):
             m.d.sync += of_tick.eq(moved)
