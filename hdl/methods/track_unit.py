@@ -1,8 +1,7 @@
 """The unit of the tracking machine: products, logarithms, powers and shifts; one that is quick, and one that is small.
 
 Both shift to the right alone. What is shifted has 8 bits below the LSB of the result, which decide how it is rounded. A
-logarithm is the number of places until the leading one is at bit 8, and a table of what is behind it. A power is a
-number from a table, shifted.
+logarithm has the places until the leading one is at bit 8, and a table of what is behind; a power is of a table.
 """
 
 from collections.abc import Sequence
@@ -79,13 +78,12 @@ class Unit(wiring.Component):
         m = Module()
         self.doing = Signal(Start)
         self.how_done = Signal(HOW_BITS)
-        doing, how = self.doing, self.how_done
-        m.d.sync += [doing.eq(self.start), how.eq(self.how)]
+        m.d.sync += [self.doing.eq(self.start), self.how_done.eq(self.how)]
         # The number of the event, its bits reversed.
         self.chance = Signal(CHANCE_BITS)
         with m.If(self.begin):
             m.d.sync += self.chance.eq(1 << CHANCE_BITS - 1)
-        with m.Elif(doing == Start.CHANCE):
+        with m.Elif(self.doing == Start.CHANCE):
             m.d.sync += self.chance.eq(Cat(reversed(self.sum[:CHANCE_BITS])))
         values = self._program.tables
         m.submodules.tables = tables = Memory(shape=TABLE_BITS, depth=1 << (len(values) - 1).bit_length(), init=values)
@@ -94,7 +92,7 @@ class Unit(wiring.Component):
         place = (~self.sum)[_GAIN_LOW : _GAIN_LOW + 9]
         beyond = place[8] | (place[7] & place[5:7].any())  # beyond the last
         gain = Mux(beyond, GAINS_FROM - 1, place[: GAINS.bit_length() - 1])
-        self.gain_address = Cat(gain, (how[:2] + (len(values) - 3 * GAINS) // GAINS)[:3])
+        self.gain_address = Cat(gain, (self.how_done[:2] + (len(values) - 3 * GAINS) // GAINS)[:3])
         self.power_address = self.sum[LOG_BITS - EXP_INDEX : LOG_BITS]
         self.whole = self.sum[LOG_BITS : LOG_BITS + 9].as_signed()
         shifts = self._program.shifts
