@@ -60,7 +60,7 @@ class Compare:
         if found is None:
             form = (
                 "must be START:STEP:COUNT:WIDTH, such as 100:100:50:10us, or 100:100:50:10us:backward for positions "
-                "that go down by STEP, or :both, or list:DEPTH:WIDTH, such as list:64:10us"
+                "that go down by STEP, or :both, with :fine behind all that, or list:DEPTH:WIDTH, such as list:64:10us"
             )
             raise ParameterError(what, f"{form}, not {text!r}")
         start, step, count, depth, width, direction, fine = found.groups()
@@ -126,10 +126,10 @@ class Compare:
         one = 1 << FINEST_BITS if self.fine else 1
         half = one << position_width - 1
         clocks = self.clocks(clock_hz)
+        if self.fine and (self.depth or self.direction == BOTH):
+            raise ParameterError("compare", "must not be fine with :both or a list: type 100:12.5:0:10us:fine")
         if self.fine and fine_bits is None:
             raise ParameterError("compare", "must not be fine with this method: position_fine is of --method track")
-        if self.fine and (self.depth or self.direction == BOTH):
-            raise ParameterError("compare", "must have START:STEP:COUNT:WIDTH and one direction to be fine")
         if self.fine and fine_bits is not None and (self.start | self.step) % (1 << FINEST_BITS - fine_bits):
             raise ParameterError("compare", f"must have START and STEP in multiples of 2^-{fine_bits}, see --fine-bits")
         ranges = (
