@@ -13,7 +13,7 @@ from tachometry.boards.host.demo import DemoBoard
 from tachometry.boards.host.link import NoAnswer
 from tachometry.sim.golden.emulator import Change, GoldenEmulator
 from tachometry.sim.golden.registers import Access, GoldenBank
-from tachometry.spec.registers.demo import DemoMap
+from tachometry.spec.registers.demo import DemoMap, emulated
 from tachometry.spec.registers.emulator import EmulatorSettings, fastest, rate_of, speed_of
 
 _EVENTS = ("updated", "indexed")  # flags that say what was between two captures
@@ -191,9 +191,7 @@ def _compared(
     captured = [(number, register) for number, register in enumerate(registers) if register.captured]
     at = [register.name for _, register in captured].index("TIME")
     n_clocks = max(words[at] for words in seen) + 1
-    index = spec.encoder.pulses_per_rev if spec.index else None
-    emulator = GoldenEmulator(index, spec.index_place, spec.complemented)
-    trace = emulator.trace(changes, n_clocks)
+    trace = GoldenEmulator(*emulated(spec)).trace(changes, n_clocks)
     if spec.external_tick:
         trace = trace.with_tick_in(np.arange(1, n_clocks, spec.timing.tick_cycles))
     bank = GoldenBank(registers, trace)

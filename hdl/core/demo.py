@@ -11,7 +11,7 @@ from tachometry.hdl.core.register_core import RegisterCore
 from tachometry.hdl.wires.ports import follow, hand_through, members
 from tachometry.hdl.wires.synchronizer import Synchronizer
 from tachometry.spec.registers.buses import CAPTURE, Bus
-from tachometry.spec.registers.demo import ENCODER_LINES, PERIOD_WIDTH, DemoMap, demo_ports
+from tachometry.spec.registers.demo import ENCODER_LINES, PERIOD_WIDTH, DemoMap, demo_ports, emulated
 from tachometry.spec.registers.field import WORD
 
 
@@ -37,8 +37,7 @@ class Demo(wiring.Component):
         self._map = registers
         self.core = RegisterCore(registers)
         self._lines = [pin.name for pin in spec.ports.pins if pin.name in ENCODER_LINES]
-        index = spec.encoder.pulses_per_rev if spec.index else None
-        self.emulator = EncoderEmulator(index, spec.index_place, spec.complemented)
+        self.emulator = EncoderEmulator(*emulated(spec))
         self.bridge = bridge_on(registers, bus)
         self.telemetry: TelemetrySender | None = None
         if isinstance(self.bridge, UartBridge):

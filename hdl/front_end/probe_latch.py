@@ -107,9 +107,8 @@ class ProbeLatch(wiring.Component):
         ]
         latched = {"position": self.position, "time": since}
         if self._age_width:
-            age = Signal(
-                self._age_width, init=-1
-            )  # of what was shown in the clock before, to an edge that is known now
+            # Of what was shown in the clock before, to an edge that is known now.
+            age = Signal(self._age_width, init=-1)
             shown = Mux(self.update, self._update_latency + 1 - self._latency, age + ~age.all())
             m.d.sync += age.eq(shown)
             latched |= {"fine": self.fine, "age": shown}

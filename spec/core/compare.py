@@ -126,12 +126,14 @@ class Compare:
         one = 1 << FINEST_BITS if self.fine else 1
         half = one << position_width - 1
         clocks = self.clocks(clock_hz)
-        if self.fine and (self.depth or self.direction == BOTH):
-            raise ParameterError("compare", "must not be fine with :both or a list: type 100:12.5:0:10us:fine")
-        if self.fine and fine_bits is None:
-            raise ParameterError("compare", "must not be fine with this method: position_fine is of --method track")
-        if self.fine and fine_bits is not None and (self.start | self.step) % (1 << FINEST_BITS - fine_bits):
-            raise ParameterError("compare", f"must have START and STEP in multiples of 2^-{fine_bits}, see --fine-bits")
+        if self.fine:
+            if self.depth or self.direction == BOTH:
+                raise ParameterError("compare", "must not be fine with :both or a list: type 100:12.5:0:10us:fine")
+            if fine_bits is None:
+                raise ParameterError("compare", "must not be fine with this method: position_fine is of --method track")
+            if (self.start | self.step) % (1 << FINEST_BITS - fine_bits):
+                grid = f"multiples of 2^-{fine_bits}, see --fine-bits"
+                raise ParameterError("compare", f"must have START and STEP in {grid}")
         ranges = (
             ("start", self.start, -half, half - 1),
             ("step", self.step, 1, half - 1),

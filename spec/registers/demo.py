@@ -30,6 +30,13 @@ LEDS = 4
 PERIOD_WIDTH = 16  # bits of the telemetry's period
 
 
+def emulated(spec: TachometerSpec) -> tuple[int | None, int, tuple[str, ...]]:
+    """Return what the emulator of a core's encoder has: pulses per revolution if there is an index, the quarter in
+    which that is high, and the lines that come with their complements.
+    """
+    return spec.encoder.pulses_per_rev if spec.index else None, spec.index_place, spec.complemented
+
+
 @dataclass(frozen=True)
 class DemoMap(RegisterMap):
     """Holds all registers of a demo.
