@@ -8,15 +8,15 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
+from gain_figure import Found, save_usable_gains
+from gate_check import check
 from pages import markdown, write_block
+from usable_gain import IDEAL, KINDS, REAL, TASK, TICKS, setting, usable, variants
 
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.engines.loop import Observer
 from tachometry.sim.figures.tsuji_loops import SOLUTIONS, Cosine, deviation, solution
-from tachometry.sim.plots.usable_gain import Found, save_usable_gains
 from tachometry.sim.studies.loops.control import Outcome, Task, each_seed, mean, outcome_of
-from tachometry.sim.studies.loops.gate_check import check
-from tachometry.sim.studies.loops.usable_gain import IDEAL, KINDS, REAL, TASK, TICKS, setting, usable, variants
 
 DISCS = {"ideal disc": IDEAL, "real disc": REAL}
 SLOW = {

@@ -10,6 +10,7 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 
+from motions import OTHERS, SITUATIONS, Situation
 from pages import markdown
 
 from tachometry.cli.options.methods import listed_methods
@@ -17,7 +18,6 @@ from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.comparing.baselines import Steps
 from tachometry.sim.studies.comparing.compare import Curve, common_instants, core_curve
 from tachometry.sim.studies.comparing.rivals import BASELINES, settings, steps_curve
-from tachometry.sim.studies.comparing.situations import OTHERS, SITUATIONS, Situation
 from tachometry.sim.studies.comparing.tune import TUNED, core_settings, error_of
 from tachometry.spec import TachometerSpec, of_texts
 

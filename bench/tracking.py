@@ -6,12 +6,12 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from motions import OTHERS, REAL, SITUATIONS, Situation
 from pages import markdown, write_block
 from situations import Cell, core
 
 from tachometry.sim import golden
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.sim.studies.comparing.situations import OTHERS, REAL, SITUATIONS, Situation
 
 # What the recursion has in floating point with seeds 301 to 310, in rad/s, at each tick; the rest is rounding alone.
 IN_FLOAT = {

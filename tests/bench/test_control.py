@@ -4,11 +4,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from gate_check import Checked
 from support.script import load
+from usable_gain import KINDS, TICKS
 
 from tachometry.sim.studies.loops.control import Outcome
-from tachometry.sim.studies.loops.gate_check import Checked
-from tachometry.sim.studies.loops.usable_gain import KINDS, TICKS
 
 bench = load("control")
 

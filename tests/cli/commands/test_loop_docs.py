@@ -9,6 +9,7 @@ import click
 import pytest
 from support import command, docs
 from support.nightly import nightly, only
+from usable_gain import GAINS, KINDS, REAL, is_usable, setting, variants
 
 from tachometry.cli.commands.loop import loop
 from tachometry.cli.options.closed_loop import loop_options
@@ -17,7 +18,6 @@ from tachometry.cli.options.settings import of_command_line
 from tachometry.cli.options.sweep import by_name
 from tachometry.sim.engines.loop import Observer
 from tachometry.sim.studies.loops.control import Outcome, outcome_of, simulation_of
-from tachometry.sim.studies.loops.usable_gain import GAINS, KINDS, REAL, is_usable, setting, variants
 
 PAGE = docs.page("concepts/control.md")
 MEASURED = docs.page("measured/control.md")

@@ -6,7 +6,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from gate_check import check
 from support.nightly import nightly
+from usable_gain import KINDS, MOTOR, REAL, setting
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
@@ -15,8 +17,6 @@ from tachometry.sim.engines.loop import Log, Observer
 from tachometry.sim.golden.command_generator import Command
 from tachometry.sim.golden.control import Control, run_loop
 from tachometry.sim.studies.loops.control import Load, Outcome, Task, edges_of, in_gates, simulation_of
-from tachometry.sim.studies.loops.gate_check import check
-from tachometry.sim.studies.loops.usable_gain import KINDS, MOTOR, REAL, setting
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.language.option import ParameterError
 

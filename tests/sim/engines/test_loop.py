@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from usable_gain import KINDS, MOTOR, REAL, core, setting
 
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines.loop import Course, FloatArray, Gains, Log, LoopSimulation, Motor, Observer
 from tachometry.sim.studies.loops.control import edges_of, simulation_of
-from tachometry.sim.studies.loops.usable_gain import KINDS, MOTOR, REAL, core, setting
 from tachometry.spec.language.option import ParameterError
 
 S_CORE = core(KINDS[0], 20e-6)

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from motions import REAL
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
-from tachometry.sim.studies.comparing.situations import REAL
 from tachometry.sim.studies.plan import CELLS, Plans
 from tachometry.sim.theory.performance import REAL_DISC
 from tachometry.spec import of_texts

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from motions import SITUATIONS, Situation
 from reference.tracker import Tracker
 from support.nightly import nightly, only
 from support.script import load
@@ -13,7 +14,6 @@ from support.tracking import core
 from tachometry.sim import golden
 from tachometry.sim.golden.front_end import decoded
 from tachometry.sim.signals.recording import PinTrace, quadrature
-from tachometry.sim.studies.comparing.situations import SITUATIONS, Situation
 
 SPEC = core(tick="100us", max_time="100ms", max_speed="1000rad/s")
 ROWS = {situation.name: situation for situation in SITUATIONS}

@@ -7,23 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import usable_gain
 from support.nightly import nightly
-
-from tachometry.sim.encoder.motion import parse_motion
-from tachometry.sim.engines.loop import Log, LoopSimulation, Observer
-from tachometry.sim.studies.loops import control, usable_gain
-from tachometry.sim.studies.loops.control import (
-    Load,
-    Outcome,
-    Setting,
-    Task,
-    as_shown,
-    each_seed,
-    mean,
-    outcome_of,
-    sound,
-)
-from tachometry.sim.studies.loops.usable_gain import (
+from usable_gain import (
     GAINS,
     IDEAL,
     KINDS,
@@ -34,6 +20,21 @@ from tachometry.sim.studies.loops.usable_gain import (
     setting,
     usable,
     variants,
+)
+
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.engines.loop import Log, LoopSimulation, Observer
+from tachometry.sim.studies.loops import control
+from tachometry.sim.studies.loops.control import (
+    Load,
+    Outcome,
+    Setting,
+    Task,
+    as_shown,
+    each_seed,
+    mean,
+    outcome_of,
+    sound,
 )
 from tachometry.spec.language.option import ParameterError
 

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from motions import OTHERS, SITUATIONS, Situation
 from support.command import run
 from support.nightly import only
 
 from tachometry.sim.studies.comparing.baselines import Steps
 from tachometry.sim.studies.comparing.compare import common_instants, rms_error
 from tachometry.sim.studies.comparing.rivals import steps_curve
-from tachometry.sim.studies.comparing.situations import OTHERS, SITUATIONS, Situation
 
 ALL = (*SITUATIONS, *OTHERS)
 
