@@ -36,37 +36,21 @@ FINE = Compare.parse("compare", "100.5:12.5:0:10us:fine")
 
 @dataclass(frozen=True)
 class Configuration:
-    """A core to be measured.
+    """A core to be measured."""
 
-    Parameters
-    ----------
-    name, what : str
-        Its name, and what distinguishes it, for the tables.
-    spec : TachometerSpec, AxesSpec or LoopSpec
-    bars : dict
-        Limits by target and figure: Fmax must reach its bar, everything else must not exceed it.
-    is_option : bool
-        Whether the difference from the first configuration is what one option costs.
-    bus : str
-        On which its registers are, or `none`.
-    demo : bool
-        With emulator and telemetry.
-    without_max_speed : str
-        Name of the configuration that differs only in that it has no greatest speed, if there is one.
-    after : str
-        Source of a script that changes the netlist, see `Target`.
-    """
-
+    # name and what: its name, and what distinguishes it, for the tables
     name: str
     what: str
     spec: AnySpec
+    # limits by target and figure: Fmax must reach its bar, everything else must not exceed it
     bars: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    is_option: bool = True
+    is_option: bool = True  # whether the difference from the first configuration is what one option costs
     targets: tuple[str, ...] = tuple(TARGETS)
-    bus: str = "none"
-    demo: bool = False
+    bus: str = "none"  # on which its registers are, or `none`
+    demo: bool = False  # with emulator and telemetry
+    # name of the configuration that differs only in that it has no greatest speed, if there is one
     without_max_speed: str = ""
-    after: str = ""
+    after: str = ""  # source of a script that changes the netlist, see `Target`
 
     @property
     def has_speed_bar(self) -> bool:

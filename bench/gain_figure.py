@@ -21,21 +21,13 @@ _ROWS = ("usable $k_v$ (1/s)", "dip under 0.2 Nm (rad/s)", "current above 50 Hz 
 
 @dataclass(frozen=True)
 class Found:
-    """Holds the greatest gain that is usable.
+    """Holds the greatest gain that is usable."""
 
-    Parameters
-    ----------
-    disc, name : str
-        What the encoder is, and how the loop is closed.
-    seconds : float
-        The control tick.
-    gain : float, 1/s
-    """
-
+    # disc and name: what the encoder is, and how the loop is closed
     disc: str
     name: str
-    seconds: float
-    gain: float
+    seconds: float  # the control tick
+    gain: float  # 1/s
     outcome: Outcome
 
 

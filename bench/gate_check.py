@@ -12,20 +12,11 @@ from tachometry.sim.studies.loops.control import Outcome, Setting, in_gates, sim
 
 @dataclass(frozen=True)
 class Checked:
-    """Holds a run in gates.
+    """Holds a run in gates."""
 
-    Parameters
-    ----------
-    ticks : int
-        Control ticks.
-    mismatches : int
-        Clocks, currents, filtered velocities and disturbances that differ from the golden model's.
-    gates, double : Outcome
-        Of this run, and of one with a controller in double precision.
-    """
-
-    ticks: int
-    mismatches: int
+    ticks: int  # control ticks
+    mismatches: int  # clocks, currents, filtered velocities and disturbances that differ from the golden model's
+    # gates and double: of this run, and of one with a controller in double precision
     gates: Outcome
     double: Outcome
 

@@ -50,25 +50,17 @@ TURN_S = 500 * PULSE_S
 
 @dataclass(frozen=True)
 class Example:
-    """A fault, its code, and the time within which it must be told.
+    """A fault, its code, and the time within which it must be told."""
 
-    Parameters
-    ----------
-    option, words : str
-        What the command line calls the fault, and how the time follows.
-    faulty, core : dict
-        Parameters of the encoder, and options of the core beside those of all.
-    onset : int
-        How many times the lines must have been wrong before the time begins.
-    """
-
+    # option and words: what the command line calls the fault, and how the time follows
     option: str
     code: Fault
     within_s: float
     words: str
+    # faulty and core: parameters of the encoder, and options of the core beside those of all
     faulty: dict[str, Any] = field(default_factory=dict)
     core: dict[str, str] = field(default_factory=dict)
-    onset: int = 0
+    onset: int = 0  # how many times the lines must have been wrong before the time begins
 
 
 def _wires() -> Iterator[Example]:

@@ -18,23 +18,13 @@ BAD = {"jitter": "0.1", "nonuniformity": "0.2", "phase-error": "20"}
 
 @dataclass(frozen=True)
 class Situation:
-    """Describes a row of the table of all situations.
-
-    Parameters
-    ----------
-    start : str
-        Errors before this time are left out.
-    faults : mapping of str to str
-        Of the encoder, by the options of the command line.
-    lines : int
-        Of the encoder; every edge counts.
-    """
+    """Describes a row of the table of all situations."""
 
     name: str
     motion: str
-    start: str
-    faults: Mapping[str, str]
-    lines: int = 500
+    start: str  # errors before this time are left out
+    faults: Mapping[str, str]  # of the encoder, by the options of the command line
+    lines: int = 500  # of the encoder; every edge counts
 
     @property
     def start_s(self) -> float:

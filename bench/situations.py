@@ -51,19 +51,11 @@ Errors = Mapping[str, float]  # rad/s, RMS, by the name of a method with its opt
 
 @dataclass(frozen=True)
 class Cell:
-    """A setting in a situation.
-
-    Parameters
-    ----------
-    mean : float, rad/s
-        Of the RMS errors with all seeds.
-    spread : float or None, rad/s
-        Standard deviation of these; None if there is one only.
-    """
+    """A setting in a situation."""
 
     name: str
-    mean: float
-    spread: float | None
+    mean: float  # rad/s: of the RMS errors with all seeds
+    spread: float | None  # rad/s: standard deviation of these; None if there is one only
 
     @staticmethod
     def of(name: str, errors: list[float]) -> "Cell":

@@ -27,24 +27,14 @@ TASK = Task(
 
 @dataclass(frozen=True, kw_only=True)
 class Kind:
-    """Says how the loop is closed.
-
-    Parameters
-    ----------
-    filtered : bool
-        Whether there is a low-pass filter of the velocity.
-    options : tuple of (str, str)
-        Of the method.
-    shortest : float, s
-        The shortest tick of the core; with shorter control ticks it keeps this one.
-    """
+    """Says how the loop is closed."""
 
     name: str
     method: str
     way: Observer
-    filtered: bool = True
-    options: tuple[tuple[str, str], ...] = ()
-    shortest: float = 0.0
+    filtered: bool = True  # whether there is a low-pass filter of the velocity
+    options: tuple[tuple[str, str], ...] = ()  # of the method
+    shortest: float = 0.0  # s: the shortest tick of the core; with shorter control ticks it keeps this one
 
 
 _SILENT = (("bound-decay", "no"),)  # updates without a count are no measurements, and would have eq. (22)'s weight

@@ -14,62 +14,30 @@ def pins(text: str) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Header:
-    """Is a connector of a board.
+    """Is a connector of a board."""
 
-    Parameters
-    ----------
-    label : str
-        What people call it.
-    pins : mapping of str to str
-        Its pins by the ports that are on them.
-    connector : tuple of str and int, or None
-        Its name and number in amaranth-boards; None: the pins are those of the FPGA.
-    """
-
-    label: str
-    pins: Mapping[str, str]
+    label: str  # what people call it
+    pins: Mapping[str, str]  # its pins by the ports that are on them
+    # its name and number in amaranth-boards; None: the pins are those of the FPGA
     connector: tuple[str, int] | None = None
 
 
 @dataclass(frozen=True)
 class Board:
-    """Describes a board on which a core can run.
+    """Describes a board on which a core can run."""
 
-    Parameters
-    ----------
-    name : str
-        On the command line.
-    title : str
-        The board and its FPGA, for people.
-    clock_hz : int
-        Frequency of its oscillator, at which the core runs: there is no PLL.
-    platform : callable
-        Makes the platform of amaranth-boards, which is of the extra `boards`, and imported only here.
-    attributes : mapping of str to object
-        Of every pin of a header: its voltage.
-    pull_up : mapping of str to object
-        Also of inputs.
-    leds : int
-        LEDs that are used, at most.
-    flow : Flow or None
-        What makes a bitstream; None: the vendor's tools, from an archive.
-    loader : tuple of str
-        What openFPGALoader must be told of the board.
-    bitstream : str
-        Suffix of the bitstream that the vendor's tools make.
-    """
-
-    name: str
-    title: str
-    clock_hz: int
+    name: str  # on the command line
+    title: str  # the board and its FPGA, for people
+    clock_hz: int  # frequency of its oscillator, at which the core runs: there is no PLL
+    # makes the platform of amaranth-boards, which is of the extra `boards`, and imported only here
     platform: Callable[[], Any]
     headers: tuple[Header, ...]
-    attributes: Mapping[str, object]
-    pull_up: Mapping[str, object]
-    leds: int
-    flow: Flow | None
-    loader: tuple[str, ...]
-    bitstream: str = ""
+    attributes: Mapping[str, object]  # of every pin of a header: its voltage
+    pull_up: Mapping[str, object]  # also of inputs
+    leds: int  # LEDs that are used, at most
+    flow: Flow | None  # what makes a bitstream; None: the vendor's tools, from an archive
+    loader: tuple[str, ...]  # what openFPGALoader must be told of the board
+    bitstream: str = ""  # suffix of the bitstream that the vendor's tools make
 
     @property
     def suffix(self) -> str:

@@ -25,30 +25,14 @@ _PLATFORMS = ("amaranth", "amaranth-boards")
 
 @dataclass(frozen=True)
 class Built:
-    """Holds the outcome of a build.
+    """Holds the outcome of a build."""
 
-    Parameters
-    ----------
-    content : bytes
-        The bitstream, or the archive.
-    suffix : str
-        Of its file.
-    tools : mapping of str to str
-        Versions of the packages that have made it.
-    cells : mapping of str to tuple of int and int
-        Cells that are used, and that there are, by what people call them.
-    fmax : float or None
-        Greatest frequency of the clock in MHz; None of an archive.
-    seed : int or None
-        Of place and route.
-    """
-
-    content: bytes
-    suffix: str
-    tools: Mapping[str, str]
-    cells: Mapping[str, tuple[int, int]]
-    fmax: float | None
-    seed: int | None
+    content: bytes  # the bitstream, or the archive
+    suffix: str  # of its file
+    tools: Mapping[str, str]  # versions of the packages that have made it
+    cells: Mapping[str, tuple[int, int]]  # cells that are used, and that there are, by what people call them
+    fmax: float | None  # greatest frequency of the clock in MHz; None of an archive
+    seed: int | None  # of place and route
 
 
 def check_tools(board: Board) -> None:

@@ -13,27 +13,15 @@ ROUTE_LOG, REPORT = "route.log", "report.json"
 
 @dataclass(frozen=True)
 class Flow:
-    """Describes the tools for a family of FPGAs.
+    """Describes the tools for a family of FPGAs."""
 
-    Parameters
-    ----------
-    route : tuple of str
-        nextpnr with the device, the constraints that the platform writes, and the files between the tools.
-    pack : tuple of str
-        What makes the bitstream `top` + `suffix`.
-    cells : mapping of str to str
-        What nextpnr calls the cells that are shown, by what people call them.
-    packages : tuple of str
-        Packages on PyPI that the tools come from.
-    netlist : callable or None
-        Changes the netlist `top.json` between synthesis and routing.
-    """
-
+    # nextpnr with the device, the constraints that the platform writes, and the files between the tools
     route: tuple[str, ...]
-    pack: tuple[str, ...]
+    pack: tuple[str, ...]  # what makes the bitstream `top` + `suffix`
     suffix: str
-    cells: Mapping[str, str]
-    packages: tuple[str, ...]
+    cells: Mapping[str, str]  # what nextpnr calls the cells that are shown, by what people call them
+    packages: tuple[str, ...]  # packages on PyPI that the tools come from
+    # changes the netlist `top.json` between synthesis and routing
     netlist: Callable[[Mapping[str, Any]], object] | None = None
 
     @property

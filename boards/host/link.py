@@ -38,21 +38,11 @@ class NoAnswer(TimeoutError):
 
 @dataclass
 class Counts:
-    """Counts what a receiver has seen.
+    """Counts what a receiver has seen."""
 
-    Parameters
-    ----------
-    frames : int
-        Frames of telemetry that were right.
-    lost : int
-        Frames of telemetry that the core has sent or left out, and that were not seen.
-    bytes_dropped : int
-        Bytes that belong to no frame.
-    """
-
-    frames: int = 0
-    lost: int = 0
-    bytes_dropped: int = 0
+    frames: int = 0  # frames of telemetry that were right
+    lost: int = 0  # frames of telemetry that the core has sent or left out, and that were not seen
+    bytes_dropped: int = 0  # bytes that belong to no frame
 
 
 @dataclass
@@ -61,17 +51,11 @@ class Receiver:
 
     A frame is taken if its check is right and its words can be those of the registers. At a byte with which none
     begins, the search goes on with the next.
-
-    Parameters
-    ----------
-    request : bytes
-        What is to be answered; empty: nothing is.
-    frame_clocks : int
-        Clocks from a frame of telemetry to the next, with which losses of 16 frames and more are seen; 0: not known.
     """
 
     registers: HostRegisters
-    request: bytes = b""
+    request: bytes = b""  # what is to be answered; empty: nothing is
+    # clocks from a frame of telemetry to the next, with which losses of 16 frames and more are seen; 0: not known
     frame_clocks: int = 0
     counts: Counts = field(default_factory=Counts)
 

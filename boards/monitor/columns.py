@@ -13,24 +13,12 @@ Value = float | int | bool | None
 
 @dataclass(frozen=True)
 class Column:
-    """Is a column of a recording.
+    """Is a column of a recording."""
 
-    Parameters
-    ----------
-    name : str
-        Of the port.
-    unit : str
-        Empty: it has none.
-    kind : type
-        float, int or bool.
-    value : callable of Snapshot
-        None: there is no such value in this frame.
-    """
-
-    name: str
-    unit: str
-    kind: type
-    value: Callable[[Snapshot], Value]
+    name: str  # of the port
+    unit: str  # empty: it has none
+    kind: type  # float, int or bool
+    value: Callable[[Snapshot], Value]  # None: there is no such value in this frame
 
     @property
     def head(self) -> str:

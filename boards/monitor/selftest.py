@@ -22,42 +22,23 @@ _SILENCE = 30.0  # seconds after which no more telemetry will come
 
 @dataclass(frozen=True)
 class Step:
-    """Is a part of the self-test, from a restart on.
-
-    Parameters
-    ----------
-    first : EmulatorSettings
-        What holds from the restart on.
-    then : sequence of (float, dict)
-        Settings that change, each so many seconds after the change before, or the restart, at the earliest.
-    rest : float
-        Seconds after the last change.
-    """
+    """Is a part of the self-test, from a restart on."""
 
     name: str
-    first: EmulatorSettings
+    first: EmulatorSettings  # what holds from the restart on
+    # settings that change, each so many seconds after the change before, or the restart, at the earliest
     then: Sequence[tuple[float, dict[str, int]]] = ()
-    rest: float = 0.05
+    rest: float = 0.05  # seconds after the last change
 
 
 @dataclass(frozen=True)
 class Result:
-    """Holds the outcome of a step.
-
-    Parameters
-    ----------
-    frames : int
-        Frames of telemetry that were compared.
-    values : int
-        Words that were compared.
-    difference : str
-        The first difference; empty if there is none.
-    """
+    """Holds the outcome of a step."""
 
     name: str
-    frames: int
-    values: int
-    difference: str = ""
+    frames: int  # frames of telemetry that were compared
+    values: int  # words that were compared
+    difference: str = ""  # the first difference; empty if there is none
 
     @property
     def passed(self) -> bool:

@@ -31,15 +31,9 @@ class ForeignDevice(ValueError):
 
 @dataclass(frozen=True)
 class Frame:
-    """Holds telemetry, and when it was captured.
+    """Holds telemetry, and when it was captured."""
 
-    Parameters
-    ----------
-    time : float
-        Seconds of the board since the first frame. Over a reconnection they go on by the clock of the host.
-    """
-
-    time: float
+    time: float  # seconds of the board since the first frame. Over a reconnection they go on by the clock of the host.
     snapshot: Snapshot
 
 

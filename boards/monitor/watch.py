@@ -23,24 +23,15 @@ _PATIENCE = 5.0  # seconds without telemetry after which a duration can be over
 
 @dataclass
 class State:
-    """Holds the state of a board.
-
-    Parameters
-    ----------
-    columns : sequence of Column
-    told : Counter of str
-        In how many frames each flag of a wrong index was set.
-    waits_for : str
-        Why there is no telemetry; empty: there is.
-    """
+    """Holds the state of a board."""
 
     title: str
     spec: TachometerSpec
     columns: Mapping[str, Column]
     counts: Counts = field(default_factory=Counts)
     counters: Mapping[str, int] = field(default_factory=dict)
-    told: Counter[str] = field(default_factory=Counter)
-    waits_for: str = ""
+    told: Counter[str] = field(default_factory=Counter)  # in how many frames each flag of a wrong index was set
+    waits_for: str = ""  # why there is no telemetry; empty: there is
     recorded: str = ""
     frame: Frame | None = None
     history: deque[tuple[float, float, Value, Value]] = field(default_factory=deque)

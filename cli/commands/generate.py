@@ -59,17 +59,6 @@ the manifest names both.
 class Asked:
     """Holds what `generate` is asked for.
 
-    Parameters
-    ----------
-    name, bus, baud, target, irq
-        See `hdl.export.export`.
-    testbench, ci : str or None
-        What is written beside the core.
-    record : callable or None
-        Gives what an encoder records of the motion of the testbench.
-    tables : list of Path
-        The files that the motion reads.
-
     Raises
     ------
     ValueError
@@ -77,15 +66,17 @@ class Asked:
     """
 
     spec: AnySpec
+    # name, bus, baud, target and irq: see `hdl.export.export`
     name: str
+    # testbench and ci: what is written beside the core
     testbench: str | None
     bus: str
     baud: int | None
     target: str
     irq: bool
     ci: str | None
-    record: Callable[..., Encoding] | None
-    tables: list[Path]
+    record: Callable[..., Encoding] | None  # gives what an encoder records of the motion of the testbench
+    tables: list[Path]  # the files that the motion reads
 
     def __post_init__(self) -> None:
         check_module_name(self.name)

@@ -126,17 +126,10 @@ def _taken(given: dict[str, Any]) -> Texts:
 
 @dataclass(frozen=True)
 class Part:
-    """Options of what a core of one axis may be made into.
+    """Options of what a core of one axis may be made into."""
 
-    Parameters
-    ----------
-    options : sequence of callable
-        See `Group`.
-    take : callable
-        Takes the options out of what click gives a command, and gives what makes of a core what it is for.
-    """
-
-    options: Sequence[Callable[[Any], Any]]
+    options: Sequence[Callable[[Any], Any]]  # see `Group`
+    # takes the options out of what click gives a command, and gives what makes of a core what it is for
     take: Callable[[dict[str, Any]], Callable[[Any], Any]]
 
 
@@ -194,19 +187,11 @@ def _common_of_board() -> tuple[click.Option, ...]:
 
 @dataclass(frozen=True)
 class CoreTexts:
-    """Options of a core that may have been given.
-
-    Parameters
-    ----------
-    texts : mapping of str to str
-        By the names of the options without dashes.
-    given : bool
-        Whether there is any.
-    """
+    """Options of a core that may have been given."""
 
     method: str
-    texts: Texts
-    given: bool
+    texts: Texts  # by the names of the options without dashes
+    given: bool  # whether there is any
 
     def at(self, clock_hz: int) -> TachometerSpec:
         """Return the core, at the clock of a board; ParameterError if an option is wrong, or missing."""

@@ -10,17 +10,10 @@ from tachometry.spec import AUTO, METHODS, TachometerSpec, method_named
 
 @dataclass(frozen=True)
 class Methods:
-    """Holds the methods of a list.
+    """Holds the methods of a list."""
 
-    Parameters
-    ----------
-    specs : dict of str to TachometerSpec or None
-        By name, in order; None for what is no method of a core.
-    left_out : dict of str to str
-        Methods of `all` that are impossible with these options, and why.
-    """
-
-    specs: dict[str, TachometerSpec | None]
+    specs: dict[str, TachometerSpec | None]  # by name, in order; None for what is no method of a core
+    # methods of `all` that are impossible with these options, and why
     left_out: dict[str, str] = field(default_factory=dict)
 
 

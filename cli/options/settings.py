@@ -26,17 +26,10 @@ _LISTS = ("methods", "axes")
 
 @dataclass
 class Settings:
-    """Options by their names, without dashes, and axes with their values.
+    """Options by their names, without dashes, and axes with their values."""
 
-    Parameters
-    ----------
-    fixed : dict of str to str
-        Texts as on the command line; `yes` or `no` of a flag.
-    vary : dict of str to list
-        Values of each axis in order; None stands for leaving the option out.
-    """
-
-    fixed: dict[str, str] = field(default_factory=dict)
+    fixed: dict[str, str] = field(default_factory=dict)  # texts as on the command line; `yes` or `no` of a flag
+    # values of each axis in order; None stands for leaving the option out
     vary: dict[str, list[Text]] = field(default_factory=dict)
 
     def over(self, other: "Settings") -> "Settings":

@@ -25,16 +25,10 @@ _BUS = "uart"
 
 @dataclass(frozen=True)
 class Target:
-    """The board that is meant.
-
-    Parameters
-    ----------
-    title : str
-        What the view is headed with.
-    """
+    """The board that is meant."""
 
     port: str
-    title: str
+    title: str  # what the view is headed with
     registers: DemoMap
     bus: Bus
     module: str = "tachometer"

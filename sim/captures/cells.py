@@ -17,16 +17,10 @@ _LEVELS = {"false": 0, "true": 1, "x": HELD}
 
 
 class Threshold(NamedTuple):
-    """Says from which voltage on a line is high.
-
-    Parameters
-    ----------
-    hysteresis : float, volts
-        By so much a line must fall below where it rose.
-    """
+    """Says from which voltage on a line is high."""
 
     volts: float
-    hysteresis: float = 0.0
+    hysteresis: float = 0.0  # volts: by so much a line must fall below where it rose
 
 
 def parse_threshold(what: str, text: str) -> Threshold:

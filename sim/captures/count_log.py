@@ -22,23 +22,12 @@ NO_WRAP = 0
 
 @dataclass(frozen=True)
 class CountLog:
-    """Holds what a counter showed.
+    """Holds what a counter showed."""
 
-    Parameters
-    ----------
-    time : float64 array, shape (n,), seconds, strictly increasing, first entry 0
-    count : int64 array, shape (n,), first entry 0
-        Since the first row; what wrapped goes on.
-    name : str
-        Of the column.
-    notes : tuple of str
-        How the rows were understood.
-    """
-
-    time: NDArray[np.float64]
-    count: Ints
-    name: str
-    notes: tuple[str, ...]
+    time: NDArray[np.float64]  # shape (n,), seconds, strictly increasing, first entry 0
+    count: Ints  # shape (n,), first entry 0: since the first row; what wrapped goes on
+    name: str  # of the column
+    notes: tuple[str, ...]  # how the rows were understood
 
     @property
     def source(self) -> Source:

@@ -24,18 +24,10 @@ NO_VECTORS: Mapping[int, str] = {}
 
 
 class Line(NamedTuple):
-    """Names a line of a capture.
+    """Names a line of a capture."""
 
-    Parameters
-    ----------
-    number : int
-        Of its channel.
-    bit : int or None
-        Of the number that the channel is; None: it is a level.
-    """
-
-    number: int
-    bit: int | None = None
+    number: int  # of its channel
+    bit: int | None = None  # of the number that the channel is; None: it is a level
 
 
 class CaptureError(ValueError):

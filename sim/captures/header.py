@@ -44,31 +44,15 @@ PLAIN = TextOptions()
 
 @dataclass(frozen=True)
 class Header:
-    """Holds the head of a text capture.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Of all columns; the first may have none.
-    time : int or None
-        Column of the times; None: every row is a sample.
-    unit : TimeUnit
-        Of the times.
-    assumed : bool
-        Whether nothing says the unit.
-    samplerate_hz : float or None
-        For rows that are samples.
-    period : int or None
-        For files of sigrok, whose times are sample numbers times so many of a unit.
-    """
+    """Holds the head of a text capture."""
 
     table: Table
-    names: tuple[str, ...]
-    time: int | None
-    unit: TimeUnit
-    assumed: bool = False
-    samplerate_hz: float | None = None
-    period: int | None = None
+    names: tuple[str, ...]  # of all columns; the first may have none
+    time: int | None  # column of the times; None: every row is a sample
+    unit: TimeUnit  # of the times
+    assumed: bool = False  # whether nothing says the unit
+    samplerate_hz: float | None = None  # for rows that are samples
+    period: int | None = None  # for files of sigrok, whose times are sample numbers times so many of a unit
 
     @property
     def unit_name(self) -> str:

@@ -15,30 +15,14 @@ VOLTS = {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "millivolt": 1e-3, "mi
 
 
 class Table(NamedTuple):
-    """Holds where the rows of a text begin, and what is above them.
+    """Holds where the rows of a text begin, and what is above them."""
 
-    Parameters
-    ----------
-    separator : str
-        One of `SEPARATORS`; but for the comma, numbers may have a decimal comma.
-    names : list of str or None
-        Of the columns; None: there are none.
-    units : list of str
-        What stands in a line of units below the names; as many, or none.
-    start : int
-        Lines before the first row.
-    comments : list of str
-        Lines before it that are comments.
-    first : list of str
-        Cells of the first row; empty if there is none.
-    """
-
-    separator: str
-    names: list[str] | None
-    units: list[str]
-    start: int
-    comments: list[str]
-    first: list[str]
+    separator: str  # one of `SEPARATORS`; but for the comma, numbers may have a decimal comma
+    names: list[str] | None  # of the columns; None: there are none
+    units: list[str]  # what stands in a line of units below the names; as many, or none
+    start: int  # lines before the first row
+    comments: list[str]  # lines before it that are comments
+    first: list[str]  # cells of the first row; empty if there is none
 
 
 def split(line: str, separator: str) -> list[str]:

@@ -17,23 +17,12 @@ _ALLOWED = "".join(_LEVELS) + "xzuw-"  # what VHDL and Verilog have beside level
 
 
 class Variable(NamedTuple):
-    """Describes a variable of a waveform.
+    """Describes a variable of a waveform."""
 
-    Parameters
-    ----------
-    name : str
-        With its scopes, as `tb.core.a`.
-    size : int
-        Number of its bits.
-    code : bytes or int
-        Several may share one.
-    high, low : int
-        Numbers of its first and last bit, as declared: 3 and 0, or 1 and 4.
-    """
-
-    name: str
-    size: int
-    code: Code
+    name: str  # with its scopes, as `tb.core.a`
+    size: int  # number of its bits
+    code: Code  # several may share one
+    # high and low: numbers of its first and last bit, as declared: 3 and 0, or 1 and 4
     high: int
     low: int
 

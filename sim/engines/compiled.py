@@ -38,19 +38,11 @@ _CAPACITY = 1 << 14  # rows
 
 @dataclass(frozen=True)
 class Design:
-    """Describes what is to be compiled.
-
-    Parameters
-    ----------
-    pins : list of Port
-        Inputs, in the order of their levels.
-    watched : Watched or None
-        The core with shown signals, if there are any to be shown.
-    """
+    """Describes what is to be compiled."""
 
     spec: AnySpec
-    pins: list[Port]
-    watched: Watched | None = None
+    pins: list[Port]  # inputs, in the order of their levels
+    watched: Watched | None = None  # the core with shown signals, if there are any to be shown
 
     @cached_property
     def component(self) -> wiring.Component:

@@ -36,26 +36,17 @@ class Observer(IntEnum):
 class Motor:
     """Describes a motor with its driver and load.
 
-    Parameters
-    ----------
-    inertia : float, kg m²
-    torque_constant : float, Nm/A
-    driver_seconds : float
-        Time constant of the current.
-    viscous : float, Nm/(rad/s)
-    coulomb : float, Nm
-
     Raises
     ------
     ParameterError
         If one is out of range.
     """
 
-    inertia: float = 0.003
-    torque_constant: float = 0.0603
-    driver_seconds: float = 1e-4
-    viscous: float = 0.0
-    coulomb: float = 0.0
+    inertia: float = 0.003  # kg m²
+    torque_constant: float = 0.0603  # Nm/A
+    driver_seconds: float = 1e-4  # time constant of the current
+    viscous: float = 0.0  # Nm/(rad/s)
+    coulomb: float = 0.0  # Nm
 
     def __post_init__(self) -> None:
         _more_than_0(self, "inertia", "torque_constant")
@@ -66,42 +57,27 @@ class Motor:
 class Gains:
     """Describes a controller of velocity and position with a disturbance observer.
 
-    Parameters
-    ----------
-    position, velocity : float, 1/s², 1/s
-        k_p and k_v.
-    observer, filter : float, rad/s
-        G_dis, and G_v; with an infinite G_v there is no low-pass filter of the velocity.
-    seconds : float
-        Distance of control ticks.
-    delay : float, s
-        From a control tick until its current is commanded, at most `seconds`.
-    on_filtered : bool
-        Whether k_v acts on the velocity behind the filter, not before it.
-    feed_forward : bool
-        Whether the acceleration of the command is added.
-    inertia, torque_constant : float, kg m², Nm/A
-        As the controller knows them.
-    current_limit : float, A
-
     Raises
     ------
     ParameterError
         If one is out of range.
     """
 
+    # position and velocity: 1/s², 1/s: k_p and k_v
     position: float
     velocity: float
+    # observer and filter: rad/s: G_dis, and G_v; with an infinite G_v there is no low-pass filter of the velocity
     observer: float
     filter: float
-    seconds: float
+    seconds: float  # distance of control ticks
     way: Observer = Observer.SYNCHRONISED
-    delay: float = 0.0
-    on_filtered: bool = True
-    feed_forward: bool = False
+    delay: float = 0.0  # s: from a control tick until its current is commanded, at most `seconds`
+    on_filtered: bool = True  # whether k_v acts on the velocity behind the filter, not before it
+    feed_forward: bool = False  # whether the acceleration of the command is added
+    # inertia and torque_constant: kg m², Nm/A: as the controller knows them
     inertia: float = 0.003
     torque_constant: float = 0.0603
-    current_limit: float = 8.0
+    current_limit: float = 8.0  # A
 
     def __post_init__(self) -> None:
         _more_than_0(self, "observer", "seconds", "inertia", "torque_constant", "current_limit")
@@ -130,22 +106,14 @@ def _at_least_0(what: object, *names: str) -> None:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Course:
-    """Holds the commands, and what comes in between; all at times `seconds` apart.
-
-    Parameters
-    ----------
-    speed, angle : float64 array, shape (n,), rad/s and rad
-        Commanded; between two times the speed is a line.
-    load : float64 array, shape (n,), Nm
-        Against the shaft, from each time to the next.
-    current : float64 array, shape (n,), A
-        Added to the command behind the controller, which does not know of it: a virtual disturbance.
-    """
+    """Holds the commands, and what comes in between; all at times `seconds` apart."""
 
     seconds: float
+    # speed and angle: shape (n,), rad/s and rad: commanded; between two times the speed is a line
     speed: FloatArray
     angle: FloatArray
-    load: FloatArray
+    load: FloatArray  # shape (n,), Nm: against the shaft, from each time to the next
+    # shape (n,), A: added to the command behind the controller, which does not know of it: a virtual disturbance
     current: FloatArray
 
 

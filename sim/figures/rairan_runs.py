@@ -28,13 +28,7 @@ _NAMES = ("$ω_{m1}$", "$ω_{m2}$", "$ω_{m3}$")
 
 @dataclass(frozen=True, eq=False)
 class _Estimates:
-    """Holds the estimates of Table 1 after each update, in ω_lim, from when both counts are there; shape (n,).
-
-    Parameters
-    ----------
-    clock : int64 array
-    n1, n2, n3 : float64 arrays
-    """
+    """Holds the estimates of Table 1 after each update, in ω_lim, from when both counts are there; shape (n,)."""
 
     clock: NDArray[np.int64]
     n1: FloatArray

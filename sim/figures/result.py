@@ -13,88 +13,47 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Is a line of a panel.
+    """Is a line of a panel."""
 
-    Parameters
-    ----------
-    label : str
-        Its name in the legend and in the CSV.
-    x, y : arrays, shape (n,)
-    style : str
-        `line`, `held` (each value until the next), `dots` or `reference` (thin and grey).
-    """
-
-    label: str
+    label: str  # its name in the legend and in the CSV
+    # x and y: shape (n,)
     x: NDArray[np.floating[Any]]
     y: NDArray[np.floating[Any]]
-    style: str = "line"
+    style: str = "line"  # `line`, `held` (each value until the next), `dots` or `reference` (thin and grey)
 
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """Is a pair of axes with curves.
-
-    Parameters
-    ----------
-    log : str
-        Axes that are logarithmic: "", "x", "y" or "xy".
-    levels : tuple of float
-        Where thin horizontal lines are drawn.
-    y_limits : pair of float or None
-    whole : bool
-        Ticks of the y axis at whole numbers only.
-    marks : tuple of (str, float)
-        Letters at some x.
-    """
+    """Is a pair of axes with curves."""
 
     title: str
     x_label: str
     y_label: str
     curves: tuple[Curve, ...]
-    log: str = ""
-    levels: tuple[float, ...] = ()
+    log: str = ""  # axes that are logarithmic: "", "x", "y" or "xy"
+    levels: tuple[float, ...] = ()  # where thin horizontal lines are drawn
     y_limits: tuple[float, float] | None = None
-    whole: bool = False
-    marks: tuple[tuple[str, float], ...] = ()
+    whole: bool = False  # ticks of the y axis at whole numbers only
+    marks: tuple[tuple[str, float], ...] = ()  # letters at some x
 
 
 @dataclass(frozen=True)
 class Claim:
-    """Holds a paper's word on a figure beside the value that was computed.
+    """Holds a paper's word on a figure beside the value that was computed."""
 
-    Parameters
-    ----------
-    paper : str
-        The paper's statement.
-    found : str
-        What was computed, with its numbers.
-    """
-
-    paper: str
-    found: str
+    paper: str  # the paper's statement
+    found: str  # what was computed, with its numbers
     agrees: bool
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """Holds a figure that was computed.
+    """Holds a figure that was computed."""
 
-    Parameters
-    ----------
-    source : str
-        Paper and number of the figure.
-    title : str
-        As in the paper.
-    settings : str
-        What was simulated.
-    panels : tuple of Panel
-        One below the other.
-    """
-
-    source: str
-    title: str
-    settings: str
-    panels: tuple[Panel, ...]
+    source: str  # paper and number of the figure
+    title: str  # as in the paper
+    settings: str  # what was simulated
+    panels: tuple[Panel, ...]  # one below the other
     claims: tuple[Claim, ...]
 
     @property
@@ -104,21 +63,12 @@ class Result:
 
 @dataclass(frozen=True)
 class Entry:
-    """Describes a figure that can be computed.
-
-    Parameters
-    ----------
-    compute : callable
-    seconds : float
-        About what it takes.
-    compiled : bool
-        Whether it needs a C++ compiler.
-    """
+    """Describes a figure that can be computed."""
 
     name: str
     compute: "Callable[[Lab], Result]"
-    seconds: float
-    compiled: bool = False
+    seconds: float  # about what it takes
+    compiled: bool = False  # whether it needs a C++ compiler
 
 
 def percent(part: NDArray[np.bool_]) -> float:

@@ -29,21 +29,11 @@ _TURN = 1 << FINE_WIDTH
 
 @dataclass(frozen=True)
 class Change:
-    """Is a write to the emulator's registers.
+    """Is a write to the emulator's registers."""
 
-    Parameters
-    ----------
-    clock : int
-        Of the write, since the restart; -1 for what was set before it.
-    settings : EmulatorSettings
-        All that holds from the next clock on.
-    jump : bool
-        The phase turns by half a period in this clock.
-    """
-
-    clock: int
-    settings: EmulatorSettings
-    jump: bool = False
+    clock: int  # of the write, since the restart; -1 for what was set before it
+    settings: EmulatorSettings  # all that holds from the next clock on
+    jump: bool = False  # the phase turns by half a period in this clock
 
 
 class _Random:

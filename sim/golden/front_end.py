@@ -130,49 +130,26 @@ def _none() -> NDArray[np.int64]:
 
 @dataclass(frozen=True)
 class Steps:
-    """Holds the steps that the decoder sees, on the core's clock.
+    """Holds the steps that the decoder sees, on the core's clock."""
 
-    Parameters
-    ----------
-    clock : int64 array, shape (n,)
-        Clocks, increasing, with a step or where a line changes without one.
-    step : int64 array, shape (n,)
-        −1, 0 or +1.
-    errors : int64 array
-        Clocks in which `decode_error` is high.
-    index : int64 array
-        Clocks in which the index is taken, or of the first teeth after a gap; none without an index.
-    swallowed : int64 array
-        Clocks in which the glitch filter has counted a glitch.
-    changed : uint8 array, shape (n,)
-        The lines that change in `clock`: 1 of A, 2 of B, 3 both.
-    wide, missed : int64 arrays
-        Clocks in which Z meets its state a second time, and has come and gone without it.
-    wheel : Teeth or None
-        Of a wheel with missing teeth, the teeth.
-    z : int64 array
-        Clocks in which Z rises, or would be taken in its state.
-    presets, values : int64 arrays
-        Clocks in which the position is set, before the step in them, and to what.
-    arms : int64 array
-        Clocks in which the next index is let through.
-    probes : tuple of (int64 array, uint8 array)
-        Of each probe the clocks from which its level is seen, and the levels; the first is no edge.
-    """
-
-    clock: NDArray[np.int64]
-    step: NDArray[np.int64]
-    errors: NDArray[np.int64]
+    clock: NDArray[np.int64]  # shape (n,): clocks, increasing, with a step or where a line changes without one
+    step: NDArray[np.int64]  # shape (n,): −1, 0 or +1
+    errors: NDArray[np.int64]  # clocks in which `decode_error` is high
+    # clocks in which the index is taken, or of the first teeth after a gap; none without an index
     index: NDArray[np.int64]
-    swallowed: NDArray[np.int64]
+    swallowed: NDArray[np.int64]  # clocks in which the glitch filter has counted a glitch
+    # shape (n,): the lines that change in `clock`: 1 of A, 2 of B, 3 both
     changed: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, dtype=np.uint8))
+    # wide and missed: clocks in which Z meets its state a second time, and has come and gone without it
     wide: NDArray[np.int64] = field(default_factory=_none)
     missed: NDArray[np.int64] = field(default_factory=_none)
-    z: NDArray[np.int64] = field(default_factory=_none)
+    z: NDArray[np.int64] = field(default_factory=_none)  # clocks in which Z rises, or would be taken in its state
+    # presets and values: clocks in which the position is set, before the step in them, and to what
     presets: NDArray[np.int64] = field(default_factory=_none)
     values: NDArray[np.int64] = field(default_factory=_none)
-    arms: NDArray[np.int64] = field(default_factory=_none)
-    wheel: Teeth | None = None
+    arms: NDArray[np.int64] = field(default_factory=_none)  # clocks in which the next index is let through
+    wheel: Teeth | None = None  # of a wheel with missing teeth, the teeth
+    # of each probe the clocks from which its level is seen, and the levels; the first is no edge
     probes: tuple[tuple[NDArray[np.int64], NDArray[np.uint8]], ...] = ()
 
     def asked(
@@ -268,21 +245,13 @@ def wrapped(spec: TachometerSpec, position: NDArray[np.int64]) -> NDArray[np.int
 
 @dataclass(frozen=True)
 class _Origins:
-    """Says what is taken off the sum of all steps: at each index, and from what clock on.
+    """Says what is taken off the sum of all steps: at each index, and from what clock on."""
 
-    Parameters
-    ----------
-    captured, at_index : int64 arrays
-        The sum at each index, and what is taken off it there.
-    clock : int64 array, shape (n,)
-    off : int64 array, shape (n + 1,)
-        What is taken off before any of these clocks, and after each.
-    """
-
+    # captured and at_index: the sum at each index, and what is taken off it there
     captured: NDArray[np.int64]
     at_index: NDArray[np.int64]
-    clock: NDArray[np.int64]
-    off: NDArray[np.int64]
+    clock: NDArray[np.int64]  # shape (n,)
+    off: NDArray[np.int64]  # shape (n + 1,): what is taken off before any of these clocks, and after each
 
     @classmethod
     def of(cls, spec: TachometerSpec, steps: Steps) -> "_Origins":

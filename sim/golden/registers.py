@@ -17,19 +17,11 @@ from tachometry.spec.registers.map import COUNTER_WIDTH, RegisterMap
 
 @dataclass(frozen=True)
 class Access:
-    """Is one clock of the native port.
-
-    Parameters
-    ----------
-    address : int
-        Of the word.
-    data : int or None
-        What is written; None: the access reads.
-    """
+    """Is one clock of the native port."""
 
     clock: int
-    address: int
-    data: int | None = None
+    address: int  # of the word
+    data: int | None = None  # what is written; None: the access reads
 
 
 def initial(registers: RegisterMap) -> dict[str, int]:

@@ -12,21 +12,11 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Teeth:
-    """Holds the teeth of a wheel, on the core's clock.
+    """Holds the teeth of a wheel, on the core's clock."""
 
-    Parameters
-    ----------
-    clock : int64 array
-        Clocks of all teeth, there or not.
-    index : int64 array
-        Of those that are the first ones after a gap.
-    errors : int64 array
-        Of those that are where the gap must be.
-    """
-
-    clock: Ints
-    index: Ints
-    errors: Ints
+    clock: Ints  # clocks of all teeth, there or not
+    index: Ints  # of those that are the first ones after a gap
+    errors: Ints  # of those that are where the gap must be
 
     def synced(self, clock: Ints) -> NDArray[np.bool_]:
         """Tell whether the gap is known in these clocks, from those that are before them."""

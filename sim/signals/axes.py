@@ -18,15 +18,9 @@ from tachometry.spec.methods.axes import AxesSpec
 
 @dataclass(frozen=True)
 class AxesTrace:
-    """Holds the levels that the first synchroniser flip-flops of many axes sample, on the core's clock.
+    """Holds the levels that the first synchroniser flip-flops of many axes sample, on the core's clock."""
 
-    Parameters
-    ----------
-    each : tuple of PinTrace
-        Of axis 0, of axis 1 …, with the same lines and as long as each other.
-    """
-
-    each: tuple[PinTrace, ...]
+    each: tuple[PinTrace, ...]  # of axis 0, of axis 1 …, with the same lines and as long as each other
 
     def __post_init__(self) -> None:
         if len({(trace.n_clocks, *trace.lines) for trace in self.each}) != 1:

@@ -13,25 +13,14 @@ from tachometry.spec import CoreSpec
 
 @dataclass(frozen=True)
 class Lockstep:
-    """Holds both runs of a trace, and their differences.
+    """Holds both runs of a trace, and their differences."""
 
-    Parameters
-    ----------
-    trace : Trace
-        What was played; after Ctrl-C shorter than what was asked for.
-    expected, actual : Run
-        Of the golden model and of the engine.
-    n_mismatches : int
-        Values that differ.
-    first : list of Mismatch
-        The first of them in each signal that differs.
-    """
-
-    trace: Trace
+    trace: Trace  # what was played; after Ctrl-C shorter than what was asked for
+    # expected and actual: of the golden model and of the engine
     expected: Run
     actual: Run
-    n_mismatches: int
-    first: list[Mismatch]
+    n_mismatches: int  # values that differ
+    first: list[Mismatch]  # the first of them in each signal that differs
 
 
 def lockstep(

@@ -121,15 +121,11 @@ def dense_speeds(spec: TachometerSpec, low: float, high: float) -> NDArray[np.fl
 
 @dataclass(frozen=True)
 class Plans:
-    """Holds plans of a core, and of methods beside each other, over a range of speeds.
-
-    Parameters
-    ----------
-    low, high : float, rad/s
-    """
+    """Holds plans of a core, and of methods beside each other, over a range of speeds."""
 
     spec: TachometerSpec
     methods: Mapping[str, TachometerSpec]
+    # low and high: rad/s
     low: float
     high: float
 
@@ -217,19 +213,11 @@ class Plans:
 
 @dataclass(frozen=True)
 class Advice:
-    """Says what another method would be.
-
-    Parameters
-    ----------
-    gain : float
-        How many times less its greatest error is, with a real disc.
-    cells : int
-        How many more cells it takes.
-    """
+    """Says what another method would be."""
 
     method: str
-    gain: float
-    cells: int
+    gain: float  # how many times less its greatest error is, with a real disc
+    cells: int  # how many more cells it takes
 
 
 def _others(spec: TachometerSpec) -> Iterator[TachometerSpec]:

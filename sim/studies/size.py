@@ -37,24 +37,13 @@ ADDED_TO_NAME = re.compile(r"(\$|_(SB|TRELLIS|LUT4|CCU2C|PFUMX|L6MUX21|DFFLC)(_|
 
 @dataclass(frozen=True)
 class Target:
-    """Describes a device and the commands that fill it.
-
-    Parameters
-    ----------
-    synth : str
-        Command of Yosys.
-    route : tuple of str
-        nextpnr, device and package.
-    cells : dict
-        What nextpnr calls the cells that are counted, by the names that the tables give them.
-    after : str
-        Source of a Python script that changes a netlist between synthesis and routing; empty if there is none.
-    """
+    """Describes a device and the commands that fill it."""
 
     device: str
-    synth: str
-    route: tuple[str, ...]
-    cells: Mapping[str, str]
+    synth: str  # command of Yosys
+    route: tuple[str, ...]  # nextpnr, device and package
+    cells: Mapping[str, str]  # what nextpnr calls the cells that are counted, by the names that the tables give them
+    # source of a Python script that changes a netlist between synthesis and routing; empty if there is none
     after: str = ""
 
 
@@ -82,21 +71,11 @@ TARGETS = {
 
 @dataclass(frozen=True)
 class Measurement:
-    """Holds the cells that a core takes on a device, and its speed.
+    """Holds the cells that a core takes on a device, and its speed."""
 
-    Parameters
-    ----------
-    figures : dict
-        Cells by name, the median `Fmax` in MHz if it was routed, `latency` in clocks.
-    limit : str
-        The path that limits Fmax with the seed that has the median.
-    spread : tuple of float, or None
-        The least and the greatest Fmax of the seeds.
-    """
-
-    figures: Mapping[str, float]
-    limit: str
-    spread: tuple[float, float] | None = None
+    figures: Mapping[str, float]  # cells by name, the median `Fmax` in MHz if it was routed, `latency` in clocks
+    limit: str  # the path that limits Fmax with the seed that has the median
+    spread: tuple[float, float] | None = None  # the least and the greatest Fmax of the seeds
 
 
 def wrapper(ports: Iterable[Port], top: str = CORE, clock: str = "clk") -> str:

@@ -39,37 +39,23 @@ _PATIENCE = 10.0  # seconds in which a process that is told to end does so
 
 @dataclass(frozen=True)
 class Failure:
-    """Holds the first motion on which hardware and golden model differ.
-
-    Parameters
-    ----------
-    first : list of Mismatch
-        In each signal that differs.
-    trace : Trace
-        The motion, up to what differs first.
-    """
+    """Holds the first motion on which hardware and golden model differ."""
 
     seed: int
-    first: list[Mismatch]
-    trace: Trace
+    first: list[Mismatch]  # in each signal that differs
+    trace: Trace  # the motion, up to what differs first
 
 
 @dataclass
 class Outcome:
-    """Holds the outcome of all motions on an engine.
-
-    Parameters
-    ----------
-    seconds : float
-        That the engine took, its build included.
-    """
+    """Holds the outcome of all motions on an engine."""
 
     n_motions: int = 0
     n_clocks: int = 0
     n_ticks: int = 0
     n_updates: int = 0
     n_mismatches: int = 0
-    seconds: float = 0.0
+    seconds: float = 0.0  # that the engine took, its build included
     failure: Failure | None = None
 
 
@@ -89,18 +75,10 @@ class Configuration:
 
 @dataclass(frozen=True)
 class Verification:
-    """Holds the outcomes of configurations.
+    """Holds the outcomes of configurations."""
 
-    Parameters
-    ----------
-    outcomes : list of (Configuration, dict of str to Outcome)
-        By the engine.
-    n_cores : int
-        Configurations that there are; after Ctrl-C not all have an outcome.
-    """
-
-    outcomes: list[tuple[Configuration, dict[str, Outcome]]]
-    n_cores: int
+    outcomes: list[tuple[Configuration, dict[str, Outcome]]]  # by the engine
+    n_cores: int  # configurations that there are; after Ctrl-C not all have an outcome
 
 
 def verification(

@@ -85,25 +85,14 @@ class Make:
 
 @dataclass(frozen=True)
 class Checked:
-    """Tells what was found of a core.
-
-    Parameters
-    ----------
-    files : dict of str to (str, str)
-        What was found of each file, and where it differs first, or "".
-    simulated : str or None
-        What the golden comparison says: "" if all agrees; None if there was none.
-    why_not : str
-        Why there was none.
-    unchecked : str
-        The error for which nothing was checked, or "".
-    """
+    """Tells what was found of a core."""
 
     manifest: Path
+    # what was found of each file, and where it differs first, or ""
     files: dict[str, tuple[str, str]] = field(default_factory=dict)
-    simulated: str | None = None
-    why_not: str = ""
-    unchecked: str = ""
+    simulated: str | None = None  # what the golden comparison says: "" if all agrees; None if there was none
+    why_not: str = ""  # why there was none
+    unchecked: str = ""  # the error for which nothing was checked, or ""
 
     @property
     def right(self) -> bool:

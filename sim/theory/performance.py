@@ -34,21 +34,11 @@ _DEVIATIONS = 3  # of what is random and has no bound
 
 @dataclass(frozen=True, eq=False)
 class Performance:
-    """Holds the figures of a method at each speed.
+    """Holds the figures of a method at each speed."""
 
-    Parameters
-    ----------
-    resolution : float64 array, shape (n,), rad/s
-        Q_V. NaN where the method cannot measure.
-    time : float64 array, shape (n,), seconds
-        T_m, mean.
-    forced : bool array, shape (n,)
-        The maximum time ends the measurement.
-    """
-
-    resolution: Floats
-    time: Floats
-    forced: NDArray[np.bool_]
+    resolution: Floats  # shape (n,), rad/s: Q_V. NaN where the method cannot measure.
+    time: Floats  # shape (n,), seconds: T_m, mean
+    forced: NDArray[np.bool_]  # shape (n,): the maximum time ends the measurement
 
 
 def m_performance(speed: Floats, n: int, counts_per_rev: int, tick_seconds: float) -> Performance:

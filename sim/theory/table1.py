@@ -6,26 +6,18 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Row:
-    """Holds the entries of Table 1 after an event.
+    """Holds the entries of Table 1 after an event."""
 
-    Parameters
-    ----------
-    time : int, ts
-    pulse, end : bool
-        A pulse came (lep), dt ended.
-    c_ep, c_dt, n_ep1, n_dt1 : int
-        Cep, Cdt, Nep1, Ndt1.
-    new_n_ep1, new_n_dt1 : bool
-        Nep1 (line 9), Ndt1 (line 6) was updated.
-    """
-
-    time: int
+    time: int  # ts
+    # pulse and end: a pulse came (lep), dt ended
     pulse: bool
     end: bool
+    # c_ep, c_dt, n_ep1 and n_dt1: Cep, Cdt, Nep1, Ndt1
     c_ep: int
     c_dt: int
     n_ep1: int
     n_dt1: int
+    # new_n_ep1 and new_n_dt1: Nep1 (line 9), Ndt1 (line 6) was updated
     new_n_ep1: bool = False
     new_n_dt1: bool = False
 

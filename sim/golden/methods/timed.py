@@ -18,20 +18,11 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Counts:
-    """Holds all counts of a run, and its timer periods from 0 on, in each of which there is one count at most.
+    """Holds all counts of a run, and its timer periods from 0 on, in each of which there is one count at most."""
 
-    Parameters
-    ----------
-    period : int64 array, shape (n,)
-    size : int64 array, shape (n,)
-        Counts of the step or of the tick; never 0.
-    clock_of : int64 array, shape (m,), or None
-        Clock in which each period is seen; None: a period is a clock.
-    """
-
-    period: Ints
-    size: Ints
-    clock_of: Ints | None
+    period: Ints  # shape (n,)
+    size: Ints  # shape (n,): counts of the step or of the tick; never 0
+    clock_of: Ints | None  # shape (m,): clock in which each period is seen; None: a period is a clock
     n_periods: int
 
     @classmethod

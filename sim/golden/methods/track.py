@@ -20,39 +20,19 @@ from tachometry.spec.formats.tracking import LOGS, PLACE_BITS, POWERS, Tracking
 
 @dataclass(frozen=True)
 class Windows:
-    """Holds the counts of every tick, as columns of one length.
+    """Holds the counts of every tick, as columns of one length."""
 
-    Parameters
-    ----------
-    number : int64 array
-        Counts that an event takes: the first ones of the tick.
-    times : int64 array
-        Sum of the clocks from each of these to the end of the tick.
-    places : int64 array
-        Sum of twice the places of their edges, in counts from the place at the beginning of the tick.
-    last : int64 array
-        Clocks from the last count of the tick to its end.
-    moved : int64 array
-        Forward counts less backward ones.
-    kind : int64 array
-        Which of four edges the last of these was of: the lower one of the two positions around it, modulo 4.
-    down : bool array
-        Whether it went backward.
-    end : int64 array
-        Position at the end of the tick, since reset, modulo 4.
-    length : int64 array
-        Clocks of the tick.
-    """
-
-    number: NDArray[np.int64]
-    times: NDArray[np.int64]
+    number: NDArray[np.int64]  # counts that an event takes: the first ones of the tick
+    times: NDArray[np.int64]  # sum of the clocks from each of these to the end of the tick
+    # sum of twice the places of their edges, in counts from the place at the beginning of the tick
     places: NDArray[np.int64]
-    last: NDArray[np.int64]
-    moved: NDArray[np.int64]
+    last: NDArray[np.int64]  # clocks from the last count of the tick to its end
+    moved: NDArray[np.int64]  # forward counts less backward ones
+    # which of four edges the last of these was of: the lower one of the two positions around it, modulo 4
     kind: NDArray[np.int64]
-    down: NDArray[np.int64]
-    end: NDArray[np.int64]
-    length: NDArray[np.int64]
+    down: NDArray[np.int64]  # whether it went backward
+    end: NDArray[np.int64]  # position at the end of the tick, since reset, modulo 4
+    length: NDArray[np.int64]  # clocks of the tick
 
     @classmethod
     def of(cls, steps: Steps, last: NDArray[np.int64], most: int) -> "Windows":

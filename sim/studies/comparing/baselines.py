@@ -27,19 +27,11 @@ MOTEUS_3DB_RATIO = 2.48
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """Holds the counts of an encoder, one by one.
+    """Holds the counts of an encoder, one by one."""
 
-    Parameters
-    ----------
-    time : float64 array, shape (n,), seconds, from 0 to `duration`, not decreasing
-    step : int64 array, shape (n,), +1 or -1
-    duration : float, seconds
-        Length of the recording.
-    """
-
-    time: FloatArray
-    step: IntArray
-    duration: float
+    time: FloatArray  # shape (n,), seconds, from 0 to `duration`, not decreasing
+    step: IntArray  # shape (n,), +1 or -1
+    duration: float  # seconds: length of the recording
     counts_per_rev: int
 
     def __post_init__(self) -> None:
@@ -71,17 +63,10 @@ class Steps:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Holds a measured speed.
+    """Holds a measured speed."""
 
-    Parameters
-    ----------
-    time : float64 array, shape (n,), seconds, increasing
-    velocity : float64 array, shape (n,), rad/s
-        Holds from `time` on, until the next one.
-    """
-
-    time: FloatArray
-    velocity: FloatArray
+    time: FloatArray  # shape (n,), seconds, increasing
+    velocity: FloatArray  # shape (n,), rad/s: holds from `time` on, until the next one
 
     def at(self, t: ArrayLike) -> FloatArray:
         """Return speed in rad/s that holds at times `t` in seconds; 0 before the first."""
@@ -89,19 +74,11 @@ class Estimate:
 
 
 class Readings(NamedTuple):
-    """Holds the readings of a controller, one per control period.
+    """Holds the readings of a controller, one per control period."""
 
-    Parameters
-    ----------
-    time : float64 array, shape (n,), seconds
-    counts : int64 array, shape (n,)
-    changed_at : float64 array, shape (n,), seconds
-        Of the latest step, 0 before the first.
-    """
-
-    time: FloatArray
-    counts: IntArray
-    changed_at: FloatArray
+    time: FloatArray  # shape (n,), seconds
+    counts: IntArray  # shape (n,)
+    changed_at: FloatArray  # shape (n,), seconds: of the latest step, 0 before the first
 
     @property
     def difference(self) -> IntArray:

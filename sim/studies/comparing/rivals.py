@@ -43,18 +43,10 @@ def _number(what: str, text: str) -> float:
 
 @dataclass(frozen=True)
 class Parameter:
-    """Describes an option of a baseline.
+    """Describes an option of a baseline."""
 
-    Parameters
-    ----------
-    argument : str
-        Of the model.
-    read : callable
-        Makes its value from the option's name and the text.
-    """
-
-    argument: str
-    read: Callable[[str, str], Any]
+    argument: str  # of the model
+    read: Callable[[str, str], Any]  # makes its value from the option's name and the text
 
 
 _PERIOD = Parameter("period_s", _time)
@@ -64,29 +56,16 @@ _ORDER = Parameter("order", parse_whole)
 
 @dataclass(frozen=True)
 class Baseline:
-    """Describes a float model of what others do.
+    """Describes a float model of what others do."""
 
-    Parameters
-    ----------
-    title : str
-        What it is.
-    usual : str
-        The settings that it has without options, in words: for the first four those that their projects come with.
-    model : callable
-        Takes `Steps` and the arguments of the parameters.
-    parameters : dict of str to Parameter
-        By the names of the options.
-    swept : tuple of dict of str to texts
-        What is tried for the best: in each, the product of all values, separated by spaces.
-    fixed : dict
-        Values of arguments that are left out, where they are not those of the model.
-    """
-
-    title: str
+    title: str  # what it is
+    # the settings that it has without options, in words: for the first four those that their projects come with
     usual: str
-    model: Callable[..., Estimate]
-    parameters: Mapping[str, Parameter]
+    model: Callable[..., Estimate]  # takes `Steps` and the arguments of the parameters
+    parameters: Mapping[str, Parameter]  # by the names of the options
+    # what is tried for the best: in each, the product of all values, separated by spaces
     swept: tuple[Mapping[str, str], ...]
+    # values of arguments that are left out, where they are not those of the model
     fixed: Mapping[str, Any] = field(default_factory=dict)
 
 

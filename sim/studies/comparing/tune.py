@@ -22,22 +22,13 @@ SETTLED_S = 0.1
 
 @dataclass(frozen=True)
 class Cost:
-    """Holds the cost of a setting.
+    """Holds the cost of a setting."""
 
-    Parameters
-    ----------
-    method, name : str
-        The method, and its name with the setting.
-    rms : float, rad/s
-        Error of the held velocity.
-    delay : float, seconds
-        See `equivalent_delay`.
-    """
-
+    # method and name: the method, and its name with the setting
     method: str
     name: str
-    rms: float
-    delay: float
+    rms: float  # rad/s: error of the held velocity
+    delay: float  # seconds: see `equivalent_delay`
 
 
 def core_settings(method: str) -> list[tuple[str, dict[str, str]]]:

@@ -38,16 +38,10 @@ class Command(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Load:
-    """Describes a torque that acts for some time.
+    """Describes a torque that acts for some time."""
 
-    Parameters
-    ----------
-    torque : float, Nm
-        Against the shaft.
-    begin, seconds : float, s
-    """
-
-    torque: float
+    torque: float  # Nm: against the shaft
+    # begin and seconds: s
     begin: float
     seconds: float
 
@@ -58,22 +52,13 @@ class Load:
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """Describes how the shaft is to move, and what disturbs it.
+    """Describes how the shaft is to move, and what disturbs it."""
 
-    Parameters
-    ----------
-    motion : Command
-        The commanded speed, and by its integral the commanded angle.
-    virtual : bool
-        The load is a current that is added behind the controller, as in the paper's experiment, and no torque.
-    noise : float, Nm rms
-        Of the torque: Gaussian, a new value every millisecond.
-    """
-
-    motion: Command
+    motion: Command  # the commanded speed, and by its integral the commanded angle
     load: Load | None = None
+    # the load is a current that is added behind the controller, as in the paper's experiment, and no torque
     virtual: bool = False
-    noise: float = 0.0
+    noise: float = 0.0  # Nm rms: of the torque: Gaussian, a new value every millisecond
 
     def course(self, motor: Motor, seed: int) -> Course:
         """Return the tables of a run."""
@@ -125,23 +110,15 @@ class Outcome:
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """A loop: a core, what is about it, and what it is to do.
-
-    Parameters
-    ----------
-    begin : float, s
-        From when on it is judged.
-    gates : LoopSpec or None
-        The core whose controller runs in place of one in double precision, see `in_gates`.
-    """
+    """A loop: a core, what is about it, and what it is to do."""
 
     spec: TachometerSpec
     gains: Gains
     task: Task
     motor: Motor = field(default_factory=Motor)
     encoder: VirtualEncoder
-    begin: float = 0.0
-    gates: LoopSpec | None = None
+    begin: float = 0.0  # s: from when on it is judged
+    gates: LoopSpec | None = None  # the core whose controller runs in place of one in double precision, see `in_gates`
 
     @property
     def simulation(self) -> Simulation:

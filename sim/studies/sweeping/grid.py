@@ -18,24 +18,12 @@ Item = TypeVar("Item", bound=_Digested)
 
 @dataclass(frozen=True)
 class Grid(Generic[Item]):
-    """Holds the points that are to be run.
+    """Holds the points that are to be run."""
 
-    Parameters
-    ----------
-    points : dict of str to Item
-        By their digests, in order.
-    at : dict of str to dict
-        Where each is: values of the axes that its method has.
-    axes : dict of str to list of str
-        All values of each axis.
-    left_out : dict of str to str
-        Methods of `all` that are impossible somewhere, and why.
-    """
-
-    points: dict[str, Item]
-    at: dict[str, dict[str, str]]
-    axes: dict[str, list[str]]
-    left_out: dict[str, str] = field(default_factory=dict)
+    points: dict[str, Item]  # by their digests, in order
+    at: dict[str, dict[str, str]]  # where each is: values of the axes that its method has
+    axes: dict[str, list[str]]  # all values of each axis
+    left_out: dict[str, str] = field(default_factory=dict)  # methods of `all` that are impossible somewhere, and why
 
 
 class Points(Grid[Point]):

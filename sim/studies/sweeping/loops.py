@@ -26,19 +26,11 @@ FIGURES = {
 
 @dataclass(frozen=True)
 class LoopPoint:
-    """Holds a setting with its seeds.
+    """Holds a setting with its seeds."""
 
-    Parameters
-    ----------
-    method : str
-        What the method is called.
-    text : str
-        The motion in words.
-    """
-
-    method: str
+    method: str  # what the method is called
     setting: Setting
-    text: str
+    text: str  # the motion in words
     seeds: tuple[int, ...]
 
     @cached_property

@@ -19,41 +19,23 @@ from tachometry.spec.language.units import plural
 
 @dataclass(frozen=True)
 class SweepResult:
-    """Holds what has come of a sweep.
-
-    Parameters
-    ----------
-    columns : dict of str to list
-        Those that were wanted, with a value for each point.
-    n_run : int
-        Points that were run; the others were in the file.
-    """
+    """Holds what has come of a sweep."""
 
     grid: Points
-    columns: dict[str, list[Any]]
-    n_run: int
+    columns: dict[str, list[Any]]  # those that were wanted, with a value for each point
+    n_run: int  # points that were run; the others were in the file
     seconds: float
 
 
 @dataclass(frozen=True)
 class LoopResult:
-    """Holds what has come of loops.
-
-    Parameters
-    ----------
-    rows : dict of str to Row
-        The mean of the seeds, by the digest of the point.
-    seeds : list of Row
-        A row for each seed of a loop that is alone, and
-    log : Log
-        what happened with the first.
-    """
+    """Holds what has come of loops."""
 
     grid: Loops
-    rows: dict[str, Row]
+    rows: dict[str, Row]  # the mean of the seeds, by the digest of the point
     seconds: float
-    seeds: list[Row] = field(default_factory=list)
-    log: Log = field(default_factory=dict)
+    seeds: list[Row] = field(default_factory=list)  # a row for each seed of a loop that is alone
+    log: Log = field(default_factory=dict)  # what happened in it with the first seed
 
 
 def run_sweep(

@@ -119,33 +119,21 @@ def _content(about: Option) -> tuple[str, str]:
 class Point:
     """Describes a core on a motion.
 
-    Parameters
-    ----------
-    method : str
-        What the method is called.
-    text : str
-        The motion in words.
-    values : dict of str to float
-        What the sweep varies within the motion, in rad/s, s and Hz: a column each.
-    earliest : float, seconds
-        Errors before it are left out.
-    engine : str or None
-        What runs the hardware; None: the golden model alone, which it equals.
-
     Raises
     ------
     ValueError
         If the motion is shorter than a tick, or no two ticks of it are compared.
     """
 
-    method: str
+    method: str  # what the method is called
     spec: TachometerSpec
     encoder: VirtualEncoder
     motion: Motion
-    text: str
+    text: str  # the motion in words
+    # what the sweep varies within the motion, in rad/s, s and Hz: a column each
     values: dict[str, float] = field(default_factory=dict)
-    earliest: float = 0.0
-    engine: str | None = None
+    earliest: float = 0.0  # seconds: errors before it are left out
+    engine: str | None = None  # what runs the hardware; None: the golden model alone, which it equals
 
     def __post_init__(self) -> None:
         needed = self.spec.times.longest_tick + self.spec.latency.tick
