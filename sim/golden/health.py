@@ -72,7 +72,7 @@ def faults(spec: TachometerSpec, trace: PinTrace, steps: Steps, index: Table, cl
         return Table(_NONE, {})
     standing, codes = _standing(spec, steps)
     illegal = _illegal(spec, steps.errors)
-    wrong, off = _index(spec, steps, index) if spec.index_watched else (standing[:0], standing[:0])
+    wrong, off = _index(spec, steps, index) if spec.index_watched else (_NONE, _NONE)
     opened, lines = _open(spec, trace, clears)
     missed = steps.missed + spec.latency.tick
     others = {Fault.ILLEGAL: illegal, Fault.INDEX_MISSED: missed, Fault.INDEX_COUNTS: wrong}

@@ -20,6 +20,7 @@ from tachometry.spec.registers.axes import AxesMap
 )
 def test_registers_are_those_of_the_golden_model(seed: int, spec: AxesSpec) -> None:
     registers = AxesMap(spec.tachometer, spec)
+    assert [one.name for one in registers.status] == [f"STATUS_{axis}" for axis in range(spec.axes)]
     trace = motions(spec, 1500)
     accesses, captures = random_accesses(registers, seed, trace.n_clocks)
     rows: list[dict[str, int]] = [{"capture": 0, "bus.read": 0, "bus.write": 0} for _ in range(trace.n_clocks)]

@@ -168,6 +168,10 @@ def test_the_speed_changes_at_the_rate() -> None:
     assert abs(len(a) / 2 - periods) <= 1
 
 
+def test_a_ramp_that_is_changed_in_the_first_clock() -> None:
+    check([Change(clock, EmulatorSettings(speed=(5 + clock) << 28, rate=1 << 31)) for clock in (-1, 0)], None)
+
+
 @pytest.mark.parametrize("clock", [1 << 16, (1 << 16) + 1])
 def test_a_ramp_turns_round_without_a_jump(clock: int) -> None:
     ramp = EmulatorSettings(speed=1 << 28, rate=1 << 27)

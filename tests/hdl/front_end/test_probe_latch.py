@@ -23,6 +23,7 @@ from tachometry.sim.golden.registers import Access, GoldenBank
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import TachometerSpec, of_texts
+from tachometry.spec.core.probe import RISING
 from tachometry.spec.registers.map import RegisterMap
 
 BASE = {"ppr": "25", "clock": "1MHz", "tick": "20clk", "max-time": "60clk", "probe": "rising,falling,both"}
@@ -115,6 +116,16 @@ def test_an_edge_of_a_probe_and_a_count_of_the_same_clock_are_in_order(clocks: i
         assert latched.probe_position_1.tolist() == [position]
         assert latched.probe_time_1.tolist() == [min(time, 2**spec.times.probe_width - 1)]
         assert latched.clock.tolist() == [at + spec.latency.entries["pin_to_probe"]]
+
+
+@pytest.mark.parametrize(("before", "latches"), [(1, True), (2, False)])
+def test_edges_that_a_program_sets_hold_from_the_clock_after(before: int, latches: bool) -> None:
+    """An edge is known a clock before it is shown, by what is set before that."""
+    spec = of_texts("s", BASE | {"probe": "1"})
+    set_at = 20 + spec.latency.entries["pin_to_probe"] - before
+    low, edges = np.zeros(3, np.uint8), np.array([RISING, RISING, 0])
+    trace = PinTrace(np.array([0, 20, set_at]), low, low, 80, more={"probe": np.array([0, 1, 1]), "probe_edges": edges})
+    assert len(golden.tables(spec, trace.completed(spec))["probe_valid_0"]) == latches
 
 
 def test_fine_position_and_velocity_say_where_an_even_shaft_was() -> None:

@@ -147,4 +147,8 @@ def test_it_tells_what_cannot_be() -> None:
             of_texts("t", {**BASE, "ppr": "60", "missing-teeth": "60-2"} | more)
     spec = spec_of("60-2", index="yes")
     assert of_options(spec.options) == spec
-    assert {"z"} & {port.name for port in spec.ports} == set()
+    texts = {port.name: port.help for port in spec.ports}
+    assert "z" not in texts
+    assert texts["index_valid"] == "One clock for every first tooth after a gap."
+    assert texts["index_position"].startswith("Position at the first tooth after a gap, ")
+    assert texts["decode_error"].startswith("One clock: the gap was not where it had to be")
