@@ -26,7 +26,7 @@ def check(setting: Setting, seed: int) -> Checked:
     both = in_gates(setting)
     assert both.gates is not None
     log, through = both.through(simulation_of(both.gates), seed)
-    n_ticks = len(range(both.gates.first_tick, through.trace.n_clocks, both.gates.period))
+    n_ticks = len(range(both.gates.latency.first_tick, through.trace.n_clocks, both.gates.period))
     commands = [Command(*row) for row in through.commands[:n_ticks].tolist()]
     expected = run_loop(both.gates, through.trace, commands, golden.tables).tables["current_valid"]
     columns = (expected.clock, expected.current, expected.filtered_velocity, expected.disturbance)

@@ -9,6 +9,7 @@ from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines.loop import Gains, Motor, Observer
 from tachometry.sim.studies.loops.control import Load, Outcome, Setting, Task, outcome_of
 from tachometry.spec import TachometerSpec, of_texts
+from tachometry.spec.methods.track import in_loop
 
 # k_v in 1/s. Each is a fifth more than the one before.
 GAINS = tuple(round(20 * 2 ** (k / 4), 1) for k in range(21))
@@ -70,7 +71,7 @@ def core(kind: Kind, seconds: float, decoding: int = 4, kv: float = GAINS[0]) ->
     texts = {"ppr": "500", "clock": clock, "tick": tick, "max-time": "10ms", "decoding": str(decoding)}
     if tick == "20ns":
         texts["frac-bits"] = "24"
-    return of_texts(kind.method, texts | dict(kind.options)).in_loop(Fraction(kv))
+    return in_loop(of_texts(kind.method, texts | dict(kind.options)), Fraction(kv))
 
 
 def gains_of(kind: Kind, kv: float, seconds: float) -> Gains:

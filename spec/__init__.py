@@ -21,7 +21,7 @@ from tachometry.spec.methods.mt import MTTachometer
 from tachometry.spec.methods.rairan import RairanTachometer
 from tachometry.spec.methods.s import STachometer
 from tachometry.spec.methods.t import TTachometer
-from tachometry.spec.methods.track import TrackTachometer
+from tachometry.spec.methods.track import TrackTachometer, in_loop
 
 # Every method by its name; `DATAPATHS` in hdl/ and `MODELS` in sim/golden/ hold what belongs to it.
 METHODS: dict[str, type[TachometerSpec]] = {
@@ -180,7 +180,7 @@ def _check_division(spec: TachometerSpec) -> None:
 def _of_method(method: str, texts: Mapping[str, str]) -> TachometerSpec:
     """Return the core of a method."""
     spec = spec_class(method)
-    given = {**spec.usual, **texts}
+    given = {**spec.facts.usual, **texts}
     known = {about.name: about for about in (*common_options(), *own_options(method))}
     for name in given:
         parameter = name.replace("-", "_")
@@ -231,7 +231,7 @@ def with_loop(spec: CoreSpec, texts: Mapping[str, str]) -> LoopSpec:
     The tachometer is as such a loop needs it: with method track, its memory is bounded.
     """
     loop = _looped(spec, texts)
-    return replace(loop, tachometer=loop.tachometer.in_loop(loop.velocity_gain))
+    return replace(loop, tachometer=in_loop(loop.tachometer, loop.velocity_gain))
 
 
 def _looped(spec: CoreSpec, texts: Mapping[str, str]) -> LoopSpec:

@@ -130,12 +130,12 @@ def _read(
             if text_of_line is not None and line not in alone.encoder.kind.lines:
                 raise OptionError(line, f"must not be given together with --sensor {sensor}")
         line_a, line_b = (_of_axis(line, text, axis, axes) for line, text in (("a", a), ("b", b)))
-        index = _of_axis("z", z, axis, axes) if z is not None or "z" in alone.lines else None
+        index = _of_axis("z", z, axis, axes) if z is not None or "z" in alone.front_end.lines else None
         tick = "tick_in" if tick_in is None and alone.external_tick else tick_in
         rate = None if samplerate is None else float(parse_frequency("samplerate", samplerate))
         second = SAME if sensor == "pulses" else line_b
         third = (c or "c") if sensor == "hall" else None
-        recording = read_capture(capture, line_a, second, rate, index, tick, text, third, alone.complemented)
+        recording = read_capture(capture, line_a, second, rate, index, tick, text, third, alone.front_end.complemented)
         return with_last_tick(fitted(recording, alone.encoder), spec)
 
     if others.get("capture") is None:

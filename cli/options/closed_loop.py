@@ -19,6 +19,7 @@ from tachometry.spec.control.motor import Motor
 from tachometry.spec.core.timing import whole_clocks
 from tachometry.spec.language.option import ParameterError, options_of
 from tachometry.spec.language.units import TIME, TORQUE, Units, format_time, number_reader, parse_time, read_nearest
+from tachometry.spec.methods.track import in_loop
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.studies.loops.control import Load, Setting
@@ -193,7 +194,7 @@ def _core_motor_and_gains(
         torque_constant=torque_constant,
         current_limit=float(law.current_limit),
     )
-    return spec.in_loop(law.velocity_gain), motor, gains
+    return in_loop(spec, law.velocity_gain), motor, gains
 
 
 # Gives what makes a setting of a core, the motion in words, and the first seed.

@@ -75,10 +75,10 @@ def _pulses(spec: TachometerSpec, texts: tuple[str, ...]) -> dict[str, Ints]:
     apart = 2 * (spec.filter_clocks + 1)  # high and low as long as the filter asks for
     for text in texts:
         name, colon, times = text.partition(":")
-        if not spec.pulsed:
+        if not (pulsed := spec.front_end.pulsed):
             raise ParameterError("pulse", "must be given together with --preset, --index-once or --probe")
-        if name not in spec.pulsed or not colon:
-            raise ParameterError("pulse", f"must be INPUT:TIME,TIME… of {' or '.join(spec.pulsed)}, not {text!r}")
+        if name not in pulsed or not colon:
+            raise ParameterError("pulse", f"must be INPUT:TIME,TIME… of {' or '.join(pulsed)}, not {text!r}")
         if name in found:
             whole = ",".join(each.partition(":")[2] for each in texts if each.startswith(f"{name}:"))
             raise ParameterError("pulse", f"must be given once for {name}: type --pulse {name}:{whole}")

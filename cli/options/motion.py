@@ -93,7 +93,7 @@ def _read_encoder(**given: Any) -> dict[str, Any]:
     def encoder(spec: TachometerSpec) -> VirtualEncoder:
         from tachometry.sim.encoder.virtual import VirtualEncoder
 
-        wires = dict(index=spec.index, index_state=spec.index_place, complemented=spec.complemented)
+        wires = dict(index=spec.index, index_state=spec.front_end.index_place, complemented=spec.front_end.complemented)
         return VirtualEncoder.of(spec.encoder, **wires, **values)
 
     return dict(encoder=encoder, **given)

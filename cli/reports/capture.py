@@ -100,7 +100,7 @@ def _index_place(axis: Axis) -> list[str]:
     recording = axis.recording
     if not len(near) or recording.z is None:
         return []
-    if axis.spec.index_state is not None:
+    if axis.spec.front_end.index_state is not None:
         return [
             f"to and fro, the index is found {int(near.max())} counts apart: z is high for longer than a period of A, "
             "and meets its state twice; find it in one direction alone"

@@ -9,7 +9,7 @@ from tachometry.spec.registers.buses import Bus
 
 def loop_rows(spec: LoopSpec, bus: Bus | None = None) -> list[tuple[str, str]]:
     """Return the configuration of tachometer and loop, and the registers on a bus."""
-    form, period, late = spec.form, spec.units.seconds, spec.tick_to_result
+    form, period, late = spec.form, spec.units.seconds, spec.latency.tick_to_result
     filtered = "none" if spec.filter is None else f"{float(spec.filter):.6g} rad/s"
     when = "at updates of the velocity" if spec.synchronised else "at every control tick"
     widths = ", ".join(
@@ -28,7 +28,7 @@ def loop_rows(spec: LoopSpec, bus: Bus | None = None) -> list[tuple[str, str]]:
         (
             "multiplier",
             f"{spec.multiplier}: words of {form.word_width} bits by coefficients of {form.factor_bits}, "
-            f"{plural(spec.product_clocks, 'clock')} a product",
+            f"{plural(spec.latency.product, 'clock')} a product",
         ),
         ("widths of the loop", widths),
     ]

@@ -189,7 +189,7 @@ def wrong_rows(state: State) -> list[tuple[str, str]]:
         if name in state.counters or name != "tick_errors":
             number = state.counters.get(name)
             rows.append((text, "-" if number is None else f"{number}{' or more' * (number == _SATURATED)}"))
-    if state.spec.index_state is not None:
+    if state.spec.front_end.index_state is not None:
         rows += [(name.replace("_", " "), str(state.told[name])) for name in (WIDE, MISSED)]
     if "health" in state.columns:
         code = state.value("health")

@@ -129,7 +129,7 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         found = {text: len(run.tables.get(name, ())) for name, text in wrong.items()}
         told = "".join(f"; {text} {number} times" for text, number in found.items() if number)
         rows.append(("index", f"{len(run.index.clock)} times{last}{index_distance(axis)}{told}"))
-    if spec.wheel is not None:
+    if spec.front_end.wheel is not None:
         synced = np.flatnonzero(run.ticks.synced)
         when = format_time(spec.times.seconds(int(run.ticks.clock[synced[0]]))) if len(synced) else ""
         lost = "" if run.ticks.synced[-1] or not when else ", and lost"
@@ -138,8 +138,8 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         rows.append(("homed", "yes" if run.ticks.homed[-1] else "no"))
     if spec.preset is not None:
         rows.append(("position", f"{run.ticks.position[-1]} at the end; counts out are without presets"))
-    if spec.modulus is not None:
-        rows.append(("position modulo", f"{run.ticks.position_modulo[-1]} of {spec.modulus} at the end"))
+    if spec.front_end.modulus is not None:
+        rows.append(("position modulo", f"{run.ticks.position_modulo[-1]} of {spec.front_end.modulus} at the end"))
     if spec.health:
         code, number = run.ticks.health[-1], int(run.ticks.faults[-1])
         faults = plural(number, "fault") + " or more" * (number == (1 << FAULTS_WIDTH) - 1)

@@ -41,7 +41,9 @@ class AxesTachometer(wiring.Component):
         self.rounds = Rounds(spec.slots, spec.rounds, WARM_UP, external)
         self.axis_filter: AxisFilter | None = None
         if spec.axis.filter_clocks:
-            self.axis_filter = AxisFilter(slots=spec.slots, looks=spec.axis.filter_clocks, lines=spec.lines)
+            self.axis_filter = AxisFilter(
+                slots=spec.slots, looks=spec.axis.filter_clocks, lines=spec.axis.front_end.lines
+            )
         decoded: dict[str, Any] = {"decoding": spec.axis.encoder.decoding, "reverse": spec.axis.encoder.reverse}
         self.axis_counters: AxisCounters
         self.datapath: AxesDatapath | AxesTrackDatapath
@@ -77,7 +79,7 @@ class AxesTachometer(wiring.Component):
             m.submodules[f"sync_{name}"] = Synchronizer(getattr(self, name), levels)
         if spec.axis.external_tick:
             m.d.comb += [rounds.tick_in.eq(level["tick_in"]), self.tick_error.eq(rounds.tick_error)]
-        at, level, known = self._looks(m, {name: level[name] for name in spec.lines})
+        at, level, known = self._looks(m, {name: level[name] for name in spec.axis.front_end.lines})
         level |= {name: ~level[name] for name in spec.axis.encoder.inverted}
         m.d.comb += [
             *(getattr(counters, name).eq(at[name]) for name in ("slot", "first", "last")),
@@ -97,7 +99,7 @@ class AxesTachometer(wiring.Component):
         self._show(m, UPDATE, datapath.velocity_valid, "axis", datapath.axis, datapath)
         if self.axis_index is not None:
             m.submodules.axis_index = index = self.axis_index
-            state, all_known = spec.axis.index_state, known["z"] & known["a"] & known["b"]
+            state, all_known = spec.axis.front_end.index_state, known["z"] & known["a"] & known["b"]
             m.d.comb += [
                 index.slot.eq(at["slot"]),
                 index.ready.eq(at["ready"]),

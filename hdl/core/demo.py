@@ -85,12 +85,12 @@ class Demo(wiring.Component):
         """Give the core its pins, or the lines of the emulator and a tick in each period."""
         core, emulator, bank = self.core, self.emulator, self.core.bank
         follow(m, emulator, bank, (field.port for field in self._map.emulated))
-        for line in self._map.spec.complemented:
+        for line in self._map.spec.front_end.complemented:
             name = f"{line}_n"
             m.d.comb += getattr(core, name).eq(Mux(bank.emulated, getattr(emulator, name), ~getattr(self, line)))
         for pin in (pin for pin in self._map.spec.ports.pins if hasattr(self, pin.name)):
             emulated = getattr(emulator, pin.name) if pin.name in self._lines else period  # the external tick
-            if pin.name in self._map.spec.controls:
+            if pin.name in self._map.spec.front_end.controls:
                 emulated = getattr(self, pin.name)
             if pin.name in self._lines:
                 m.d.comb += getattr(self, f"emulated_{pin.name}").eq(emulated)

@@ -31,7 +31,7 @@ class LoopCore(wiring.Component):
         self._spec = spec
         super().__init__(members(spec.ports))
         self.tachometer = Tachometer(spec.tachometer)
-        self.control_clock = ControlClock(spec.first_tick, spec.period, tells=bool(spec.held_inputs))
+        self.control_clock = ControlClock(spec.latency.first_tick, spec.period, tells=bool(spec.held_inputs))
         self.window = UpdateWindow(spec.form)
         self.controller = Controller(spec.form, spec.multiplier)
         self.sigma_delta = SigmaDelta(spec.current_width)

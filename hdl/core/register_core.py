@@ -49,7 +49,7 @@ class RegisterCore(wiring.Component):
         core, bank = self.tachometer, self.bank
         whole = core if self.loop is None else self.loop
         # Long windows saturate what has been counted since the tick, and what sets the position is not in it.
-        counted = not (spec.facts.own_ticks or spec.moves_position)
+        counted = not (spec.facts.own_ticks or spec.front_end.moves_position)
         open_sum = core.pulse_counter.open_sum if counted else None
         position = TickPosition(spec.position_width, 0 if open_sum is None else len(open_sum))
         restarts = ResetInserter(bank.restart) if hasattr(bank, "restart") else lambda box: box
@@ -96,7 +96,7 @@ class RegisterCore(wiring.Component):
 
     def _place(self, m: Module) -> None:
         """Let a program set the position, arm the index, and move the place within a modulus."""
-        core, bank, modulus = self.tachometer, self.bank, self._map.spec.modulus
+        core, bank, modulus = self.tachometer, self.bank, self._map.spec.front_end.modulus
         for name, box in core.controls.items():
             m.d.comb += box.asked.eq(getattr(bank, f"{name}_now"))
         if "preset" in core.controls:

@@ -59,8 +59,9 @@ class Tachometer(wiring.Component):
     def __init__(self, spec: TachometerSpec) -> None:
         self._spec = spec
         super().__init__(members(spec.ports))
-        self.conditioner = InputConditioner(spec.filter_clocks, (*spec.lines, *spec.probes), spec.complemented)
-        self.decoder = decoder_of(spec.encoder, spec.wheel)
+        front = spec.front_end
+        self.conditioner = InputConditioner(spec.filter_clocks, (*front.lines, *front.probes), front.complemented)
+        self.decoder = decoder_of(spec.encoder, front.wheel)
         self.pulse_counter = PulseCounter(
             max(spec.times.longest_tick, spec.widths.max_pulse_count),
             spec.widths.max_pulse_count,
@@ -68,21 +69,21 @@ class Tachometer(wiring.Component):
             staged=spec.latency.tick - spec.latency.registers_steps > 2,
         )
         self.position_counter = PositionCounter(spec.position_width, spec.latency.tick, spec.preset)
-        self.controls = {name: PinRise(spec.latency.tick) for name in spec.controls}
-        self.modulo_counter = None if spec.modulus is None else ModuloCounter(spec.modulus, spec.latency.tick)
+        self.controls = {name: PinRise(spec.latency.tick) for name in front.controls}
+        self.modulo_counter = None if front.modulus is None else ModuloCounter(front.modulus, spec.latency.tick)
         self.index_capture: IndexCapture | None = None
         if spec.index:
             self.index_capture = IndexCapture(spec.position_width, spec.latency.tick, once=spec.index_once)
         self.index_state: IndexState | None = None
-        if spec.index_state is not None:
-            after = spec.encoder.kind.after(spec.index_state)
-            self.index_state = IndexState(spec.index_state, after, spec.latency.tick)
+        if front.index_state is not None:
+            after = spec.encoder.kind.after(front.index_state)
+            self.index_state = IndexState(front.index_state, after, spec.latency.tick)
         self.probe_latch: ProbeLatch | None = None
         if spec.probe:
             fine = {port.name: port.width for port in spec.method_ports}.get(FINE, 0)
             self.probe_latch = ProbeLatch(
                 packed_edges(spec.probe),
-                len(spec.probes),
+                len(front.probes),
                 spec.position_width,
                 spec.times.probe_width,
                 spec.latency.tick,
@@ -96,12 +97,12 @@ class Tachometer(wiring.Component):
                 second=spec.timing.clock_hz,
                 edges=spec.health_edges,
                 errors=spec.health_errors,
-                counts_per_rev=spec.encoder.counts_per_rev if spec.index_watched else 0,
-                position_width=spec.position_width if spec.index_watched else 0,
+                counts_per_rev=spec.encoder.counts_per_rev if front.index_watched else 0,
+                position_width=spec.position_width if front.index_watched else 0,
                 index_reset=spec.index_reset,
-                presets=spec.index_watched and spec.preset is not None,
-                complements=dict.fromkeys(spec.complemented, spec.complements or 0),
-                misses=spec.index_state is not None,
+                presets=front.index_watched and spec.preset is not None,
+                complements=dict.fromkeys(front.complemented, spec.complements or 0),
+                misses=front.index_state is not None,
             )
         self.datapath = DATAPATHS[spec.method](spec)
         self.sampling_clock: TickSource
@@ -128,7 +129,7 @@ class Tachometer(wiring.Component):
         if spec.compare is not None:
             clocks = spec.compare.clocks(spec.timing.clock_hz)
             if isinstance(spec, TrackTachometer) and spec.compare.fine:
-                given = spec.carrying, spec.widths.native
+                given = spec.scale.carrying, spec.widths.native
                 self.compare_output = FineCompareOutput(spec.compare, clocks, spec.position_width, *given)
             else:
                 self.compare_output = CompareOutput(spec.compare, clocks, spec.position_width)
@@ -182,7 +183,7 @@ class Tachometer(wiring.Component):
                 self.sampling_clock.tick_in.eq(self.tick_in),
                 self.tick_error.eq(self.sampling_clock.tick_error),
             ]
-        if self._spec.wheel is not None:
+        if self._spec.front_end.wheel is not None:
             with m.If(self.pulse_counter.coming):
                 m.d.sync += self.synced.eq(self.decoder.synced)
         if self._spec.filter_clocks:
@@ -310,7 +311,7 @@ class Tachometer(wiring.Component):
         """Return Z as it is, in its state alone, or of a gap, and whether it is real, as is the level before."""
         level: Value
         ready: Value
-        if self._spec.wheel is not None:
+        if self._spec.front_end.wheel is not None:
             return self.decoder.index, self.decoder.ready
         m.d.comb += self.conditioner.z.eq(self.z)
         level, ready = self._level("z"), self.conditioner.ready_z
@@ -334,10 +335,10 @@ class Tachometer(wiring.Component):
         m.submodules.watch = watch = self.watch
         follow(m, watch, self.decoder, ("level_a", "level_b", "ready", "step", "decode_error"))
         follow(m, self, watch, ("health", "faults"))
-        follow(m, self.conditioner, self, (f"{line}_n" for line in self._spec.complemented))
-        follow(m, watch, self.conditioner, (f"equal_{line}" for line in self._spec.complemented))
+        follow(m, self.conditioner, self, (f"{line}_n" for line in self._spec.front_end.complemented))
+        follow(m, watch, self.conditioner, (f"equal_{line}" for line in self._spec.front_end.complemented))
         m.d.comb += self.fault.eq(watch.health.any())
-        if self.index_capture is not None and self._spec.index_watched:
+        if self.index_capture is not None and self._spec.front_end.index_watched:
             if self._spec.preset is not None:
                 m.d.comb += watch.preset.eq(self.controls["preset"].rises)
             follow(m, watch, self.index_capture, ("index_valid", "index_position"))
@@ -350,7 +351,7 @@ class Tachometer(wiring.Component):
         if self.probe_latch is None:
             return
         m.submodules.probe_latch = latch = self.probe_latch
-        names = self._spec.probes
+        names = self._spec.front_end.probes
         m.d.comb += [
             *(getattr(self.conditioner, name).eq(level) for name, level in zip(names, self.probe, strict=True)),
             latch.level.eq(Cat(getattr(self.conditioner, f"level_{name}") for name in names)),

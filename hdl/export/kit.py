@@ -60,8 +60,8 @@ def _synchronizers(spec: AnySpec, bus: Bus | None) -> dict[str, list[str]]:
     box = {"tick_in": ["sampling_clock"]} if spec.axes is None else {}
     default = ["conditioner"] if spec.axes is None else []
     tacho = spec.tachometer
-    complements = [f"{line}_n" for line in tacho.complemented]
-    pins = (*tacho.lines, *complements, *tacho.probes, *["tick_in"] * tacho.external_tick)
+    complements = [f"{line}_n" for line in tacho.front_end.complemented]
+    pins = (*tacho.front_end.lines, *complements, *tacho.front_end.probes, *["tick_in"] * tacho.external_tick)
     boxes = {pin: box.get(pin, default) for pin in pins}
     boxes |= {line: ["bridge"] for line in (bus.asynchronous if bus else ())}
     return {pin: [*path, f"sync_{pin}"] for pin, path in boxes.items()}
@@ -72,7 +72,7 @@ def _first_levels(spec: AnySpec) -> dict[str, int]:
     encoder, all_ones = spec.tachometer.encoder, (1 << (spec.axes or 1)) - 1
     first = dict(zip(encoder.kind.lines, encoder.kind.legal[0], strict=True)) | {"z": 0}
     at_pins = {line: level ^ (line in encoder.inverted) for line, level in first.items()}
-    at_pins |= {f"{line}_n": 1 - at_pins[line] for line in spec.tachometer.complemented}
+    at_pins |= {f"{line}_n": 1 - at_pins[line] for line in spec.tachometer.front_end.complemented}
     return {line: all_ones for line, level in at_pins.items() if level}
 
 
@@ -101,7 +101,7 @@ def _turned(encoder: Encoder, turns: tuple[int, int]) -> tuple[dict[str, str], i
 def _wired(spec: TachometerSpec, levels: dict[str, str]) -> dict[str, str]:
     """Return levels of the pins: those of the lines, but of inverted ones and complements the others."""
     wired = {line: f"~({level})" if line in spec.encoder.inverted else level for line, level in levels.items()}
-    return wired | {f"{line}_n": f"~({wired[line]})" for line in spec.complemented if line in wired}
+    return wired | {f"{line}_n": f"~({wired[line]})" for line in spec.front_end.complemented if line in wired}
 
 
 @singledispatch

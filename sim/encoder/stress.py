@@ -58,7 +58,7 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
             level[rng.random(len(level)) < 0.01] = 7
         level[VirtualEncoder.of(spec.encoder).absent(place)] = 0
     z = (rng.random(len(clock)) < 0.05).astype(np.uint8)
-    if spec.index_state is not None:  # at times wider than a period
+    if spec.front_end.index_state is not None:  # at times wider than a period
         z |= np.repeat(rng.random(len(clock) // 12 + 1) < 0.1, 12)[: len(clock)].astype(np.uint8)
     n_clocks = int(clock[-1]) + spec.facts.rest_tenths * longest // 10 + 40 * cycles + 300
     a, b, c = (level >> np.uint8(line) & np.uint8(1) for line in range(3))
@@ -66,7 +66,7 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     trace = _open(spec, trace, seed)
     if spec.compare is not None and spec.compare.depth:
         trace = _listed(spec, trace, went, seed)
-    for name in spec.controls:
+    for name in spec.front_end.controls:
         few = 30 if name == "preset" else 6
         high = spec.filter_clocks + int(rng.integers(1, 30))
         apart = rng.integers(high + spec.filter_clocks + 1, n_clocks // few + high + spec.filter_clocks + 2, few)
@@ -83,7 +83,8 @@ def _probed(spec: TachometerSpec, trace: PinTrace, seed: int) -> PinTrace:
     """Return the trace with edges of probes in clocks of edges, beside them and anywhere, armed now and then; a stream
     is ready now and then.
     """
-    bits = {"probe": len(spec.probes), "probe_arm": len(spec.probes), READY: int(spec.stream is not None)}
+    probes = len(spec.front_end.probes)
+    bits = {"probe": probes, "probe_arm": probes, READY: int(spec.stream is not None)}
     if not any(bits.values()):
         return trace
     rng = np.random.default_rng([seed, 2])
@@ -101,7 +102,7 @@ def _probed(spec: TachometerSpec, trace: PinTrace, seed: int) -> PinTrace:
 def _open(spec: TachometerSpec, trace: PinTrace, seed: int) -> PinTrace:
     """Return the trace with complements that equal their lines for a while."""
     rng = np.random.default_rng([seed, 3])
-    for line in spec.complemented:
+    for line in spec.front_end.complemented:
         most = spec.complements or 0
         begin = np.append(0, rng.integers(0, trace.n_clocks, 20))
         end = np.minimum(begin + np.append(most, rng.choice([1, most, most + 1, 3 * most], 20)), trace.n_clocks - 1)

@@ -102,7 +102,8 @@ class GateLoop:
             most_edges=MOST_EDGES,
         )
         # A current is at the motor in the clock after the one in which it is new.
-        clocks = {"clocks": int(spec.period), "first": spec.first_tick, "delay": spec.tick_to_result + 1}
+        first, delay = spec.latency.first_tick, spec.latency.tick_to_result + 1
+        clocks = {"clocks": int(spec.period), "first": first, "delay": delay}
         controller = CONTROLLER(**clocks)
         found = self._simulation.call(
             motor, edges, controller, course, log, 1e-5, ctypes.cast(ctypes.byref(gates), ctypes.c_void_p).value

@@ -76,7 +76,7 @@ def _carried(
     """Yield the same of places between counts: that of an update, and eight times its velocity per clock for each clock
     in which it catches up, then the velocity once a clock.
     """
-    way = spec.carrying
+    way = spec.scale.carrying
     half = 1 << spec.position_width - 1 + way.fine_bits
     widest = half << way.more_bits
     jumps = np.concatenate([steps.presets, steps.index[: len(steps.index) * spec.index_reset]]) + spec.latency.tick

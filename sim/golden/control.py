@@ -151,7 +151,7 @@ def control(
         rows.append((loop.current, loop.saturated, loop.y, loop.w))
     columns = np.array(rows, dtype=np.int64).reshape(-1, 4).T
     names = ("current", "current_saturated", "filtered_velocity", "disturbance")
-    return Table(clock + spec.tick_to_result, dict(zip(names, columns, strict=True)))
+    return Table(clock + spec.latency.tick_to_result, dict(zip(names, columns, strict=True)))
 
 
 def run_loop(
@@ -167,7 +167,7 @@ def run_loop(
     and gains, where they are inputs.
     """
     alone = spec.tachometer
-    clock = np.arange(spec.first_tick, trace.n_clocks, spec.period)
+    clock = np.arange(spec.latency.first_tick, trace.n_clocks, spec.period)
     # The position is as late as a tick shows it.
     places, _ = count(alone, decoded(alone, trace), clock - alone.latency.tick)
     found = tables(alone, trace)

@@ -191,15 +191,15 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     at = clock + spec.latency.pin_to_count + (np.arange(len(clock)) == 0)
     changed = packed([line[1:] ^ line[:-1] for line in levels])
     rises = wide = missed = at[:0]
-    seen = [conditioned(name) for name in spec.probes]
+    seen = [conditioned(name) for name in spec.front_end.probes]
     probes = tuple((clock_of + spec.latency.pin_to_count, level) for clock_of, level in seen)
-    if spec.wheel is not None:
+    if spec.front_end.wheel is not None:
         swallowed = np.sort(np.concatenate(returned)) + 3
         return _without_gaps(spec, Steps(at[1:], step[1:], at[:0], rises, swallowed, probes=probes), trace)
     if spec.index:
         at_z, z = conditioned("z")
         z = z ^ np.uint8("z" in encoder.inverted)
-        if spec.index_state is not None:
+        if spec.front_end.index_state is not None:
             at_z, levels_z = together([*zip([clock] * len(levels), levels, strict=True), (at_z, z)])
             line_z = levels_z[-1]
             z, again = in_state(spec, levels_z)
@@ -208,7 +208,7 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
             missed = passed_by(at[step != 0], step[step != 0], at_state, line_z, z)
         rises = at_z[1:][z[1:] > z[:-1]] + spec.latency.pin_to_count
     asked = {"preset": rises[:0], "home": rises[:0]}
-    for name in spec.controls:
+    for name in spec.front_end.controls:
         at_pin, level = conditioned(name)
         asked[name] = at_pin[1:][level[1:] > level[:-1]] + spec.latency.pin_to_count
     swallowed = np.sort(np.concatenate(returned)) + 3
@@ -218,8 +218,8 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
 
 def _without_gaps(spec: TachometerSpec, steps: Steps, trace: PinTrace) -> Steps:
     """Return the steps of a wheel with its missing teeth."""
-    assert spec.wheel is not None
-    teeth = filled(spec.wheel, steps.clock[steps.step != 0], trace.n_clocks)
+    assert spec.front_end.wheel is not None
+    teeth = filled(spec.front_end.wheel, steps.clock[steps.step != 0], trace.n_clocks)
     index = teeth.index if spec.index else steps.index
     step = np.full(len(teeth.clock), -1 if spec.encoder.reverse else 1)
     return replace(steps, clock=teeth.clock, step=step, errors=teeth.errors, index=index, wheel=teeth)
@@ -328,7 +328,7 @@ def count(
     columns = {
         "pulse_count": np.clip(sums, -spec.widths.max_pulse_count, spec.widths.max_pulse_count),
         "position": wrapped(spec, reached - origins.after(last)),
-        "position_modulo": shaft % (spec.modulus or 1),
+        "position_modulo": shaft % (spec.front_end.modulus or 1),
         "homed": homed(spec, steps, strobe),
         "overflow": overflow,
         "swallowed_edges": 2 * np.minimum(glitches, (1 << 15) - 1),

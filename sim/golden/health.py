@@ -51,7 +51,7 @@ def _open(spec: TachometerSpec, trace: PinTrace, clears: Ints) -> tuple[Ints, In
     cleared is found again.
     """
     found, codes = [_NONE], [_NONE]
-    for name in spec.complemented:
+    for name in spec.front_end.complemented:
         equal = np.concatenate([[False], trace.lines[name] == trace.lines[f"{name}_n"], [False]])
         clock = np.append(trace.clock, trace.n_clocks) + 2  # of the synchronised lines
         begin, end = clock[equal[1:] & ~equal[:-1]], clock[~equal[1:] & equal[:-1]]
@@ -72,7 +72,7 @@ def faults(spec: TachometerSpec, trace: PinTrace, steps: Steps, index: Table, cl
         return Table(_NONE, {})
     standing, codes = _standing(spec, steps)
     illegal = _illegal(spec, steps.errors)
-    wrong, off = _index(spec, steps, index) if spec.index_watched else (_NONE, _NONE)
+    wrong, off = _index(spec, steps, index) if spec.front_end.index_watched else (_NONE, _NONE)
     opened, lines = _open(spec, trace, clears)
     missed = steps.missed + spec.latency.tick
     others = {Fault.ILLEGAL: illegal, Fault.INDEX_MISSED: missed, Fault.INDEX_COUNTS: wrong}

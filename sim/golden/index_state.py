@@ -25,7 +25,7 @@ def in_state(spec: TachometerSpec, levels: Sequence[NDArray[np.uint8]]) -> tuple
         Z has been high since the lines left the state on the other side.
     """
     *lines, z = levels
-    kind, state = spec.encoder.kind, spec.index_state
+    kind, state = spec.encoder.kind, spec.front_end.index_state
     assert state is not None
     place = packed(
         [line ^ np.uint8(name in spec.encoder.inverted) for name, line in zip(kind.lines, lines, strict=True)]

@@ -31,7 +31,7 @@ class GoldenLoopBank(GoldenBank):
         held = dict.fromkeys((port.name for port in loop.held_inputs), 0)
         settings = initial(self._of_loop)
         left = [access for access in accesses if access.data is not None]
-        for tick in range(loop.first_tick, self._trace.n_clocks, loop.period):
+        for tick in range(loop.latency.first_tick, self._trace.n_clocks, loop.period):
             # What is written in a clock is there in the next; a clock before the tick all but `enable` is taken.
             while left and left[0].clock + 1 < tick:
                 self._write(settings, left.pop(0))

@@ -99,4 +99,4 @@ def with_probed(spec: TachometerSpec, ticks: Table, found: dict[str, Table]) -> 
     if not spec.probe:
         return ticks
     probed = shown(found["probed"], ticks.clock)
-    return ticks.having(probed=probed if len(spec.probes) > 1 else probed != 0)
+    return ticks.having(probed=probed if len(spec.front_end.probes) > 1 else probed != 0)

@@ -120,7 +120,7 @@ class GoldenBank:
     def _ask(self, accesses: Sequence[Access]) -> None:
         """Find what the core shows if a program sets the position, lets the index through, and writes offsets."""
         spec = self._map.spec
-        if not spec.controls and spec.modulus is None:
+        if not spec.front_end.controls and spec.front_end.modulus is None:
             return
         written_at = self._written(accesses)
         ahead = spec.latency.tick - 1
@@ -131,9 +131,9 @@ class GoldenBank:
         values = self._held("preset_value", spec.preset or 0, clocks["preset"] + ahead)
         self._steps = self._pins.asked(spec, clocks["preset"], values, clocks["home"])
         self._tables = golden.tables(spec, self._trace, self._steps)
-        if spec.modulus is not None:
+        if spec.front_end.modulus is not None:
             ticks = self._tables[TICK]
-            moved = (ticks.position_modulo + self._held("modulo_offset", 0, ticks.clock)) % spec.modulus
+            moved = (ticks.position_modulo + self._held("modulo_offset", 0, ticks.clock)) % spec.front_end.modulus
             self._tables[TICK] = ticks.having(position_modulo=moved)
         self._happened["indexed"] = self._tables[INDEX].clock
 

@@ -270,10 +270,10 @@ class PinTrace(_Lines):
         """
         if spec.external_tick and self.tick_in is None:
             return self.with_tick_in(nominal_ticks(spec, self.n_clocks)).completed(spec)
-        low = {name: np.zeros_like(self.a) for name in spec.controls if name not in self.lines}
-        if spec.probes:
-            low |= {"probe": np.zeros_like(self.a), "probe_arm": np.full_like(self.a, (1 << len(spec.probes)) - 1)}
-        low |= {f"{line}_n": self.lines[line] ^ np.uint8(1) for line in spec.complemented}
+        low = {name: np.zeros_like(self.a) for name in spec.front_end.controls if name not in self.lines}
+        if probes := len(spec.front_end.probes):
+            low |= {"probe": np.zeros_like(self.a), "probe_arm": np.full_like(self.a, (1 << probes) - 1)}
+        low |= {f"{line}_n": self.lines[line] ^ np.uint8(1) for line in spec.front_end.complemented}
         if spec.compare is not None and spec.compare.depth:
             low |= dict.fromkeys(LIST_PINS, np.zeros_like(self.a))
         if spec.stream is not None:

@@ -174,7 +174,7 @@ def measure_core(
     """
     between = wrapper(tuple(ports) or spec.ports)
     found = measure_verilog(verilog, CORE, between, target, tools, seeds)
-    return replace(found, figures={**found.figures, "latency": spec.tick_to_result})
+    return replace(found, figures={**found.figures, "latency": spec.latency.tick_to_result})
 
 
 def measure_verilog(

@@ -190,7 +190,12 @@ def _again(spec: AnySpec, name: str, vectors: Path) -> dict[str, str]:
             return cocotb_bench(spec, name)
         clock, *levels = np.array(there["changes"], dtype=np.int64).T
         lines = {pin: row for pin, row in zip(there["pins"], levels, strict=True)}
-        of_user = (*LINES, *spec.tachometer.controls, *(f"{line}_n" for line in spec.tachometer.complemented), "probe")
+        of_user = (
+            *LINES,
+            *spec.tachometer.front_end.controls,
+            *(f"{line}_n" for line in spec.tachometer.front_end.complemented),
+            "probe",
+        )
         lines = {pin: lines[pin] for pin in lines if pin in of_user}
         traces = []
         for axis in range(spec.axes or 1):

@@ -24,7 +24,7 @@ IntArray = NDArray[np.int64]
 
 def loop_inputs(spec: LoopSpec, trace: PinTrace) -> tuple[dict[str, IntArray], Run]:
     """Return the levels of all inputs of the loop by control tick, without a sign, and what the core must show."""
-    clock = np.arange(spec.first_tick, trace.n_clocks, spec.period)
+    clock = np.arange(spec.latency.first_tick, trace.n_clocks, spec.period)
     inputs = _inputs(spec, trace, clock)
     widths = {port.name: port.width for port in spec.ports.pins}
     bits = {name: values & ((1 << widths[name]) - 1) for name, values in inputs.items()}
@@ -84,7 +84,7 @@ def _held(inputs: dict[str, IntArray]) -> dict[str, IntArray]:
 
 def changes(spec: LoopSpec, trace: PinTrace, inputs: dict[str, IntArray]) -> list[IntArray]:
     """Return columns of clocks, lines and inputs: these are there from two clocks before their control tick on."""
-    tick = np.arange(spec.first_tick, trace.n_clocks, spec.period)
+    tick = np.arange(spec.latency.first_tick, trace.n_clocks, spec.period)
     at = np.unique(np.concatenate([trace.clock, tick - 2]))
     at = at[(at >= 0) & (at < trace.n_clocks)]
     line = np.maximum(np.searchsorted(trace.clock, at, side="right") - 1, 0)

@@ -59,7 +59,7 @@ def cocotb_bench(core: AnySpec, name: str, recordings: Sequence[Recording] | Non
         trace = recording.place(spec.timing.clock_hz)
         if spec.external_tick:
             trace = trace.with_tick_in(_external_ticks(spec, trace.n_clocks))
-        for number, name_of in enumerate(spec.pulsed):
+        for number, name_of in enumerate(spec.front_end.pulsed):
             rises = np.arange(1, 8) * trace.n_clocks // (9 + number)
             trace = trace.with_pulses(name_of, rises, spec.filter_clocks + 1)
         traces.append(trace.completed(spec))
@@ -147,7 +147,7 @@ def usual_motion(spec: TachometerSpec, seed: int = 1, most: int = _MOVING) -> Re
         start_angle_rad=-3.5 * np.pi / (2 * spec.encoder.pulses_per_rev),
         seed=seed,
         index=spec.index,
-        index_state=spec.index_place,
+        index_state=spec.front_end.index_place,
     )
     usual = _usual_form(spec, most, backward=seed % 2 == 0)
     return encoder.record(parse_motion("+".join([*_to_compare(spec, 5 * most), usual]))).recording

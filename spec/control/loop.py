@@ -36,6 +36,54 @@ _UNFILTERED = 3  # to load the velocity, to subtract, to store
 _LIMIT = 2  # to hold the sum within few bits, and within the limit
 
 
+class LoopLatency:
+    """Counts the clocks of the ticks of a control loop, and of its computation.
+
+    Parameters
+    ----------
+    spec : LoopSpec
+    """
+
+    def __init__(self, spec: LoopSpec) -> None:
+        self.spec = spec
+
+    @property
+    def first_tick(self) -> int:
+        """The clock of the first control tick, from 0: one clock after the update of the first tick has come.
+
+        So a period of whole ticks meets each update when it is new.
+        """
+        spec = self.spec.tachometer
+        return spec.timing.tick_cycles - 1 + spec.latency.tick + spec.latency.tick_to_velocity + 1
+
+    @property
+    def product(self) -> int:
+        """Clocks from one product to the next."""
+        return self._product(self.spec.form.factor_bits)
+
+    def _product(self, factor_bits: int) -> int:
+        return _STEPS + (factor_bits if self.spec.multiplier == "serial" else _PARALLEL)
+
+    @property
+    def tick_to_result(self) -> int:
+        """Clocks from `control_tick` to `current_valid`."""
+        return self._tick_to_result(self.spec.form.factor_bits)
+
+    def _tick_to_result(self, factor_bits: int) -> int:
+        unfiltered = self.spec.filter is None
+        return (len(Term) - unfiltered) * self._product(factor_bits) + unfiltered * _UNFILTERED + _LIMIT
+
+    @property
+    def least_period(self) -> int:
+        """Fewest clocks between two control ticks: the current is added to those before it."""
+        return self.least_period_of(self.spec.form.factor_bits)
+
+    def least_period_of(self, factor_bits: int) -> int:
+        """Return the fewest clocks between two control ticks, for coefficients of so many bits."""
+        generated = generator_clocks(self.spec.multiplier) if self.spec.command == "generator" else 0
+        return max(self._tick_to_result(factor_bits) + 1, generated)
+
+
 @dataclass(frozen=True, kw_only=True)
 class LoopSpec(Law):
     """Describes a tachometer with disturbance observer and controller of position and velocity; see `ControlForm`.
@@ -67,6 +115,7 @@ class LoopSpec(Law):
 
     # Outputs are of one axis.
     axes: ClassVar[None] = None
+    latency = cached_property(LoopLatency)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -88,7 +137,7 @@ class LoopSpec(Law):
         if self.gains not in FIXED_OR_INPUTS:
             raise ParameterError("gains", f"must be fixed or inputs, not {self.gains!r}")
         self._check_formats()
-        if self.period < self.least_period:
+        if self.period < self.latency.least_period:
             periods = [self.period]
             while (needed := self._least_in(periods[-1])) not in periods:
                 periods.append(needed)
@@ -100,9 +149,9 @@ class LoopSpec(Law):
             )
 
     def _least_in(self, period: int) -> int:
-        """Return `least_period` with another period: words are of other widths in it."""
+        """Return `latency.least_period` with another period: words are of other widths in it."""
         ratios = ratios_of(replace(self.units, period=period))
-        return self._least_period(factor_bits(list(ratios.values())))
+        return self.latency.least_period_of(factor_bits(list(ratios.values())))
 
     def _check_formats(self) -> None:
         for rate, name in ((self.observer, "observer"), (self.filter, "velocity_filter")):
@@ -143,15 +192,6 @@ class LoopSpec(Law):
         """Units of its numbers."""
         return Units(self, self.current_width, self.period)
 
-    @property
-    def first_tick(self) -> int:
-        """The clock of the first control tick, from 0: one clock after the update of the first tick has come.
-
-        So a period of whole ticks meets each update when it is new.
-        """
-        spec = self.tachometer
-        return spec.timing.tick_cycles - 1 + spec.latency.tick + spec.latency.tick_to_velocity + 1
-
     @cached_property
     def ratios(self) -> dict[Term, Sequence[Fraction]]:
         """The factor of each term, in units of its result for one of its word."""
@@ -161,32 +201,6 @@ class LoopSpec(Law):
     def form(self) -> ControlForm:
         """Formats and coefficients."""
         return control_form(self.units, self.ratios, inputs=self.gains == "inputs")
-
-    @property
-    def product_clocks(self) -> int:
-        """Clocks from one product to the next."""
-        return self._product_clocks(self.form.factor_bits)
-
-    def _product_clocks(self, factor_bits: int) -> int:
-        return _STEPS + (factor_bits if self.multiplier == "serial" else _PARALLEL)
-
-    @property
-    def tick_to_result(self) -> int:
-        """Clocks from `control_tick` to `current_valid`."""
-        return self._tick_to_result(self.form.factor_bits)
-
-    def _tick_to_result(self, factor_bits: int) -> int:
-        unfiltered = _UNFILTERED if self.filter is None else 0
-        return (len(Term) - (self.filter is None)) * self._product_clocks(factor_bits) + unfiltered + _LIMIT
-
-    @property
-    def least_period(self) -> int:
-        """Fewest clocks between two control ticks: the current is added to those before it."""
-        return self._least_period(self.form.factor_bits)
-
-    def _least_period(self, factor_bits: int) -> int:
-        generated = generator_clocks(self.multiplier) if self.command == "generator" else 0
-        return max(self._tick_to_result(factor_bits) + 1, generated)
 
     @cached_property
     def generator(self) -> GeneratorForm:
@@ -229,6 +243,6 @@ class LoopSpec(Law):
         return {**self.tachometer.parameters, "loop": own}
 
 
-# A core of any kind: all have ports, options, parameters, entries of a manifest, `axes`, `tick_to_result`, and a
-# `tachometer`, the core of one axis that they are, or that is in them.
+# A core of any kind: all have ports, options, parameters, entries of a manifest, `axes`, `latency.tick_to_result`, and
+# a `tachometer`, the core of one axis that they are, or that is in them.
 AnySpec = CoreSpec | LoopSpec

@@ -162,8 +162,8 @@ def loop_entries(spec: LoopSpec) -> dict[str, Any]:
         }
     return {
         "period_cycles": spec.period,
-        "first_tick": spec.first_tick,
-        "tick_to_current": spec.tick_to_result,
+        "first_tick": spec.latency.first_tick,
+        "tick_to_current": spec.latency.tick_to_result,
         "longest_interval": form.longest,
         "current": {
             "width": spec.current_width,

@@ -36,7 +36,7 @@ def check(spec: TachometerSpec) -> None:
         raise ParameterError("filter_clocks", f"must be from 0 to {most} clocks, {longest}, not {spec.filter_clocks}")
     if spec.index_reset and not spec.index:
         raise ParameterError("index_reset", "must be given together with --index")
-    if "z" in spec.encoder.inverted and "z" not in spec.lines:
+    if "z" in spec.encoder.inverted and "z" not in spec.front_end.lines:
         raise ParameterError("invert", "must not have z without --index, which makes the line z")
     if spec.encoder.missing and spec.bounds:
         raise ParameterError("bounds", "must not be given with --missing-teeth: teeth that are not there have no edges")
@@ -64,7 +64,7 @@ def check(spec: TachometerSpec) -> None:
 def _check_index_state(spec: TachometerSpec) -> None:
     if spec.index_at is None:
         return
-    kind, state = spec.encoder.kind, spec.index_state
+    kind, state = spec.encoder.kind, spec.front_end.index_state
     if not spec.index:
         raise ParameterError("index_at", "must be given together with --index")
     if state is None:
@@ -85,13 +85,13 @@ def _check_index_state(spec: TachometerSpec) -> None:
 def _check_place(spec: TachometerSpec) -> None:
     if spec.index_once and not spec.index:
         raise ParameterError("index_once", "must be given together with --index")
-    if spec.wheel is not None and spec.controls:
-        name = {"preset": "preset", "home": "index_once"}[spec.controls[0]]
+    if spec.front_end.wheel is not None and spec.front_end.controls:
+        name = {"preset": "preset", "home": "index_once"}[spec.front_end.controls[0]]
         raise ParameterError(name, "must not be given together with --missing-teeth, whose gap is the index")
     half = 1 << spec.position_width - 1
     if spec.preset is not None and not -half <= spec.preset < half:
         raise ParameterError("preset", f"must be from {-half} to {half - 1}, a position, not {spec.preset}")
-    if (counts := spec.modulus) is None:
+    if (counts := spec.front_end.modulus) is None:
         return
     turn, parts = spec.encoder.counts_per_rev, (spec.position_modulo or "").partition("/")[2]
     if parts and turn % int(parts):

@@ -1,6 +1,7 @@
 """Facts that set a method apart from the others."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,6 +28,8 @@ class Facts:
         Whether the observer of a control loop waits for a count: it takes no update that is `forced`.
     pairs_all : bool
         Whether pairwise tests give all options all of their values.
+    usual : mapping of str to str
+        Texts of options that have another default with this method than with all others.
     """
 
     title: str
@@ -38,3 +41,4 @@ class Facts:
     rest_tenths: int
     awaits_count: bool
     pairs_all: bool
+    usual: Mapping[str, str] = field(default_factory=dict)

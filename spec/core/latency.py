@@ -67,6 +67,11 @@ class Latency(Follows[S]):
         return self.datapath + self.low_pass + self.output
 
     @property
+    def tick_to_result(self) -> int:
+        """Clocks from its tick to what the core is for: here to the velocity."""
+        return self.tick_to_velocity
+
+    @property
     def entries(self) -> dict[str, int]:
         """Entries of the manifest."""
         found = {

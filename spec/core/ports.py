@@ -19,13 +19,14 @@ BOUNDS = {"velocity_lower": -1, "velocity_upper": 1}
 
 def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
     """Return all ports of a core, in the order of the exported module; those of options and methods come last."""
+    front = spec.front_end
     place = "the first tooth after a gap" if spec.encoder.missing else "the index"
     return (
         pin("clk", "Clock; all outputs change at its rising edge."),
         pin("rst", "Synchronous reset, active high."),
         *(pin(line, help) for line, help in zip(spec.encoder.kind.lines, spec.encoder.kind.pins, strict=True)),
-        *_if("z" in spec.lines, pin("z", "Index line, asynchronous; the index captures the position.")),
-        *(pin(f"{line}_n", f"Complement of line {line.upper()}, asynchronous.") for line in spec.complemented),
+        *_if("z" in front.lines, pin("z", "Index line, asynchronous; the index captures the position.")),
+        *(pin(f"{line}_n", f"Complement of line {line.upper()}, asynchronous.") for line in front.complemented),
         *_if(
             spec.external_tick,
             pin("tick_in", "External tick, asynchronous; its rising edge ends a sampling period."),
@@ -125,11 +126,11 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
             held(TICK, "homed", help="The index was taken, since home rose. It does not wait for a tick."),
         ),
         *_if(
-            spec.modulus,
+            front.modulus,
             held(
-                *(TICK, "position_modulo", ((spec.modulus or 2) - 1).bit_length()),
+                *(TICK, "position_modulo", ((front.modulus or 2) - 1).bit_length()),
                 unit="counts",
-                help=f"Counts up to this period modulo {spec.modulus}, from 0 on, since reset or since an index that "
+                help=f"Counts up to this period modulo {front.modulus}, from 0 on, since reset or since an index that "
                 "resets. Between the ticks it counts on, and a preset leaves it as it is.",
             ),
         ),
@@ -168,7 +169,7 @@ def _wrong(spec: TachometerSpec) -> str:
 
 
 def _index_strobes(spec: TachometerSpec) -> Iterable[Port]:
-    if spec.index_state is None:
+    if spec.front_end.index_state is None:
         return
     text = "One clock: z stayed high from the state of --index-at to the same state a period further, so the index is "
     yield strobe(WIDE, text + "at two places.")
@@ -177,14 +178,14 @@ def _index_strobes(spec: TachometerSpec) -> Iterable[Port]:
 
 
 def _probe_pins(spec: TachometerSpec) -> Iterable[Port]:
-    if probes := len(spec.probes):
+    if probes := len(spec.front_end.probes):
         yield pin("probe", "Probe inputs, asynchronous; their edges latch the position.", probes)
         text = "Arms probes, each while its bit is high, for the clocks after; synchronous to clk. After reset all are."
         yield pin("probe_arm", text, probes)
 
 
 def _probe_ports(spec: TachometerSpec) -> Iterable[Port]:
-    probes = range(len(spec.probes))
+    probes = range(len(spec.front_end.probes))
     if probes:
         text = "Probes that have latched and are not armed again. It changes between the ticks as well."
         yield held(TICK, "probed", len(probes), help=text)
@@ -234,14 +235,14 @@ def _compare_ports(spec: TachometerSpec) -> Iterable[Port]:
 def _health_ports(spec: TachometerSpec) -> Iterable[Port]:
     if not spec.health:
         return
-    absent = {fault for line, fault in OPEN.items() if line not in spec.complemented}
-    absent |= {Fault.INDEX_MISSED} if spec.index_state is None else set()
+    absent = {fault for line, fault in OPEN.items() if line not in spec.front_end.complemented}
+    absent |= {Fault.INDEX_MISSED} if spec.front_end.index_state is None else set()
     codes = "; ".join(f"{code}: {text}" for code, text in FAULT_TEXTS.items() if code not in absent)
     now = "It changes between the ticks as well, and a capture takes what it is then."
     yield held(TICK, "health", FAULT_WIDTH, help=f"The first fault of the encoder since it was cleared; {codes}. {now}")
     yield held(TICK, "faults", FAULTS_WIDTH, help="Faults of the encoder since they were cleared; it stays at 255.")
     yield held(TICK, "fault", help="There has been a fault of the encoder: health is not 0.")
-    if spec.index_watched:
+    if spec.front_end.index_watched:
         text = "Counts by which the latest wrong turn from index to index went too far forward: lost, or extra."
         yield held(TICK, "index_error", spec.position_width, signed=True, unit="counts", help=text)
 

@@ -16,7 +16,7 @@ class Recovery(Follows[S]):
         wheel with a gap, which must come.
         """
         spec = self.spec
-        if spec.lowpass is not None or spec.wheel is not None:
+        if spec.lowpass is not None or spec.front_end.wheel is not None:
             return None
         # What counts the ticks of a silence may have to begin anew.
         silence = ((1 << spec.timing.max_ticks.bit_length()) + 1) * spec.times.longest_tick

@@ -1,10 +1,8 @@
 """A tachometer says what is asked for: from encoder pins to velocity, whatever the method."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any, ClassVar
 
 from tachometry.spec.core.bound import Bound
@@ -13,16 +11,16 @@ from tachometry.spec.core.compare import Compare
 from tachometry.spec.core.described import entries_of, options_as_asked, parameters_of
 from tachometry.spec.core.encoder import Encoder
 from tachometry.spec.core.facts import Facts
+from tachometry.spec.core.front_end import FrontEnd
 from tachometry.spec.core.latency import Latency
 from tachometry.spec.core.ports import bound_ports, ports_of
-from tachometry.spec.core.probe import PROBE_HELP, edges_of, parse_probes
+from tachometry.spec.core.probe import PROBE_HELP, parse_probes
 from tachometry.spec.core.recovery import Recovery
 from tachometry.spec.core.scale import Scale
-from tachometry.spec.core.sensors import EDGE, USUAL_STATE, Levels, parse_modulo, parse_state
+from tachometry.spec.core.sensors import USUAL_STATE, parse_modulo, parse_state
 from tachometry.spec.core.stream import STREAM_HELP, Stream
 from tachometry.spec.core.times import Times
 from tachometry.spec.core.timing import Timing, parse_clocks, parse_filter
-from tachometry.spec.core.tooth_wheel import ToothWheel
 from tachometry.spec.core.widths import Widths
 from tachometry.spec.core.words import Words
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS, parse_lsb
@@ -35,9 +33,9 @@ from tachometry.spec.language.units import FRACTION, Quantity, Speed, parse_band
 class TachometerSpec:
     """A core of one axis; a method is a subclass, which says what it has of its own.
 
-    Its fields are what is asked for, None where nothing is. What follows from them is in small objects: `times`,
-    `widths`, `scale`, `bound`, `latency`, `recovery` and `words`, and `form` has the numbers of the method alone. A
-    value out of range raises ParameterError.
+    Its fields are what is asked for, None where nothing is. What follows from them is in small objects:
+    `front_end`, `times`, `widths`, `scale`, `bound`, `latency`, `recovery` and `words`, and `form` has the numbers of
+    the method alone. A value out of range raises ParameterError.
 
     Parameters
     ----------
@@ -256,11 +254,10 @@ class TachometerSpec:
     # Name of the method, and what sets it apart.
     method: ClassVar[str]
     facts: ClassVar[Facts]
-    # Texts of options that have another default with this method than with all others.
-    usual: ClassVar[Mapping[str, str]] = MappingProxyType({})
     # How many axes its outputs are of, if they say which.
     axes: ClassVar[None] = None
     # What follows.
+    front_end = cached_property(FrontEnd["TachometerSpec"])
     times = cached_property(Times["TachometerSpec"])
     widths = cached_property(Widths["TachometerSpec"])
     scale = cached_property(Scale["TachometerSpec"])
@@ -273,81 +270,9 @@ class TachometerSpec:
         check(self)
 
     @property
-    def lines(self) -> tuple[str, ...]:
-        """Lines of the sensor, the index and `controls` included."""
-        of_index = ("z",) if self.index and not self.encoder.missing else ()  # a gap needs none
-        return (*self.encoder.kind.lines, *of_index, *self.controls)
-
-    @property
-    def complemented(self) -> tuple[str, ...]:
-        """Lines that come with their complements, which are inputs as well: `a_n` of `a`."""
-        return () if self.complements is None else (*self.encoder.kind.lines, *("z",) * self.index)
-
-    @property
-    def wheel(self) -> ToothWheel | None:
-        """The wheel, if teeth of it are missing; they are as far apart as an update may take."""
-        if not (missing := self.encoder.missing):
-            return None
-        return ToothWheel(self.encoder.pulses_per_rev - missing, missing, (1 << self.times.longest.bit_length()) - 1)
-
-    @property
-    def controls(self) -> tuple[str, ...]:
-        """Inputs whose rises a program or a switch makes."""
-        return ("preset",) * (self.preset is not None) + ("home",) * self.index_once
-
-    @property
-    def pulsed(self) -> tuple[str, ...]:
-        """Inputs that a simulation may let rise."""
-        return (*self.controls, *self.probes)
-
-    @property
-    def probes(self) -> tuple[str, ...]:
-        """Names of the probe inputs, each a bit of `probe`."""
-        return tuple(f"probe_{number}" for number in range(len(edges_of(self.probe))))
-
-    @property
-    def moves_position(self) -> bool:
-        """Whether something else than counts changes the position."""
-        return self.index_reset or self.preset is not None
-
-    @property
-    def index_watched(self) -> bool:
-        """Whether a watch counts from index to index, each of which is taken."""
-        return self.index and not self.index_once
-
-    @property
-    def modulus(self) -> int | None:
-        """Counts within which `position_modulo` is; None: there is none."""
-        if self.position_modulo is None:
-            return None
-        of, _, parts = self.position_modulo.partition("/")
-        return self.encoder.counts_per_rev // int(parts or 1) if of == "rev" else int(of)
-
-    @property
-    def index_state(self) -> Levels | None:
-        """Levels of the lines in which the index is taken; None: it is where Z rises, or there is none."""
-        usual = USUAL_STATE if self.index and self.encoder.sensor == "quadrature" else EDGE
-        at = self.index_at or usual
-        return None if at == EDGE else tuple(int(word[-1]) for word in at.split(","))
-
-    @property
-    def index_place(self) -> int:
-        """Place in the cycle of the lines where the index is expected; 0 if it is where Z rises."""
-        return 0 if self.index_state is None else self.encoder.kind.cycle.index(self.index_state)
-
-    @property
     def tachometer(self) -> "TachometerSpec":
         """The core of one axis that it is."""
         return self
-
-    def in_loop(self, velocity_gain: Fraction) -> "TachometerSpec":
-        """Return the core as a control loop with this gain, in 1/s, needs it: options that are not given follow."""
-        return self
-
-    @property
-    def tick_to_result(self) -> int:
-        """Clocks from its tick to what the core is for: here to the velocity."""
-        return self.latency.tick_to_velocity
 
     @property
     def method_ports(self) -> tuple[Port, ...]:

@@ -108,6 +108,11 @@ class AxesLatency(_OfAxes):
         return 0
 
     @property
+    def tick_to_result(self) -> int:
+        """Clocks from `tick` to what the core is for: to the velocity."""
+        return self.tick_to_velocity
+
+    @property
     def entries(self) -> dict[str, int]:
         """Entries of the manifest."""
         return {
@@ -309,11 +314,6 @@ class AxesSpec:
             else:
                 yield pin(port.name, f"Bit k, of axis k: {port.help}", self.axes)
 
-    @property
-    def lines(self) -> tuple[str, ...]:
-        """Lines of an encoder."""
-        return tuple(pin.name for pin in self.axis.ports.pins if pin.name != "tick_in")
-
     def _strobed(self) -> Iterable[Port]:
         """Return strobes and what axis they are of; what is new with them, if it is not held for each axis."""
         last = (self.axes - 1).bit_length() or 1
@@ -369,11 +369,6 @@ class AxesSpec:
     def _external(self) -> dict[str, int]:
         times = self.axis.times
         return {"min": times.min_tick_cycles * self.slots, "max": times.longest_tick * self.slots}
-
-    @property
-    def tick_to_result(self) -> int:
-        """Clocks from `tick` to the velocity."""
-        return self.latency.tick_to_velocity
 
     @property
     def options(self) -> dict[str, str]:

@@ -13,6 +13,8 @@ from tachometry.spec.methods.timed import TimedForm, TimedTachometer, TimedTimes
 class MTForm(TimedForm["MTTachometer"]):
     """Finds the numbers of timer and divider of the M/T method."""
 
+    equation = 13
+
     @property
     def min_clocks(self) -> int:
         """T_c in clocks, as it is asked for; else a tick."""
@@ -106,7 +108,6 @@ class MTTachometer(TimedTachometer):
         awaits_count=False,
         pairs_all=False,
     )
-    equation = 13
     form = cached_property(MTForm)
     times = cached_property(MTTimes)
     words = cached_property(MTWords)

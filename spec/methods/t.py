@@ -10,6 +10,8 @@ from tachometry.spec.methods.timed import TimedForm, TimedTachometer, TimedWidth
 class TForm(TimedForm["TTachometer"]):
     """Finds the numbers of timer and divider of the T method."""
 
+    equation = 9
+
     @property
     def max_interval(self) -> int:
         return self.max_periods
@@ -57,6 +59,5 @@ class TTachometer(TimedTachometer):
         awaits_count=False,
         pairs_all=False,
     )
-    equation = 9
     form = cached_property(TForm)
     widths = cached_property(TWidths)

@@ -24,6 +24,8 @@ T = TypeVar("T", bound="TimedTachometer", covariant=True)
 class TimedForm(Follows[T]):
     """Finds the numbers of timer and divider."""
 
+    equation: ClassVar[int]  # its number in Tsuji 2009
+
     @property
     def on_lattice(self) -> bool:
         """Whether times are counted in ticks."""
@@ -197,7 +199,7 @@ class TimedWords(Words[T]):
 
     @property
     def description(self) -> str:
-        return f"eq. ({self.spec.equation}), times in {self.spec.timer}s"
+        return f"eq. ({self.spec.form.equation}), times in {self.spec.timer}s"
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -227,8 +229,6 @@ class TimedTachometer(TachometerSpec):
         False, "The published algorithm and nothing else: no decay, and a reversal is no special case."
     )
 
-    # Number of its equation in Tsuji 2009.
-    equation: ClassVar[int]
     form = cached_property(TimedForm["TimedTachometer"])
     times = cached_property(TimedTimes["TimedTachometer"])
     widths = cached_property(TimedWidths["TimedTachometer"])

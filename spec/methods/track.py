@@ -4,7 +4,6 @@ import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any
 
 from tachometry.spec.core.facts import Facts
@@ -45,14 +44,6 @@ class TrackWidths(Widths["TrackTachometer"]):
         return math.ceil(-math.log2(lsb))
 
 
-class TrackScale(Scale["TrackTachometer"]):
-    """Says what an LSB of the velocity of a tracking core is worth."""
-
-    @property
-    def rounding_lsb(self) -> float:
-        return super().rounding_lsb + 0.5  # what is below an LSB may round up, whatever it is
-
-
 class Acceleration(Follows["TrackTachometer"]):
     """Finds the format of the acceleration that the tracking method shows."""
 
@@ -72,8 +63,8 @@ class Acceleration(Follows["TrackTachometer"]):
     @cached_property
     def of_form(self) -> Fraction:
         """One LSB of the acceleration of the recursion in the unit."""
-        form = self.spec.plain_form
-        return self._per_count * self.spec.timing.tick_cycles**2 / (1 << form.acceleration_bits)
+        bits = _tracking(self.spec, Fraction(1, 2)).acceleration_bits  # whatever is shown of it
+        return self._per_count * self.spec.timing.tick_cycles**2 / (1 << bits)
 
     @cached_property
     def frac_bits(self) -> int:
@@ -86,6 +77,50 @@ class Acceleration(Follows["TrackTachometer"]):
         """One LSB in rad/s²; ticks are as long as nominal."""
         counts = Fraction(1, 2) ** self.frac_bits / self._per_count
         return self.spec.scale.unit_velocity * float(counts / self.spec.timing.tick_seconds)
+
+
+def _tracking(spec: "TrackTachometer", slope: Fraction) -> Tracking:
+    """Return formats and constants of the recursion, whose acceleration is shown with so many LSB of its own an LSB."""
+    return Tracking(
+        clock_hz=spec.timing.clock_hz,
+        tick_cycles=spec.timing.tick_cycles,
+        longest_tick=spec.times.longest_tick,
+        external=spec.external_tick,
+        max_count=spec.widths.max_count,
+        counts_per_rev=spec.encoder.counts_per_rev,
+        max_memory=None if spec.max_memory is None else Fraction(spec.max_memory, spec.timing.clock_hz),
+        max_time=spec.timing.max_ticks * spec.timing.tick_cycles,
+        velocity_out=spec.widths.native_frac_bits,
+        slope=slope,
+        quality=spec.timing.tick_cycles * spec.scale.lsb_per_count,
+        quality_bits=min(spec.widths.velocity - 1, RESULT_BITS),
+    )
+
+
+class TrackScale(Scale["TrackTachometer"]):
+    """Says what an LSB of the velocity of a tracking core is worth."""
+
+    @property
+    def rounding_lsb(self) -> float:
+        return super().rounding_lsb + 0.5  # what is below an LSB may round up, whatever it is
+
+    @cached_property
+    def acceleration(self) -> Acceleration:
+        """The format of the acceleration."""
+        return Acceleration(self.spec)
+
+    @cached_property
+    def carrying(self) -> Carrying:
+        """How `position_fine` is carried on to the pulses of a fine compare output."""
+        spec = self.spec
+        native, cycles = spec.widths.native_frac_bits, spec.timing.tick_cycles
+        bits = spec.fine_bits + 1 + (2 * spec.times.longest_tick).bit_length()
+        shift = max(0, bits - (native + cycles.bit_length() - 3))  # an LSB has to be that of four of the velocity
+        ratio = Fraction(1 << bits, cycles << native + shift)
+        per_clock = VelocityOutput(ratio, spec.widths.max_velocity << native + shift, bits + 2)
+        latency = spec.latency
+        late = latency.pin_to_count + latency.tick + latency.datapath + per_clock.serial_latency + 3
+        return Carrying(per_clock, shift, spec.fine_bits, bits - spec.fine_bits, late)
 
 
 class TrackLatency(Latency["TrackTachometer"]):
@@ -180,7 +215,6 @@ class TrackTachometer(TachometerSpec):
     fine_bits: int = option(6, "Fraction bits of position_fine, 1 to 16.", metavar="N", tests=("", "1", "16"))
 
     method = "track"
-    usual = MappingProxyType({"max-time": _MAX_TIME})
     facts = Facts(
         title="Tracking",
         summary="tracks position, velocity and acceleration",
@@ -191,8 +225,8 @@ class TrackTachometer(TachometerSpec):
         rest_tenths=17,
         awaits_count=True,
         pairs_all=False,
+        usual={"max-time": _MAX_TIME},
     )
-    acceleration = cached_property(Acceleration)
     latency = cached_property(TrackLatency)
     recovery = cached_property(TrackRecovery)
     scale = cached_property(TrackScale)
@@ -224,38 +258,10 @@ class TrackTachometer(TachometerSpec):
             )
         self._check_fine()
 
-    def in_loop(self, velocity_gain: Fraction) -> "TrackTachometer":
-        if self.max_memory is not None:
-            return self
-        # A memory that sets itself lets the loop swing just below what it can see.
-        memory = min(LOOP_MEMORY / velocity_gain, Fraction(MOST_MEMORY))
-        return replace(self, max_memory=max(math.floor(memory * self.timing.clock_hz), self.timing.tick_cycles))
-
-    def _form(self, slope: Fraction) -> Tracking:
-        return Tracking(
-            clock_hz=self.timing.clock_hz,
-            tick_cycles=self.timing.tick_cycles,
-            longest_tick=self.times.longest_tick,
-            external=self.external_tick,
-            max_count=self.widths.max_count,
-            counts_per_rev=self.encoder.counts_per_rev,
-            max_memory=None if self.max_memory is None else Fraction(self.max_memory, self.timing.clock_hz),
-            max_time=self.timing.max_ticks * self.timing.tick_cycles,
-            velocity_out=self.widths.native_frac_bits,
-            slope=slope,
-            quality=self.timing.tick_cycles * self.scale.lsb_per_count,
-            quality_bits=min(self.widths.velocity - 1, RESULT_BITS),
-        )
-
-    @cached_property
-    def plain_form(self) -> Tracking:
-        """Formats of the recursion without that of the acceleration that is shown, which follows from them."""
-        return self._form(Fraction(1, 2))
-
     @cached_property
     def form(self) -> Tracking:
         """Formats and constants of the recursion."""
-        return self._form(self.acceleration.of_form * Fraction(2) ** self.acceleration.frac_bits)
+        return _tracking(self, self.scale.acceleration.of_form * Fraction(2) ** self.scale.acceleration.frac_bits)
 
     @cached_property
     def program(self) -> Program:
@@ -270,32 +276,20 @@ class TrackTachometer(TachometerSpec):
             else replace(serial, times=QUICK)
         )
 
-    @cached_property
-    def carrying(self) -> Carrying:
-        """How `position_fine` is carried on to the pulses of a fine compare output."""
-        native, cycles = self.widths.native_frac_bits, self.timing.tick_cycles
-        bits = self.fine_bits + 1 + (2 * self.times.longest_tick).bit_length()
-        shift = max(0, bits - (native + cycles.bit_length() - 3))  # an LSB has to be that of four of the velocity
-        ratio = Fraction(1 << bits, cycles << native + shift)
-        per_clock = VelocityOutput(ratio, self.widths.max_velocity << native + shift, bits + 2)
-        latency = self.latency
-        late = latency.pin_to_count + latency.tick + latency.datapath + per_clock.serial_latency + 3
-        return Carrying(per_clock, shift, self.fine_bits, bits - self.fine_bits, late)
-
     def _check_fine(self) -> None:
         """Check that the place of an update is carried on before the next; ParameterError if it is not."""
         if self.compare is None or not self.compare.fine:
             return
-        if self.carrying.latency > self.times.shortest_tick:
+        if self.scale.carrying.latency > self.times.shortest_tick:
             raise ParameterError("compare", "must not be fine here: it takes a longer tick or a shorter --filter")
 
     @property
     def method_ports(self) -> tuple[Port, ...]:
         return (
             held(
-                *(UPDATE, "acceleration", self.acceleration.width),
+                *(UPDATE, "acceleration", self.scale.acceleration.width),
                 signed=True,
-                unit=f"2^{-self.acceleration.frac_bits} {self.acceleration.unit}",
+                unit=f"2^{-self.scale.acceleration.frac_bits} {self.scale.acceleration.unit}",
                 help="Acceleration; multiplied by rad_per_s2_per_lsb of the manifest it is in rad/s².",
             ),
             held(
@@ -315,10 +309,19 @@ class TrackTachometer(TachometerSpec):
     def method_entries(self) -> dict[str, dict[str, Any]]:
         return {
             "acceleration": {
-                "width": self.acceleration.width,
-                "frac_bits": self.acceleration.frac_bits,
-                "unit": self.acceleration.unit,
-                "rad_per_s2_per_lsb": self.acceleration.rad_per_s2_per_lsb,
+                "width": self.scale.acceleration.width,
+                "frac_bits": self.scale.acceleration.frac_bits,
+                "unit": self.scale.acceleration.unit,
+                "rad_per_s2_per_lsb": self.scale.acceleration.rad_per_s2_per_lsb,
             },
             "position_fine": {"frac_bits": self.fine_bits},
         }
+
+
+def in_loop(spec: TachometerSpec, velocity_gain: Fraction) -> TachometerSpec:
+    """Return the core as a control loop with this gain, in 1/s, needs it: with method track, its memory is bounded."""
+    if not isinstance(spec, TrackTachometer) or spec.max_memory is not None:
+        return spec
+    # A memory that sets itself lets the loop swing just below what it can see.
+    memory = min(LOOP_MEMORY / velocity_gain, Fraction(MOST_MEMORY))
+    return replace(spec, max_memory=max(math.floor(memory * spec.timing.clock_hz), spec.timing.tick_cycles))

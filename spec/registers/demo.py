@@ -34,7 +34,7 @@ def emulated(spec: TachometerSpec) -> tuple[int | None, int, tuple[str, ...]]:
     """Return what the emulator of a core's encoder has: pulses per revolution if there is an index, the quarter in
     which that is high, and the lines that come with their complements.
     """
-    return spec.encoder.pulses_per_rev if spec.index else None, spec.index_place, spec.complemented
+    return spec.encoder.pulses_per_rev if spec.index else None, spec.front_end.index_place, spec.front_end.complemented
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class DemoMap(RegisterMap):
     @property
     def inputs(self) -> list[Port]:
         """Inputs, but for complements, which a demo makes of the lines, as boards have no pins for them."""
-        made = {f"{line}_n" for line in self.spec.complemented}
+        made = {f"{line}_n" for line in self.spec.front_end.complemented}
         return [port for port in self.core_ports if port.direction == "input" and port.name not in made]
 
     @property

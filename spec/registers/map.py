@@ -138,7 +138,7 @@ class RegisterMap:
     def events(self) -> dict[str, str]:
         """Flags that say that something has happened since the capture before, each with the input that says it."""
         found = {"updated": UPDATE} | ({"indexed": INDEX} if self.spec.index else {})
-        return found | ({WIDE: WIDE, MISSED: MISSED} if self.spec.index_state else {})
+        return found | ({WIDE: WIDE, MISSED: MISSED} if self.spec.front_end.index_state else {})
 
     @cached_property
     def status(self) -> tuple[Register, ...]:
@@ -229,7 +229,7 @@ class RegisterMap:
                 *(
                     Field(name, 1, place, help, writable=True, single=True, port=f"{name}_now")
                     for place, (name, help) in enumerate(_CONTROLS.items(), 2)
-                    if name in self.spec.controls
+                    if name in self.spec.front_end.controls
                 ),
             ),
             {},
@@ -274,10 +274,10 @@ class RegisterMap:
         if spec.preset is not None:
             help = "Position that the input preset, or CONTROL.preset, sets."
             yield from self._position("PRESET", help, "preset_value", spec.preset)
-        if spec.modulus is not None:
+        if spec.front_end.modulus is not None:
             help = "Counts by which position_modulo is ahead of counts since reset, or since an index that resets."
-            width = (spec.modulus - 1).bit_length()
-            more: dict[str, Any] = {"unit": "counts", "bits": width, "least": 0, "most": spec.modulus - 1}
+            width = (spec.front_end.modulus - 1).bit_length()
+            more: dict[str, Any] = {"unit": "counts", "bits": width, "least": 0, "most": spec.front_end.modulus - 1}
             field = Field("value", WORD, help=help, writable=True, port="modulo_offset", **more)
             yield "MODULO_OFFSET", help, (field,), {}
 
@@ -314,7 +314,7 @@ class RegisterMap:
 
     def _probing(self) -> Iterable[Draft]:
         """Return registers that arm probes, and choose their edges."""
-        probes = len(self.spec.probes)
+        probes = len(self.spec.front_end.probes)
         if not probes:
             return
         arms = Field("arm", probes, help="A bit for each probe.", writable=True, single=True, port="probe_arm")

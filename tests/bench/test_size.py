@@ -391,7 +391,7 @@ def test_latency_of_a_core(monkeypatch: pytest.MonkeyPatch) -> None:
     bare = size.Measurement({"LC": 1}, "a → b")
     monkeypatch.setattr(synthesis, "measure_verilog", lambda *_: bare)
     loop = LoopSpec(tachometer=SPEC)
-    for spec, latency in ((SPEC, SPEC.latency.tick_to_velocity), (loop, loop.tick_to_result)):
+    for spec, latency in ((SPEC, SPEC.latency.tick_to_velocity), (loop, loop.latency.tick_to_result)):
         found = synthesis.measure_core(spec, size.TARGETS["HX8K"], "", {})
         assert found.figures == {"LC": 1, "latency": latency}
 

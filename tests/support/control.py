@@ -110,9 +110,9 @@ def made_up(spec: LoopSpec, n_ticks: int, seed: int, less: int) -> tuple[Table, 
     """
     rng = np.random.default_rng(seed)
     form, period = spec.form, spec.period
-    spacing = np.where(rng.random(n_ticks) < 0.7, spec.least_period, period)
+    spacing = np.where(rng.random(n_ticks) < 0.7, spec.latency.least_period, period)
     clock = 5 + np.cumsum(spacing)
-    n_clocks = int(clock[-1]) + spec.tick_to_result + 2
+    n_clocks = int(clock[-1]) + spec.latency.tick_to_result + 2
     # Often none for longer than the longest measurement, often many between two control ticks.
     rate = np.repeat([0.02, 0.0, 0.5, 0.002], -(-n_clocks // 4))[:n_clocks]
     rate[:5] = 0.9  # before the first control tick
@@ -222,7 +222,7 @@ def core_case(spec: LoopSpec, seed: int, n_edges: int = 12) -> Case:
     """
     rng = np.random.default_rng(seed)
     trace = stress(spec.tachometer, seed, n_edges)
-    clock = np.arange(spec.first_tick, trace.n_clocks, spec.period)
+    clock = np.arange(spec.latency.first_tick, trace.n_clocks, spec.period)
     n, form = len(clock), spec.form
 
     def numbers(width: int) -> Any:

@@ -82,7 +82,7 @@ def rio(spec: TachometerSpec, name: str, bus: Bus | None, made: Mapping[str, str
 
 
 def _check(spec: TachometerSpec, values: Iterable[Port]) -> None:
-    for name in spec.controls:
+    for name in spec.front_end.controls:
         option = {"preset": "preset", "home": "index_once"}[name]
         raise ParameterError(option, "must not be given for RIO, which has no pin for it")
     if spec.stream:

@@ -155,7 +155,7 @@ def test_a_core_tells_them(fault: dict[str, int], code: Fault) -> None:
     spec = of_texts("m", words | ({"complements": "3"} if code == Fault.B_OPEN else {}))
     begins = 20 * PERIOD
     changes = [Change(-1, STEADY), Change(begins, replace(STEADY, **fault))]
-    emulated = GoldenEmulator(complemented=spec.complemented)
+    emulated = GoldenEmulator(complemented=spec.front_end.complemented)
     found = tables(spec, emulated.trace(changes, 60 * PERIOD))["fault"]
     assert found["code"][0] == code
     assert 0 < found.clock[0] - begins < 10 * PERIOD // 2

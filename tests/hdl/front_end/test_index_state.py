@@ -204,7 +204,7 @@ def test_the_index_of_the_virtual_encoder_is_about_its_state(texts: dict[str, st
     encoder = VirtualEncoder.of(
         spec.encoder,
         index=True,
-        index_state=spec.index_place,
+        index_state=spec.front_end.index_place,
         index_width=width,
         index_skew_s=skew,
         start_angle_rad=-0.65,

@@ -226,4 +226,4 @@ def test_a_capture_has_the_wires_of_a_core_with_probes(tmp_path: Path) -> None:
 
 def test_a_number_of_probes_is_taken_in_python_too() -> None:
     spec = of_texts("s", BASE | {"probe": "2"})
-    assert replace(spec, probe="2").probes == spec.probes == ("probe_0", "probe_1")
+    assert replace(spec, probe="2").front_end.probes == spec.front_end.probes == ("probe_0", "probe_1")

@@ -76,7 +76,7 @@ class LoopCase(Case):
         pins, traces, starts = list[NDArray[np.uint64]](), list[Commanded](), list[int]()
         done = 0
         spec = self.spec
-        program = [spec.first_tick + 2 * spec.period + clock for clock in range(spec.period)] * 3
+        program = [spec.latency.first_tick + 2 * spec.period + clock for clock in range(spec.period)] * 3
         while done < n_clocks:
             if program and rng.random() < _OFTEN:
                 trace, resets = noise(spec.tachometer, rng, program.pop(), 3), 1
@@ -108,7 +108,7 @@ class LoopCase(Case):
     def _commanded(self, trace: PinTrace, rng: np.random.Generator) -> tuple[NDArray[np.uint64], list[Command]]:
         """Return words of every clock, and the commands that are taken: in all other clocks there are others."""
         spec = self.spec
-        clock = np.arange(spec.first_tick, trace.n_clocks, spec.period)
+        clock = np.arange(spec.latency.first_tick, trace.n_clocks, spec.period)
         levels: dict[str, NDArray[np.int64]] = {}
         row = np.searchsorted(trace.clock, np.arange(trace.n_clocks), side="right") - 1
         levels |= {name: line[row].astype(np.int64) for name, line in trace.lines.items()}

@@ -357,7 +357,7 @@ _argue(
 )
 _argue("hdl/export/kit.py: ", "The smoke test holds its pins for as long as it likes.", "5000 → 4999")
 _argue(
-    "spec/core/tachometer.py: TachometerSpec.wheel",
+    "spec/core/front_end.py: FrontEnd.wheel",
     "It is only longer than what is measured, and costs a bit.",
     "1 → 0 #2",
 )

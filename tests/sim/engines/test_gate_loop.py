@@ -48,7 +48,7 @@ def through_gates() -> tuple[Log, Through]:
 def agrees(spec: LoopSpec) -> None:
     """Each current, filtered velocity and disturbance, and its clock, with what the golden models make of the lines."""
     _, through = through_gates()
-    n_ticks = len(range(spec.first_tick, through.trace.n_clocks, spec.period))
+    n_ticks = len(range(spec.latency.first_tick, through.trace.n_clocks, spec.period))
     commands = [Command(*row) for row in through.commands[:n_ticks].tolist()]
     expected = run_loop(spec, through.trace, commands, golden.tables).tables["current_valid"]
     columns = (expected.clock, expected.current, expected.filtered_velocity, expected.disturbance)

@@ -315,10 +315,10 @@ def test_times() -> None:
         ("parallel", Fraction(0), lambda p: 6 * 6 + 3 + 2),
     ):
         spec = LoopSpec(tachometer=CORE, multiplier=multiplier, velocity_filter=filter)
-        assert spec.tick_to_result == clocks(spec.form.factor_bits)
-        assert spec.least_period == spec.tick_to_result + 1
+        assert spec.latency.tick_to_result == clocks(spec.form.factor_bits)
+        assert spec.latency.least_period == spec.latency.tick_to_result + 1
         # A control tick comes a clock behind the first update, which is late from the last clock of the tick on.
-        assert spec.first_tick == 959 + CORE.latency.tick + CORE.latency.tick_to_velocity + 1
+        assert spec.latency.first_tick == 959 + CORE.latency.tick + CORE.latency.tick_to_velocity + 1
 
 
 def test_gains_that_are_inputs_have_24_bits_at_most() -> None:

@@ -9,6 +9,7 @@ from tachometry.spec import ParameterError, TrackTachometer, of_options, with_lo
 from tachometry.spec.formats.tracking import GREATEST_ACCELERATION, WIDTH
 from tachometry.spec.formats.tracking_code import FIRST_CHOSEN
 from tachometry.spec.formats.tracking_units import QUICK, Small
+from tachometry.spec.methods.track import in_loop
 
 
 def test_ends_of_ranges() -> None:
@@ -30,7 +31,7 @@ def test_ends_of_ranges() -> None:
 def test_the_memory_in_a_loop_follows_from_its_gain() -> None:
     """It is 0.6/k_v, from a tick to 4 s, unless it is given; the options of the core make it again."""
     for gain, memory in (("120", 240_000), ("1/10", 192_000_000), ("1000000", 960)):
-        assert core(max_speed="400rad/s").in_loop(Fraction(gain)).max_memory == memory
+        assert in_loop(core(), Fraction(gain)) == core(max_memory=f"{memory}clk")
     loop = with_loop(core(max_speed="400rad/s"), {"kv": "80", "loop-multiplier": "parallel"})
     assert loop.options["max-memory"] == "7.5ms"
     assert loop.tachometer.words.heading == "Tracking method, memory of at most 7.5ms"

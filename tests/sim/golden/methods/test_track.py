@@ -56,7 +56,7 @@ def test_what_is_shown_fits_the_ports(name: str) -> None:
     assert np.abs(velocity).max() < 1 << spec.widths.native - 1
     assert quality.min() >= 0
     assert quality.max() < 1 << spec.form.quality_bits
-    assert 1 << spec.acceleration.width - 3 < np.abs(acceleration).max() < 1 << spec.acceleration.width - 1
+    assert 1 << spec.scale.acceleration.width - 3 < np.abs(acceleration).max() < 1 << spec.scale.acceleration.width - 1
 
 
 @nightly
@@ -144,7 +144,8 @@ def test_a_constant_speed_is_settled_upon(start: str) -> None:
 def test_a_ramp_has_its_acceleration() -> None:
     spec, count = core(), np.arange(1, 1500)
     clock = np.round(spec.timing.tick_cycles * np.sqrt(750 * count)).astype(np.int64)
-    shown = golden.run(spec, trace_of(clock, count)).updates.acceleration[-100:] * spec.acceleration.rad_per_s2_per_lsb
+    run, lsb = golden.run(spec, trace_of(clock, count)), spec.scale.acceleration.rad_per_s2_per_lsb
+    shown = run.updates.acceleration[-100:] * lsb
     right = 2 / 750 / float(spec.timing.tick_seconds) ** 2 * 2 * np.pi / spec.encoder.counts_per_rev
     assert shown == pytest.approx(np.full(100, right), rel=1e-4)
 
