@@ -11,9 +11,9 @@ from support.compiled import lint
 from tachometry.hdl.export import export
 from tachometry.sim.engines.compiled import Design
 from tachometry.sim.engines.verilator import Verilator
-from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.axes import Trace
 from tachometry.sim.signals.run import Run, observed
-from tachometry.spec import Port, TachometerSpec
+from tachometry.spec import Port
 from tachometry.spec.control import AnySpec
 from tachometry.spec.registers.buses import bus_of, ports_on
 
@@ -63,7 +63,7 @@ def _filled(text: str, **parts: str | int) -> str:
     return text
 
 
-def _changes(pins: list[Port], trace: PinTrace) -> np.ndarray:
+def _changes(pins: list[Port], trace: Trace) -> np.ndarray:
     return np.stack([trace.clock, *(trace.lines[pin.name] for pin in pins)], axis=1).astype(np.int64)
 
 
@@ -85,7 +85,7 @@ class LintingVerilator(Verilator):
         return text
 
 
-def run_in_icarus(spec: TachometerSpec, folder: Path, trace: PinTrace) -> Run:
+def run_in_icarus(spec: AnySpec, folder: Path, trace: Trace) -> Run:
     """Compile the exported Verilog as Verilog-2001 with -Wall, any warning an error, and play a trace on it."""
     return play_in_icarus(spec, folder, _changes(list(spec.ports.pins), trace), trace.n_clocks)
 

@@ -1,12 +1,16 @@
 """Many axes with the tracking method against the golden model of one axis."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 from support.axes import motions
+from support.verilog import run_in_icarus
 
+from tachometry.sim import golden
 from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.signals.run import compare
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import AxesSpec, Encoder, ParameterError, Speed, Timing, TrackTachometer
 from tachometry.spec.methods.track_axis import TrackAxis
@@ -29,6 +33,17 @@ def test_gates_and_golden_model_agree() -> None:
     assert len(updates) > 40
     assert len(set(updates.velocity.tolist())) > 15
     assert len(found.expected.tables["index_valid"]) > 0
+
+
+def test_the_exported_verilog_agrees_with_the_golden_model(tmp_path: Path) -> None:
+    """One machine has four axes in turn, each of which has a velocity."""
+    spec = spec_of(4, 1920)
+    assert spec.plan.machines == 1
+    trace = motions(spec, 12 * 1920)
+    actual = run_in_icarus(spec, tmp_path, trace)
+    count, first = compare(golden.run(spec, trace), actual)
+    assert count == 0, first
+    assert actual.updates.velocity.reshape(-1, 4).any(axis=0).all()
 
 
 def test_each_axis_is_ahead_by_its_place_in_the_turn() -> None:
