@@ -172,6 +172,7 @@ class Tracking:
             "log_256": 8, "log_4096": MOST_EVENTS_BITS, "log_4": 2, "log_eighth": -3, "log_half": -1,
             "log_5_8": math.log2(8 / 5),
             "of_velocity": v - PLACE_BITS + t, "of_speed": v + t, "of_slope": a - v + t + 1,
+            "of_bound": math.log2(self.quality) - v + 2**-EXP_INDEX,  # not below the velocity for the table
         }  # fmt: skip
         return {
             **{name: fixed_log(value) for name, value in logs.items()},

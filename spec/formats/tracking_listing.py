@@ -184,6 +184,7 @@ place:                                  # and the place at the end of the tick
     t = zero s+ v min most
     vs + ~ product place
     v = zero s+ t
+    least = one
     if empty goto seen
     p + ~ out position_fine
 shown:
@@ -198,25 +199,25 @@ shown:
     t = ~
     slope by
     times as acceleration
-    t min most_quality out quality
+    t max least min most_quality out quality
     ~ out acceleration
     after
     if neg goto end
     sum - one
     if neg goto ready
 learn:                                  # nothing below is in a hurry
-    change = e - before keep
+    t = e - before keep
     before = e
     log_X + log_256
     if pos goto short
     trouble
     if pos goto short
     e over 1
-    change = e + ~ keep
+    t = e + ~ keep
 short:
     noises max noises_first min noises_offset by
     w = D + D + D
-    zero s+ change - D min w over by
+    zero s+ t - D min w over by
     a keep
     t = zero s+ a min most
     D = D + ~ max least_noise
@@ -287,14 +288,7 @@ first:
     edge = raw - moved
     since = tau
     phase = minus_one
-    v = zero
-    vs = zero
-    a = zero
-    as = zero
-    slips = zero
-    velocity = zero
-    quality = none
-    goto place
+    goto nothing
 young:
     phase + one
     if neg goto first
@@ -340,28 +334,30 @@ show:
     velocity = vs + ~
     goto place
 seen:
-    z = p + ~ keep
+    P = p + ~ keep
     if neg goto below
     sum + o@up
     goto beyond
 below:
-    zero - z - o@down
+    zero - P - o@down
 beyond:
     max zero
     beyond = sum - half - D4 - Ds
     if neg goto still
-    z = z s- beyond
+    P = P s- beyond
     quiet + lead log
     w = zero
     beyond - half
     if neg goto whole
     w = log_5_8
 whole:
-    of_speed - w - ~ exp
+    w = of_speed - w - ~ exp
     t = zero s+ velocity - ~ lo+ ~
     velocity = zero s+ t
+    w + of_bound exp                    # the error is at most the bound
+    least = ~
 still:
-    z out position_fine
+    P out position_fine
     quiet - max_time
     if neg goto shown
     velocity = zero
@@ -373,6 +369,7 @@ rest:
     p = zero
 nothing:
     quality = none
+    least = zero
     velocity = zero
     p out position_fine
 quiet:

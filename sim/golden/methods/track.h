@@ -48,12 +48,13 @@ struct Recursion {
   int64_t place() const {
     return p + product(shown_v + product(shown_a, since, k.half_velocity), since, k.place);
   }
-  void emit(int64_t velocity, int64_t place) {
+  void emit(int64_t velocity, int64_t place, int64_t least = 1) {
     int64_t shown = product(velocity, k.tick, k.shown);
     row[0] = std::max(-k.most_shown, std::min(shown, k.most_shown));
     row[1] = place;
     int64_t more = std::max<int64_t>(trouble + k.log_4, 0);
-    row[2] = std::min(power(round(more + log_limit - k.order + log_share, 1) + quality - log_memory, 1), k.most_quality);
+    int64_t deviation = power(round(more + log_limit - k.order + log_share, 1) + quality - log_memory, 1);
+    row[2] = std::min(std::max(deviation, least), k.most_quality);
     row[3] = product(shown_a, k.slope, k.acceleration);
   }
 
@@ -81,9 +82,8 @@ struct Recursion {
     turn = (turn + 1) & ((1 << CHANCE_BITS) - 1);
     chance = reversed[turn];
     if (phase == 0) {
-      phase = 1, slips = 0, since = tau, v = a = shown_v = shown_a = 0, quality = k.none;
-      p = at - moved, edge = raw - moved;
-      return emit(0, place());
+      phase = 1, since = tau, p = at - moved, edge = raw - moved;
+      return nothing();
     }
     int64_t dt = std::max(since - tau, k.clock), log_dt = log2(dt);
     if (phase == 1) return begin(at, raw, tau, dt, log_dt);
@@ -166,19 +166,22 @@ struct Recursion {
   }
   void silence(int end) {
     if (quiet >= k.forget) phase = since = quiet = p = 0;
-    if (phase != 2) {
-      shown_a = 0, quality = k.none;
-      return emit(0, p);
-    }
-    int64_t z = place(), sign = sign_of(z), velocity = ahead();
+    if (phase != 2) return nothing();
+    int64_t least = 1, z = place(), sign = sign_of(z), velocity = ahead();
     int64_t beyond = std::max<int64_t>(sign * (z + offsets[(z < 0 ? end - 1 : end) & 3]), 0) - k.half - 5 * sure;
     if (beyond >= 0) {
       z -= sign * beyond;
       int64_t share = beyond - k.half >= 0 ? k.log_5_8 : 0;
-      velocity = sign * std::min(sign * velocity, power(k.of_speed - log2(quiet + k.lead) - share, 1));
+      int64_t bound = k.of_speed - log2(quiet + k.lead) - share;
+      velocity = sign * std::min(sign * velocity, power(bound, 1));
+      least = power(bound + k.of_bound, 1);
     }
     if (quiet >= k.max_time) velocity = shown_a = 0;
-    emit(velocity, z);
+    emit(velocity, z, least);
+  }
+  void nothing() {
+    shown_a = 0, quality = k.none;
+    emit(0, p, 0);
   }
 };
 

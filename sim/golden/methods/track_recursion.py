@@ -234,11 +234,9 @@ class Recursion:
             self.log_growth = k["log_eighth"]
 
     def _first(self, at: int, raw: int, tau: int) -> Row:
-        self.phase, self.slips, self.since = ONE, 0, tau
-        self.v = self.a = self.shown_v = self.shown_a = 0
-        self.quality = self._k["none"]
+        self.phase, self.since = ONE, tau
         self.p, self.edge = at - self._moved, raw - self._moved
-        return self._emit(0)
+        return self._nothing()
 
     def _begin(self, at: int, raw: int, tau: int, dt: int, log_dt: int) -> Row:
         """Take the speed from the event before to this one."""
@@ -270,9 +268,8 @@ class Recursion:
         if self.quiet >= k["forget"]:
             self.phase, self.since, self.quiet, self.p = REST, 0, 0, 0
         if self.phase != TRACKS:
-            self.shown_a, self.quality = 0, k["none"]
-            return self._emit(0, self.p)
-        z = self._place
+            return self._nothing()
+        z, least = self._place, 1
         sign = -1 if z < 0 else 1
         offset = self.offsets[(end - 1 if z < 0 else end) & 3]
         beyond = max(sign * (z + offset), 0) - k["half"] - 4 * self.sure - self.sure
@@ -280,14 +277,20 @@ class Recursion:
         if beyond >= 0:
             z -= sign * beyond
             share = k["log_5_8"] if beyond - k["half"] >= 0 else 0
-            bound = self._power(k["of_speed"] - log2(self.quiet + self._lead) - share)
-            velocity = sign * min(sign * velocity, bound)
+            bound = k["of_speed"] - log2(self.quiet + self._lead) - share
+            velocity = sign * min(sign * velocity, self._power(bound))
+            least = self._power(bound + k["of_bound"])
         if self.quiet >= k["max_time"]:
             velocity = self.shown_a = 0
-        return self._emit(velocity, z)
+        return self._emit(velocity, z, least)
 
-    def _emit(self, velocity: int, place: int | None = None) -> Row:
-        """Return what is shown."""
+    def _nothing(self) -> Row:
+        """Show no velocity."""
+        self.shown_a, self.quality = 0, self._k["none"]
+        return self._emit(0, self.p, 0)
+
+    def _emit(self, velocity: int, place: int | None = None, least: int = 1) -> Row:
+        """Return what is shown, with a deviation of at least so many LSB."""
         k, place = self._k, self._place if place is None else place
         shown = self._product(velocity, k["tick"], "shown")
         more = max(self.trouble + k["log_4"], 0)
@@ -295,6 +298,6 @@ class Recursion:
         return (
             max(-k["most_shown"], min(shown, k["most_shown"])),
             place,
-            min(self._power(noise + self.quality - self.log_memory), k["most_quality"]),
+            min(max(self._power(noise + self.quality - self.log_memory), least), k["most_quality"]),
             self._product(self.shown_a, k["slope"], "acceleration"),
         )

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from copy import deepcopy
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -148,6 +149,21 @@ def test_a_ramp_has_its_acceleration() -> None:
     shown = run.updates.acceleration[-100:] * lsb
     right = 2 / 750 / float(spec.timing.tick_seconds) ** 2 * 2 * np.pi / spec.encoder.counts_per_rev
     assert shown == pytest.approx(np.full(100, right), rel=1e-4)
+
+
+def test_quality_is_the_velocity_at_least_while_the_shaft_has_stopped() -> None:
+    """An LSB before, until the next edge is overdue; all of the velocity then; 0 when it is forgotten."""
+    spec = core(unit="rpm", max_time="50ms")
+    cycles = spec.timing.tick_cycles
+    moves = trace_of(np.arange(1, 500) * 10 * cycles, np.arange(1, 500))
+    found = golden.run(spec, replace(moves, n_clocks=moves.n_clocks + 7500 * cycles)).updates
+    assert (found.quality[2000:4990] == 1).all()
+    silent = slice(5005, 7400)
+    assert (found.velocity[silent] <= found.quality[silent]).all()
+    assert (found.quality[silent] < found.velocity[silent] * 1.01).all()
+    assert (found.velocity[7600:] == 0).all()
+    assert found.quality[9900] > 0
+    assert not found.quality[10_100:].any()
 
 
 WORDS = ("noise", "noises", "turn", 0, 1, 2, 3)  # what outlives a rest; numbers are those of offsets
