@@ -42,14 +42,13 @@ Examples:
 )
 @board_argument
 @board_core_options(LOOP)
-@option("Files", "--name", default="tachometer", metavar="NAME", help="Name of the Verilog module and of the files.")
+@option("Files", "--name NAME", default="tachometer", help="Name of the Verilog module and of the files.")
 @option(
     "Files",
-    "--output",
+    "--output DIR",
     "-o",
     "directory",
     type=FilePath(file_okay=False),
-    metavar="DIR",
     help="Directory to write to; it is made if it does not exist, and files in it are overwritten. "
     "[default: build/BOARD]",
 )

@@ -35,18 +35,16 @@ Examples:
 )
 @option(
     "Check",
-    "--verilog",
+    "--verilog FILE",
     "netlists",
     type=FilePath(),
     multiple=True,
-    metavar="FILE",
     help="Simulate this in place of NAME.v: a netlist after synthesis; again for the models of its cells.",
 )
 @option(
     "Check",
-    "--waves",
+    "--waves DIR",
     type=FilePath(),
-    metavar="DIR",
     help="Put the waveform of a core that differs from the golden model into this folder; it is made then.",
 )
 def check(places: tuple[Path, ...], simulation: bool, netlists: tuple[Path, ...], waves: Path | None) -> int:

@@ -49,9 +49,8 @@ Examples:
 @COMMON_CORE_OPTIONS
 @option(
     "Methods",
-    "--methods",
+    "--methods LIST",
     default="all",
-    metavar="LIST",
     help="Methods to compare: all, or names with commas between. Methods take options, as in m:average=10 or "
     "hostmot2:period=500us. difference, hostmot2, simplefoc, odrive and moteus are float models of what is in use; "
     "least-squares, foaw and kalman are float models of estimators in the literature. "
@@ -68,24 +67,21 @@ Examples:
 @OPTIONAL_MOTION_OPTIONS
 @option(
     "Capture",
-    "--replay",
+    "--replay CAPTURE",
     "capture",
-    metavar="CAPTURE",
     type=FilePath(),
     help="Captured lines instead of a --motion: a session, text or waveform, as `tachometry replay` takes it.",
 )
 @CAPTURE_OPTIONS
 @option(
     "Methods",
-    "--from",
+    "--from TIME",
     "start",
-    metavar="TIME",
     help="Leave out errors before this time, in s, ms, us or ns. [default: until every method has a value]",
 )
 @option(
     "Methods",
-    "--until",
-    metavar="TIME",
+    "--until TIME",
     help="Leave out errors after this time, in s, ms, us or ns. With --from, --plot shows a part of a long capture. "
     "[default: the end]",
 )

@@ -19,16 +19,14 @@ Examples:
 @click.argument("board", metavar="[PORT]", required=False)
 @option(
     "Page",
-    "--manifest",
+    "--manifest FILE",
     type=FilePath(dir_okay=False),
-    metavar="FILE",
     help="What `tachometry build` has written for the board at a serial PORT, which the page can then show live.",
 )
 @option(
     "Page",
-    "--port",
+    "--port N",
     type=click.IntRange(0, 65535),
-    metavar="N",
     help="Port of 127.0.0.1 at which the page is. [default: one that is free]",
 )
 def explore(board: str | None, manifest: Path | None, port: int | None) -> int:

@@ -31,9 +31,8 @@ Examples:
 )
 @option(
     _FIGURES,
-    "--only",
+    "--only LIST",
     default="all",
-    metavar="LIST",
     help="Figures to draw: all, or names with commas between: tsuji5, tsuji6, tsuji7, tsuji8, tsuji9, tsuji12, "
     "tsuji13, tsuji14, tsuji15 (Tsuji 2009), rairan2, rairan3, rairan5, rairan7 (Rairán 2013). The last three of Tsuji "
     "need a C++ compiler; without one, all leaves them out.",

@@ -117,9 +117,7 @@ def _read(*, bus: str | None, target: str, **given: Any) -> dict[str, Any]:
 ASKED = Group(
     [
         core_options(AXES, LOOP),
-        option(
-            "Files", "--name", default="tachometer", metavar="NAME", help="Name of the Verilog module and of the files."
-        ),
+        option("Files", "--name NAME", default="tachometer", help="Name of the Verilog module and of the files."),
         option(
             "Files",
             "--testbench",
@@ -188,12 +186,11 @@ Examples:
 @ASKED
 @option(
     "Files",
-    "--output",
+    "--output DIR",
     "-o",
     "directory",
     type=FilePath(),
     required=True,
-    metavar="DIR",
     help="Directory to write to; it is made if it does not exist, and files in it are overwritten.",
 )
 def generate(asked: Asked, directory: Path) -> int:

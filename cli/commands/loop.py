@@ -41,22 +41,20 @@ Examples:
 )
 @option(
     "Sweep",
-    "--vary",
+    "--vary NAME=VALUES",
     multiple=True,
-    metavar="NAME=VALUES",
     help="An axis: the name of an option of core, controller, motor or encoder, and its values with commas between. "
     "LO..HI:N stands for N values, evenly spaced, and LO..HI:Nlog for N whose logarithms are. It may be given several "
     "times: all combinations are run.",
 )
 @option(
     "Sweep",
-    "--methods",
+    "--methods LIST",
     default=AUTO,
-    metavar="LIST",
     help="Methods to run: auto, which chooses one as --method does, all, or names with commas between, with options "
     "as in mt:timer=tick.",
 )
-@option("Sweep", "--seeds", type=int, default=6, metavar="N", help="Runs of each loop, with seeds from --seed on.")
+@option("Sweep", "--seeds N", type=int, default=6, help="Runs of each loop, with seeds from --seed on.")
 @JOBS
 @SCHEDULER
 @output(

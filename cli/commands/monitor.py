@@ -66,28 +66,25 @@ Examples:
 @click.argument("port", metavar="PORT")
 @option(
     _GROUP,
-    "--manifest",
+    "--manifest FILE",
     type=FilePath(dir_okay=False),
-    metavar="FILE",
     help="What `tachometry build` has written for the board at a serial port: the options of its core.",
 )
 @option(
     _GROUP,
-    "--set",
+    "--set NAME=VALUE",
     "words",
     multiple=True,
-    metavar="NAME=VALUE",
     help="Set the emulated encoder, which the board measures from then on if its speed is set; can be given several "
     "times. All names are listed below.",
 )
 @option(
     _GROUP,
-    "--every",
+    "--every TIME",
     default="10ms",
-    metavar="TIME",
     help="Time from a frame of telemetry to the next, rounded to whole ticks; what the line cannot carry is lost.",
 )
-@option(_GROUP, "--duration", metavar="TIME", help="End after this time of the board. [default: at Ctrl-C]")
+@option(_GROUP, "--duration TIME", help="End after this time of the board. [default: at Ctrl-C]")
 @option(
     _GROUP, "--plain", is_flag=True, help="Print a line a second, as without a terminal, in place of the live view."
 )
@@ -100,9 +97,8 @@ Examples:
 )
 @option(
     _GROUP,
-    "--serve",
+    "--serve FILE",
     type=FilePath(dir_okay=False),
-    metavar="FILE",
     help="Only run a simulated board for other programs: print its serial port, and write its manifest to FILE.",
 )
 @output(

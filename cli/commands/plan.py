@@ -31,16 +31,14 @@ Examples:
 @CORE_AND_MAKE_OPTIONS
 @option(
     "Range",
-    "--speeds",
-    metavar="LO:HI",
+    "--speeds LO:HI",
     help="Speeds of the tables, in rad/s, rev/s or rpm; a LO without unit has that of HI. They are shown in "
     "--unit, or for count/tick in the unit of HI. "
     "[default: one count in the maximum time to --max-speed, or to ten counts per tick]",
 )
 @option(
     "Range",
-    "--methods",
-    metavar="LIST",
+    "--methods LIST",
     help="Methods to compare beside each other: all, or names with commas between, with options as in m:average=10.",
 )
 @output("--plot", suffixes=(".png", ".pdf", ".svg"), help="Figure of resolution and measurement time.")

@@ -52,26 +52,23 @@ Examples:
 @click.argument("file", required=False, type=FilePath())
 @option(
     "Sweep",
-    "--vary",
+    "--vary NAME=VALUES",
     multiple=True,
-    metavar="NAME=VALUES",
     help="An axis: the name of an option of cores, methods, motion or encoder, or a name in braces within --motion, "
     "and its values with commas between. LO..HI:N stands for N values, evenly spaced, and LO..HI:Nlog for N whose "
     "logarithms are; none leaves the option out. It may be given several times: all combinations are run.",
 )
 @option(
     "Sweep",
-    "--methods",
+    "--methods LIST",
     default=AUTO,
-    metavar="LIST",
     help="Methods to run: auto, which chooses one for each point as --method does, all, or names with commas between, "
     "with options as in m:average=10.",
 )
 @option(
     "Sweep",
-    "--from",
+    "--from TIME",
     "start",
-    metavar="TIME",
     help="Leave out errors before this time, in s, ms, us or ns. [default: until there is a value]",
 )
 @option(
@@ -89,13 +86,12 @@ Examples:
     help="Parquet with a row per point. Points that are in it already do not run again.",
 )
 @output("--plot", suffixes=(".png", ".pdf", ".svg"), help="Heat map over two axes, a panel per method.")
-@option("Outputs", "--axes", metavar="X,Y", help="Axes of the heat map. [default: the first two]")
+@option("Outputs", "--axes X,Y", help="Axes of the heat map. [default: the first two]")
 @option(
     "Outputs",
-    "--metric",
+    "--metric METRIC",
     type=click.Choice(list(METRICS), case_sensitive=False),
     default="relative-error",
-    metavar="METRIC",
     help=f"What the heat map shows, the median over all other axes: {', '.join(METRICS)}.",
 )
 @click.pass_obj

@@ -31,35 +31,31 @@ later ones find them in the cache.""",
 )
 @option(
     _VERIFICATION,
-    "--methods",
+    "--methods LIST",
     default="all",
-    metavar="LIST",
     help=lambda: f"Methods to verify: all, or names with commas between, of {', '.join(METHODS)}.",
 )
 @option(
     _VERIFICATION,
-    "--engines",
+    "--engines LIST",
     default="all",
-    metavar="LIST",
     help="Engines to verify, with commas between: pysim, cxxrtl, verilator; all are those that can be used here. With "
     "cxxrtl-every-clock, which is not among all, CXXRTL skips no clock.",
 )
 @option(
     _VERIFICATION,
-    "--clocks",
+    "--clocks N",
     type=click.IntRange(min=0),
     default=0,
-    metavar="N",
     help="Clocks that each engine simulates, spread over the configurations; pysim simulates a thousandth of them. "
     "Every "
     "configuration runs one motion at least.",
 )
-@option(_VERIFICATION, "--seed", type=click.IntRange(min=0), default=1, metavar="N", help="Seed of the first motion.")
+@option(_VERIFICATION, "--seed N", type=click.IntRange(min=0), default=1, help="Seed of the first motion.")
 @option(
     _VERIFICATION,
-    "--jobs",
+    "--jobs N",
     type=click.IntRange(min=1),
-    metavar="N",
     help="Number of processes. [default: one for each core of the computer]",
 )
 @output_folder("build/verify", help="Folder of the captures of failing motions; it is made if a motion fails.")

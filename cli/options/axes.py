@@ -12,9 +12,8 @@ _AXES = "Axes"
 _OPTIONS = [
     option(
         _AXES,
-        "--axes",
+        "--axes N",
         type=int,
-        metavar="N",
         help=f"Measure N encoders, up to {MAX_AXES}, which have a datapath of method s or track in turn: a and b have "
         "N bits, and what is measured comes with the number of its axis. Without it: one encoder, and no such number.",
     ),

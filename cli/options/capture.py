@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tachometry.cli.options.option import Group, option, refuse_without
+from tachometry.cli.options.option import Group, option, plain_options, refuse_without
 from tachometry.spec import CoreSpec
 from tachometry.spec.language.units import parse_frequency
 
@@ -17,68 +17,36 @@ if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
 _CAPTURE = "Capture"
 
 _OPTIONS = [
-    option(
+    *plain_options(
         _CAPTURE,
-        "--a",
-        metavar="CHANNEL",
-        help="Channel of line A: its name, or its number from 0. With --axes one for each axis, with commas between, "
-        "as of --b and --z; then these are a0, a1 and so on, b0, z0, if they are not given.",
+        {
+            "--a CHANNEL": "Channel of line A: its name, or its number from 0. With --axes one for each axis, with "
+            "commas between, as of --b and --z; then these are a0, a1 and so on, b0, z0, if they are not given.",
+            "--b CHANNEL": "Channel of line B. [default of --a and --b: the channels named A and B, else the first "
+            "two]",
+            "--c CHANNEL": "Channel of line C of halls. [default: c with --sensor hall]",
+            "--z CHANNEL": "Channel of line Z, the index. [default: z with --index, else none]",
+            "--tick-in CHANNEL": "Channel of the external tick. [default: tick_in with --external-tick, else none]",
+            "--time COLUMN": "Column of the times in a text: its name, or its number from 0. [default: the column "
+            "named time]",
+            "--time-unit UNIT": "Unit of the times in a text: s, ms, us, ns, or the rate of what counts them, such as "
+            "16MHz. [default: as the name of the column ends, such as time_ms or Time [us], else s]",
+            "--threshold V[:V]": "Voltage from which on a line is high, for the columns of an oscilloscope, and by how "
+            "much it must fall below where it rose, as in 1.65V:200mV. [default: levels are 0 or 1]",
+            "--count COLUMN": "Column of the counts in a text that logs time and count: its name, or its number from "
+            "0. Between two rows the shaft turns evenly; a count is one of --ppr and --decoding. With --axes as --a.",
+        },
     ),
     option(
         _CAPTURE,
-        "--b",
-        metavar="CHANNEL",
-        help="Channel of line B. [default of --a and --b: the channels named A and B, else the first two]",
-    ),
-    option(_CAPTURE, "--c", metavar="CHANNEL", help="Channel of line C of halls. [default: c with --sensor hall]"),
-    option(
-        _CAPTURE, "--z", metavar="CHANNEL", help="Channel of line Z, the index. [default: z with --index, else none]"
-    ),
-    option(
-        _CAPTURE,
-        "--tick-in",
-        metavar="CHANNEL",
-        help="Channel of the external tick. [default: tick_in with --external-tick, else none]",
-    ),
-    option(
-        _CAPTURE,
-        "--time",
-        metavar="COLUMN",
-        help="Column of the times in a text: its name, or its number from 0. [default: the column named time]",
-    ),
-    option(
-        _CAPTURE,
-        "--time-unit",
-        metavar="UNIT",
-        help="Unit of the times in a text: s, ms, us, ns, or the rate of what counts them, such as 16MHz. [default: as "
-        "the name of the column ends, such as time_ms or Time [us], else s]",
-    ),
-    option(
-        _CAPTURE,
-        "--threshold",
-        metavar="V[:V]",
-        help="Voltage from which on a line is high, for the columns of an oscilloscope, and by how much it must fall "
-        "below where it rose, as in 1.65V:200mV. [default: levels are 0 or 1]",
-    ),
-    option(
-        _CAPTURE,
-        "--count",
-        metavar="COLUMN",
-        help="Column of the counts in a text that logs time and count: its name, or its number from 0. Between "
-        "two rows the shaft turns evenly; a count is one of --ppr and --decoding. With --axes as --a.",
-    ),
-    option(
-        _CAPTURE,
-        "--wrap",
+        "--wrap N",
         type=click.IntRange(0, 1 << 53),
-        metavar="N",
         help="The counter of --count goes from N-1 to 0; 0: it does not wrap. [default: 65536 or 4294967296 where it "
         "jumps by more than half of that, else 0]",
     ),
     option(
         _CAPTURE,
-        "--samplerate",
-        metavar="FREQUENCY",
+        "--samplerate FREQUENCY",
         help="Samplerate of a .sr file or a text that contains neither it nor times, in Hz (plain number), kHz, MHz or "
         "GHz.",
     ),

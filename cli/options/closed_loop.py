@@ -10,7 +10,7 @@ import click
 
 from tachometry.cli.options.core import core_click_options
 from tachometry.cli.options.motion import DISC_OPTIONS
-from tachometry.cli.options.option import Group, declared, option, take_values
+from tachometry.cli.options.option import Group, declared, option, plain_options, take_values
 from tachometry.cli.options.sweep import by_name
 from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.spec import TachometerSpec
@@ -43,47 +43,35 @@ _MOST_SPEED = 1e6  # rad/s
 
 _OPTIONS = [
     *(declared(_MOTOR if about in options_of(Motor) else _LOOP, about) for about in options_of(Law)),
-    option(
+    *plain_options(
         _LOOP,
-        "--measured-acceleration",
-        is_flag=True,
-        help="The observer works at every control tick, with the acceleration that method track measures.",
+        {
+            "--measured-acceleration": "The observer works at every control tick, with the acceleration that method "
+            "track measures.",
+            "--delay TIME": "From a control tick until its current is commanded, at most a control tick. [default: "
+            "none]",
+            "--gates": "Run the controller in gates, too: the core that generate --loop makes with these options.",
+            "--unfiltered": "K_V acts on the velocity before the low-pass filter.",
+            "--feed-forward": "Add the acceleration of the command.",
+        },
     ),
-    option(
-        _LOOP,
-        "--delay",
-        metavar="TIME",
-        help="From a control tick until its current is commanded, at most a control tick. [default: none]",
-    ),
-    option(
-        _LOOP,
-        "--gates",
-        is_flag=True,
-        help="Run the controller in gates, too: the core that generate --loop makes with these options.",
-    ),
-    option(_LOOP, "--unfiltered", is_flag=True, help="K_V acts on the velocity before the low-pass filter."),
-    option(_LOOP, "--feed-forward", is_flag=True, help="Add the acceleration of the command."),
-    option(_MOTOR, "--driver-time", type=_TIME, default="100us", metavar="TIME", help="Time constant of the current."),
-    option(_MOTOR, "--friction", type=_TORQUE, default="5mNm", metavar="TORQUE", help="Coulomb friction, Nm or mNm."),
-    option(_MOTOR, "--viscous", type=float, default=0.0, metavar="B", help="Viscous friction in Nm/(rad/s)."),
+    option(_MOTOR, "--driver-time TIME", type=_TIME, default="100us", help="Time constant of the current."),
+    option(_MOTOR, "--friction TORQUE", type=_TORQUE, default="5mNm", help="Coulomb friction, Nm or mNm."),
+    option(_MOTOR, "--viscous B", type=float, default=0.0, help="Viscous friction in Nm/(rad/s)."),
     option(
         _MOTOR,
-        "--torque-noise",
+        "--torque-noise TORQUE",
         type=_TORQUE,
         default="5mNm",
-        metavar="TORQUE",
         help="Standard deviation of a torque that is new every millisecond.",
     ),
     option(
         _MOTOR,
-        "--load",
-        metavar="TORQUE:FROM:TIME",
+        "--load TORQUE:FROM:TIME",
         help="A torque against the shaft for a time, such as 0.2Nm:7s:500ms. RMS and greatest error, and the current, "
         "are then of the time before it.",
     ),
-    option(
-        _LOOP, "--from", "start", default="0s", metavar="TIME", help="Leave out what comes before this time: the start."
-    ),
+    option(_LOOP, "--from TIME", "start", default="0s", help="Leave out what comes before this time: the start."),
 ]
 
 _LOOKS = 1000  # at the speed of a motion

@@ -246,9 +246,8 @@ def core_click_options() -> dict[str, click.Option]:
 
 BAUD = option(
     "Files",
-    "--baud",
+    "--baud BITS",
     type=click.IntRange(min=1),
-    metavar="BITS",
     help="Bits a second of --bus uart, which the clock must make within 2 %, with at least 8 clocks a bit; "
     f"{DEFAULT_BAUD}, if it is not given.",
 )

@@ -25,24 +25,13 @@ _OPTIONS = [
     ),
     option(
         _SIMULATION,
-        "--pulse",
-        metavar="INPUT:TIME,TIME…",
+        "--pulse INPUT:TIME,TIME…",
         multiple=True,
         help="Input preset (with --preset), home (with --index-once) or probe_0 (with --probe) rises at these times, "
         "such as preset:20ms,35ms or home:960clk. It can be given for each input.",
     ),
-    option(
-        _SIMULATION,
-        "--vcd-from",
-        metavar="TIME",
-        help="Time at which the waveform of --vcd begins, such as 20us or 960clk.",
-    ),
-    option(
-        _SIMULATION,
-        "--vcd-to",
-        metavar="TIME",
-        help="Time at which the waveform of --vcd ends, such as 20us or 960clk.",
-    ),
+    option(_SIMULATION, "--vcd-from TIME", help="Time at which the waveform of --vcd begins, such as 20us or 960clk."),
+    option(_SIMULATION, "--vcd-to TIME", help="Time at which the waveform of --vcd ends, such as 20us or 960clk."),
 ]
 
 

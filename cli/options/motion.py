@@ -36,9 +36,8 @@ Units: rad/s, rev/s, rpm (0 has none); s (default), ms, us, ns;
 def _motion(required: bool) -> Callable[[Any], Any]:
     return option(
         _MOTION,
-        "--motion",
+        "--motion MOTION",
         required=required,
-        metavar="MOTION",
         help="How the shaft moves, such as ramp:0:40rad/s:5s; all forms are listed below. With --axes "
         "several, with commas between: each axis has its own, the last one those that are left, and the next seed.",
     )

@@ -229,9 +229,25 @@ class GroupedCommand(click.Command):
         return groups
 
 
-def option(group: str, *names: str, **attributes: Any) -> Callable[[Command], Command]:
-    """Decorate a command with an option in a group; defaults are shown."""
-    return click.option(*names, cls=Option, group=group, show_default=True, **attributes)
+def option(group: str, name: str, *others: str, **attributes: Any) -> Callable[[Command], Command]:
+    """Decorate a command with an option in a group; defaults are shown.
+
+    `name` may have what stands for the value behind it, as `--time COLUMN`; others follow as of `click.option`.
+    """
+    first, _, metavar = name.partition(" ")
+    attributes = {"metavar": metavar or None} | attributes
+    return click.option(first, *others, cls=Option, group=group, show_default=True, **attributes)
+
+
+def plain_options(group: str, helps: Mapping[str, str]) -> list[Callable[[Any], Any]]:
+    """Return decorators, each of which adds an option: a text, or a flag where nothing stands for a value.
+
+    Parameters
+    ----------
+    helps : mapping of str to str
+        By the name, as of `option`.
+    """
+    return [option(group, name, is_flag=" " not in name, help=help) for name, help in helps.items()]
 
 
 def declared(group: str, about: declaration.Option) -> Callable[[Command], Command]:

@@ -17,17 +17,12 @@ ENCODER = click.command("sweep")(ENCODER_OPTIONS(lambda encoder, motion: (encode
 
 SCHEDULER = option(
     "Machines",
-    "--scheduler",
-    metavar="ADDRESS",
+    "--scheduler ADDRESS",
     help="Run on the workers of a Dask scheduler, such as tcp://host:8786, with the same version of tachometry. "
     "Whoever can connect to it can run code there and here, see docs/guides/sweep.md.",
 )
 JOBS = option(
-    "Machines",
-    "--jobs",
-    type=int,
-    metavar="N",
-    help="Number of processes on this machine. [default: one for each core]",
+    "Machines", "--jobs N", type=int, help="Number of processes on this machine. [default: one for each core]"
 )
 
 
