@@ -37,18 +37,8 @@ class LoopPoint:
     def digest(self) -> str:
         """Digest of all that decides the row."""
         motion = [array.tobytes() for array in vars(self.setting.task.motion).values()]
-        one = self.setting
-        rest = (
-            one.spec,
-            one.gains,
-            one.task.load,
-            one.task.virtual,
-            one.task.noise,
-            one.motor,
-            one.encoder,
-            one.begin,
-            one.gates,
-        )
+        one, task = self.setting, self.setting.task
+        rest = (one.spec, one.gains, task.load, task.virtual, task.noise, one.motor, one.encoder, one.begin, one.gates)
         return digest(self.code, self.method, motion, *rest, self.seeds)
 
     @property

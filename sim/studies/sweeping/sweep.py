@@ -4,10 +4,11 @@ import functools
 import hashlib
 import pickle
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from importlib.util import find_spec
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ from tachometry.spec.language.units import format_time
 
 Row = dict[str, Any]
 
-# Columns of what a point is, and what came of it.
+# Columns of what came of a point.
 _RESULTS: dict[str, tuple[str, str]] = {
     "point": ("text", "digest of all that decides the row"),
     "method": ("text", "as in `methods`"),
@@ -45,40 +46,48 @@ _RESULTS: dict[str, tuple[str, str]] = {
     "max_error_rad_s": ("float", "rad/s, greatest error"),
     "relative_error": ("float", "RMS error over RMS of the true speed"),
     "delay_s": ("float", "s, shift of the true speed that comes closest"),
-    "ppr": ("int", "pulses per revolution"),
-    "decoding": ("int", "counts per pulse"),
-    "clock_hz": ("int", "Hz"),
-    "tick_s": ("float", "s; with Rairán's method dt"),
-    "max_time_s": ("float", "s"),
-    "max_tick_period_s": ("float", "s, of an external tick"),
-    "unit": ("text", "of the velocity"),
-    "frac_bits": ("int", "bits"),
-    "velocity_width": ("int", "bits"),
-    "max_speed_rad_s": ("float", "rad/s"),
-    "position_width": ("int", "bits"),
-    "filter": ("int", "clocks"),
-    "index": ("bool", "as the option"),
-    "index_reset": ("bool", "as the option"),
-    "age": ("bool", "as the option"),
-    "bounds": ("bool", "as the option"),
-    "edge_error": ("float", "counts, of the bounds"),
-    "lowpass_rad_s": ("float", "rad/s"),
 }
-_ENCODER: dict[str, tuple[str, str]] = {
-    "vibration_rad": ("float", "rad, amplitude"),
-    "vibration_hz": ("float", "Hz"),
-    "jitter": ("float", "fraction of a gap"),
-    "nonuniformity": ("float", "edge pitches"),
-    "eccentricity": ("float", "edge pitches"),
-    "phase_error_deg": ("float", "electrical degrees"),
-    "duty_error_deg": ("float", "electrical degrees"),
-    "bounce_count": ("int", "per edge"),
-    "bounce_s": ("float", "s"),
-    "lost": ("float", "probability"),
-    "illegal": ("float", "probability"),
-    "seed": ("int", "as the option"),
-    "from_s": ("float", "s, errors before are left out"),
+# Those of what it is: kind, content, and the value of a core,
+_CORE: dict[str, tuple[str, str, Callable[[TachometerSpec], Any]]] = {
+    "ppr": ("int", "pulses per revolution", lambda spec: spec.encoder.pulses_per_rev),
+    "decoding": ("int", "counts per pulse", lambda spec: spec.encoder.decoding),
+    "clock_hz": ("int", "Hz", lambda spec: spec.timing.clock_hz),
+    "tick_s": ("float", "s; with Rairán's method dt", lambda spec: _seconds(spec, spec.timing.tick_cycles)),
+    "max_time_s": ("float", "s", lambda spec: _seconds(spec, spec.timing.max_ticks * spec.timing.tick_cycles)),
+    "max_tick_period_s": ("float", "s, of an external tick", lambda spec: _of(spec, "max_tick_cycles", "clocks")),
+    "unit": ("text", "of the velocity", lambda spec: spec.unit),
+    "frac_bits": ("int", "bits", lambda spec: spec.widths.frac_bits),
+    "velocity_width": ("int", "bits", lambda spec: spec.widths.velocity),
+    "max_speed_rad_s": ("float", "rad/s", lambda spec: spec.max_speed and spec.max_speed.rad_per_s),
+    "position_width": ("int", "bits", lambda spec: spec.position_width),
+    "filter": ("int", "clocks", lambda spec: spec.filter_clocks),
+    "index": ("bool", "as the option", lambda spec: spec.index),
+    "index_reset": ("bool", "as the option", lambda spec: spec.index_reset),
+    "age": ("bool", "as the option", lambda spec: spec.age),
+    "bounds": ("bool", "as the option", lambda spec: spec.bounds),
+    "edge_error": (
+        "float",
+        "counts, of the bounds",
+        lambda spec: float(spec.bound.edge_error) if spec.bounds else None,
+    ),
+    "lowpass_rad_s": ("float", "rad/s", lambda spec: None if spec.lowpass is None else float(spec.lowpass)),
 }
+# and of an encoder.
+_ENCODER: dict[str, tuple[str, str, Callable[[VirtualEncoder], Any]]] = {
+    "vibration_rad": ("float", "rad, amplitude", lambda encoder: encoder.vibration and encoder.vibration.amplitude_rad),
+    "vibration_hz": ("float", "Hz", lambda encoder: encoder.vibration and encoder.vibration.frequency_hz),
+    "jitter": ("float", "fraction of a gap", attrgetter("jitter")),
+    "nonuniformity": ("float", "edge pitches", attrgetter("nonuniformity")),
+    "eccentricity": ("float", "edge pitches", attrgetter("eccentricity")),
+    "phase_error_deg": ("float", "electrical degrees", attrgetter("phase_error_deg")),
+    "duty_error_deg": ("float", "electrical degrees", attrgetter("duty_error_deg")),
+    "bounce_count": ("int", "per edge", lambda encoder: encoder.bounce and encoder.bounce.count),
+    "bounce_s": ("float", "s", lambda encoder: encoder.bounce and encoder.bounce.time_s),
+    "lost": ("float", "probability", attrgetter("lost")),
+    "illegal": ("float", "probability", attrgetter("illegal")),
+    "seed": ("int", "as the option", attrgetter("seed")),
+}
+_FROM = {"from_s": ("float", "s, errors before are left out")}
 _KINDS = {bool: "bool", int: "int", str: "text"}
 
 
@@ -96,7 +105,8 @@ class _Columns(Mapping[str, tuple[str, str]]):
 
     def _all(self) -> dict[str, tuple[str, str]]:
         own = {_column(about): _content(about) for method in METHODS for about in own_options(method)}
-        return _RESULTS | own | _ENCODER
+        core, encoder = ({name: each[:2] for name, each in known.items()} for known in (_CORE, _ENCODER))
+        return _RESULTS | core | own | encoder | _FROM
 
 
 # Every column of the results: its kind, and what is in it, with its unit. What does not exist or cannot be determined
@@ -269,55 +279,20 @@ def run_point(point: Point) -> Row:
 
 def _core(spec: TachometerSpec) -> Row:
     """Return columns of the configuration."""
+    own = {_column(about): _of(spec, about.field, about.unit) for about in own_options(spec.method)}
+    return {name: value(spec) for name, (_, _, value) in _CORE.items()} | own
 
-    def seconds(clocks: int | None) -> float | None:
-        return None if clocks is None else float(spec.times.seconds(clocks))
 
-    timing = spec.timing
-    own = {}
-    for about in own_options(spec.method):
-        value = spec.parameters[about.field]
-        if about.unit == "clocks":
-            value = seconds(value)
-        elif about.unit == "rad/s":
-            value = float(getattr(spec, about.field))
-        own[_column(about)] = value
-    return {
-        "ppr": spec.encoder.pulses_per_rev,
-        "decoding": spec.encoder.decoding,
-        "clock_hz": timing.clock_hz,
-        "tick_s": seconds(timing.tick_cycles),
-        "max_time_s": seconds(timing.max_ticks * timing.tick_cycles),
-        "max_tick_period_s": seconds(spec.parameters["max_tick_cycles"]),
-        "unit": spec.unit,
-        "frac_bits": spec.widths.frac_bits,
-        "velocity_width": spec.widths.velocity,
-        "max_speed_rad_s": None if spec.max_speed is None else spec.max_speed.rad_per_s,
-        "position_width": spec.position_width,
-        "filter": spec.filter_clocks,
-        "index": spec.index,
-        "index_reset": spec.index_reset,
-        "age": spec.age,
-        "bounds": spec.bounds,
-        "edge_error": float(spec.bound.edge_error) if spec.bounds else None,
-        "lowpass_rad_s": None if spec.lowpass is None else float(spec.lowpass),
-    } | own
+def _of(spec: TachometerSpec, field: str, unit: str) -> Any:
+    """Return what an option of a core is, in the unit of its column."""
+    value = spec.parameters[field]
+    return float(getattr(spec, field)) if unit == "rad/s" else _seconds(spec, value) if unit == "clocks" else value
+
+
+def _seconds(spec: TachometerSpec, clocks: int | None) -> float | None:
+    return None if clocks is None else float(spec.times.seconds(clocks))
 
 
 def _encoder(encoder: VirtualEncoder) -> Row:
     """Return columns of the encoder and what is wrong with it."""
-    vibration, bounce = encoder.vibration, encoder.bounce
-    return {
-        "vibration_rad": None if vibration is None else vibration.amplitude_rad,
-        "vibration_hz": None if vibration is None else vibration.frequency_hz,
-        "jitter": encoder.jitter,
-        "nonuniformity": encoder.nonuniformity,
-        "eccentricity": encoder.eccentricity,
-        "phase_error_deg": encoder.phase_error_deg,
-        "duty_error_deg": encoder.duty_error_deg,
-        "bounce_count": None if bounce is None else bounce.count,
-        "bounce_s": None if bounce is None else bounce.time_s,
-        "lost": encoder.lost,
-        "illegal": encoder.illegal,
-        "seed": encoder.seed,
-    }
+    return {name: value(encoder) for name, (_, _, value) in _ENCODER.items()}
