@@ -26,8 +26,8 @@ class Outputs:
 
     Parameters
     ----------
-    targets : mapping of str to path
-        Where each output goes. The keys are what messages call it, such as `--plot`.
+    targets : mapping of str to path or None
+        Where each output goes; None: it is not wanted. The keys are what messages call it, such as `--plot`.
     inputs : iterable of path
         Files that the command reads; no target may be one of them.
 
@@ -39,8 +39,8 @@ class Outputs:
         On entering and leaving, if a target cannot be written; also for a full disk in the block, with the target.
     """
 
-    def __init__(self, targets: Mapping[str, Path], inputs: Iterable[Path] = ()) -> None:
-        self._targets = {what: _real(path) for what, path in targets.items()}
+    def __init__(self, targets: Mapping[str, Path | None], inputs: Iterable[Path] = ()) -> None:
+        self._targets = {what: _real(path) for what, path in targets.items() if path is not None}
         self._made: list[Path] = []
         self._staging: dict[Path, Claim] = {}
         self._current: Path | None = None

@@ -4,13 +4,11 @@ import csv
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from tachometry.boards.monitor.columns import Column, Value
 from tachometry.boards.monitor.session import Frame
 
-SUFFIXES = (".csv", ".parquet")
 TIME = "time [s]"
 
 
@@ -25,7 +23,7 @@ class Recorder:
     path : Path
         Where it is written.
     suffix : str
-        One of `SUFFIXES`.
+        .csv or .parquet.
 
     Raises
     ------
@@ -47,9 +45,7 @@ class Recorder:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         with self._writes():
             self._file.close()
             if self._parquet and self.whole:

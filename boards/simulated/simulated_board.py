@@ -5,7 +5,6 @@ import select
 import threading
 import time
 from contextlib import suppress
-from types import TracebackType
 from typing import Protocol, Self
 
 try:
@@ -71,9 +70,7 @@ class SimulatedBoard:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

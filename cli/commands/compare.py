@@ -127,9 +127,8 @@ def compare(
     the true speed that comes closest. It is left out where it says nothing: at constant speed, and where noise hides
     it. A capture does not tell the true speed, so there are no errors.
     """
-    files = {"--plot": plot, "--csv": csv, "--tradeoff": tradeoff}
     inputs = tables if capture is None else [capture]
-    outputs = Outputs({name: path for name, path in files.items() if path is not None}, inputs=inputs)
+    outputs = Outputs({"--plot": plot, "--csv": csv, "--tradeoff": tradeoff}, inputs=inputs)
     named = named_methods(methods, make, BASELINES)
     spec = next((spec for spec in named.specs.values() if spec is not None), None) or make("s", {})
     for name in () if size else _NO_VELOCITY:

@@ -98,15 +98,14 @@ def loop(
     if log is not None and not alone:
         raise ValueError("--log must be of one loop on this machine, without --vary, several --methods or --scheduler")
     across = "" if alone or plot is None else _across(grid)
-    files = {"--plot": plot, "--log": log, "--csv": csv}
     build.compiler()  # without one nothing is begun
-    with Outputs({name: path for name, path in files.items() if path is not None}, inputs=settings.tables) as outputs:
+    with Outputs({"--plot": plot, "--log": log, "--csv": csv}, inputs=settings.tables) as outputs:
         result = run_loops(grid, scheduler, jobs, progress_bar)
-        if (path := outputs.get("--log")) is not None:
+        if path := outputs.get("--log"):
             write_csv(path, *log_table(result.log))
-        if (path := outputs.get("--csv")) is not None:
+        if path := outputs.get("--csv"):
             write_csv(path, *loop_table(result))
-        if (path := outputs.get("--plot")) is not None:
+        if path := outputs.get("--plot"):
             _plot(path, result, across)
     print_loops(result)
     return 0

@@ -144,7 +144,7 @@ def monitor(
         return _selftest(target)
     settings = emulator_settings(target.registers.spec, words)
     period = _ticks(target.registers, every)
-    outputs = Outputs({} if record is None else {"--record": record}, inputs=[] if manifest is None else [manifest])
+    outputs = Outputs({"--record": record}, inputs=[] if manifest is None else [manifest])
     shown = {column.name: column for column in columns(target.registers)}
     state = State(target.title, target.registers.spec, shown, recorded="" if record is None else str(record))
     screen = display(plain)

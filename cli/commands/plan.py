@@ -55,8 +55,7 @@ def plan(
 
     Equal options give equal files.
     """
-    targets = {what: path for what, path in (("--plot", plot), ("--csv", csv)) if path is not None}
-    outputs = Outputs(targets)
+    outputs = Outputs({"--plot": plot, "--csv": csv})
     low, high, unit = _range(spec, speeds)
     named = Methods({}) if methods is None else named_methods(methods, make)
     plans = Plans(spec, {name: one for name, one in named.specs.items() if one is not None}, low, high)

@@ -130,13 +130,12 @@ def sweep(
     check_machines(jobs, scheduler)
     grid = points_of(settings, methods, earliest, pick(engine).name if engine == "auto" else engine)
     across = {} if plot is None else _axes(axes, grid)
-    every = {"--results": results, "--plot": plot}
     inputs = [*([] if file is None else [file]), *settings.tables]
-    Outputs({what: path for what, path in every.items() if path is not None}, inputs=inputs)
+    Outputs({"--results": results, "--plot": plot}, inputs=inputs)
     columns = (*COLUMNS, "point", METRICS[metric][0])
-    with Outputs({} if plot is None else {"--plot": plot}) as outputs:
+    with Outputs({"--plot": plot}) as outputs:
         result = run_sweep(grid, columns, results, scheduler, jobs, progress_bar)
-        if (path := outputs.get("--plot")) is not None:
+        if path := outputs.get("--plot"):
             _plot(path, result, across, metric)
     return 1 if print_sweep(result, results) else 0
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, reduce
+from functools import cache, partial, reduce
 from typing import Any
 
 import click
@@ -45,8 +45,12 @@ _METHOD = option(
 )
 
 
-def _common() -> tuple[click.Option, ...]:
-    return _made_common(common_options())
+def _common(clock: str | None = None) -> tuple[click.Option, ...]:
+    """Return what all methods have; `clock` is what help says of the clock's default, where it is that of a board."""
+    every = common_options()
+    if clock is not None:
+        every = tuple(replace(about, shown=clock) if about.name == _CLOCK else about for about in every)
+    return _made_common(every)
 
 
 @cache
@@ -175,16 +179,6 @@ def _at(texts: Texts, clock_hz: int, why: str = "") -> Texts:
     return {**texts, _CLOCK: parse_frequency.written(clock_hz)}
 
 
-def _common_of_board() -> tuple[click.Option, ...]:
-    declared = common_options()
-    return _made_common(
-        tuple(
-            replace(about, shown="that of the board, and it cannot be another") if about.name == _CLOCK else about
-            for about in declared
-        )
-    )
-
-
 @dataclass(frozen=True)
 class CoreTexts:
     """Options of a core that may have been given."""
@@ -204,25 +198,16 @@ def _read_core(*, method: str, **given: Any) -> dict[str, Any]:
     return dict(core=CoreTexts(method, texts, bool(texts) or source is ParameterSource.COMMANDLINE), **given)
 
 
-def _common_optional() -> tuple[click.Option, ...]:
-    return _made_common(
-        tuple(
-            replace(about, shown="that of the board") if about.name == "clock" else about for about in common_options()
-        )
-    )
+def _of_core(clock: str | None = None) -> list[Callable[[Any], Any]]:
+    return [later("core-options", partial(_common, clock)), _METHOD, later("method-options", own_click_options)]
 
 
-_OWN = later("method-options", own_click_options)
-
-_CORE = [later("core-options", _common), _METHOD, _OWN]
-
-
-def core_options(*parts: Part) -> Group:
+def core_options(*parts: Part, clock: str | None = None) -> Group:
     """Return options of the core, and of what it may be made into, handed to the command as one argument `spec`."""
-    return Group([*_CORE, *(one for part in parts for one in part.options)], _reader(parts))
+    return Group([*_of_core(clock), *(one for part in parts for one in part.options)], _reader(parts))
 
 
-CORE_AND_MAKE_OPTIONS = Group(_CORE, _read_spec_and_make)
+CORE_AND_MAKE_OPTIONS = Group(_of_core(), _read_spec_and_make)
 """As `core_options`, with what makes a spec of another method as `make`, see `COMMON_CORE_OPTIONS`."""
 
 COMMON_CORE_OPTIONS = Group([later("core-options", _common)], _read_make)
@@ -231,11 +216,10 @@ COMMON_CORE_OPTIONS = Group([later("core-options", _common)], _read_make)
 
 def board_core_options(*parts: Part) -> Group:
     """Return those of a command that is given a `board`, whose clock is that of the core."""
-    own = [later("core-options", _common_of_board), _METHOD, _OWN]
-    return Group([*own, *(one for part in parts for one in part.options)], _reader(parts))
+    return core_options(*parts, clock="that of the board, and it cannot be another")
 
 
-OPTIONAL_CORE_OPTIONS = Group([later("core-options", _common_optional), _METHOD, _OWN], _read_core)
+OPTIONAL_CORE_OPTIONS = Group(_of_core("that of the board"), _read_core)
 """As `core_options`, but none must be given; handed over as `core`, of `CoreTexts`."""
 
 

@@ -37,26 +37,12 @@ _OPTIONS = [
 ]
 
 
-def _read(
-    *,
-    vcd: Path | None,
-    plot: Path | None,
-    trace: Path | None,
-    counts: Path | None,
-    events: Path | None,
-    save_capture: Path | None,
-    **others: Any,
-) -> dict[str, Any]:
-    given = {
-        "--vcd": vcd,
-        "--vcd (its .gtkw)": None if vcd is None else vcd.with_suffix(".gtkw"),
-        "--plot": plot,
-        "--trace": trace,
-        "--counts": counts,
-        "--events": events,
-        "--save-capture": save_capture,
-    }
-    return dict(targets={what: path for what, path in given.items() if path is not None}, **others)
+def _read(**given: Any) -> dict[str, Any]:
+    names = ("vcd", "plot", "trace", "counts", "events", "save_capture")
+    paths: dict[str, Path | None] = {f"--{name.replace('_', '-')}": given.pop(name) for name in names}
+    if (vcd := paths["--vcd"]) is not None:
+        paths["--vcd (its .gtkw)"] = vcd.with_suffix(".gtkw")
+    return dict(targets={what: path for what, path in paths.items() if path is not None}, **given)
 
 
 OUTPUT_OPTIONS = Group(_OPTIONS, _read)

@@ -23,6 +23,7 @@ from tachometry.spec import AUTO, METHODS, TachometerSpec, common_options, metho
 from tachometry.spec.language.units import FREQUENCY, SPEED, TIME, read_nearest
 
 Words = tuple[str, ...]
+Listed = tuple[str, str | None, Mapping[str, str]]  # name, method, and its options
 
 _MOST, _MOST_LOOPS = 1_000_000, 100_000
 _PLACE = re.compile(r"\{([^{}]*)\}")
@@ -47,17 +48,22 @@ def points_of(settings: Settings, methods: str, earliest: float, engine: str | N
     ValueError
         If an axis is not known, or a point cannot be.
     """
-    everything = methods.strip() == "all"
-    listed = [(name, name, {}) for name in METHODS] if everything else listed_methods(methods)
+    listed, everything = _listed(methods)
     _check_axes(settings, {method for _, method, _ in listed if method is not None})
     own = [[name for name in settings.vary if _has_option(settings, str(method), name)] for _, method, _ in listed]
     count = sum(math.prod(len(settings.vary[name]) for name in names) for names in own)
     if count > _MOST:
         raise ValueError(f"--vary must give at most {_MOST} points, not {count}")
     maker = _Maker(earliest, engine)
-    grid = Points({}, {}, {name: [text or "none" for text in values] for name, values in settings.vary.items()})
+    grid = Points({}, {}, settings.axes)
     _fill(grid, settings, listed, maker.point, everything=everything)
     return grid
+
+
+def _listed(methods: str) -> tuple[Sequence[Listed], bool]:
+    """Return the methods of a list, and whether those that cannot be are left out: all were asked for."""
+    everything = methods.strip() == "all"
+    return [(name, name, {}) for name in METHODS] if everything else listed_methods(methods), everything
 
 
 def _has_option(settings: Settings, method: str, name: str) -> bool:
@@ -153,8 +159,7 @@ def loops_of(settings: Settings, methods: str, n_seeds: int) -> Loops:
     ValueError
         If an axis is not known, or a loop cannot be.
     """
-    everything = methods.strip() == "all"
-    listed = [(name, name, {}) for name in METHODS] if everything else listed_methods(methods)
+    listed, everything = _listed(methods)
     options = loop_options()
     for name in settings.vary:
         if name not in options:
@@ -163,7 +168,7 @@ def loops_of(settings: Settings, methods: str, n_seeds: int) -> Loops:
     count = len(listed) * math.prod(map(len, settings.vary.values()))
     if count > _MOST_LOOPS:
         raise ValueError(f"--vary must give at most {_MOST_LOOPS} loops, not {count}")
-    grid = Loops({}, {}, {name: [text or "none" for text in values] for name, values in settings.vary.items()})
+    grid = Loops({}, {}, settings.axes)
     _fill(grid, settings, listed, partial(_loop, n_seeds), everything=everything, alone=True)
     return grid
 
@@ -180,7 +185,7 @@ def _loop(n_seeds: int, name: str, method: str, given: Mapping[str, str], texts:
 def _fill(
     grid: Grid[Item],
     settings: Settings,
-    listed: Sequence[tuple[str, str | None, Mapping[str, str]]],
+    listed: Sequence[Listed],
     make: Callable[[str, str, Mapping[str, str], Mapping[str, Text]], Item],
     *,
     everything: bool,

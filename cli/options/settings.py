@@ -43,6 +43,11 @@ class Settings:
         return self.fixed | {name: values[0] for name, values in self.vary.items()}
 
     @property
+    def axes(self) -> dict[str, list[str]]:
+        """The axes with their values as they are shown."""
+        return {name: [text or "none" for text in values] for name, values in self.vary.items()}
+
+    @property
     def tables(self) -> list[Path]:
         """The files that the motions read."""
         motions = self.vary.get("motion") or [self.fixed.get("motion")]

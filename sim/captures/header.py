@@ -55,11 +55,6 @@ class Header:
     period: int | None = None  # for files of sigrok, whose times are sample numbers times so many of a unit
 
     @property
-    def unit_name(self) -> str:
-        """Of the times, for messages."""
-        return "seconds" if self.unit.name == "s" else self.unit.name
-
-    @property
     def origin(self) -> int | None:
         """Nanoseconds from 1970 to the first row, if its time has a date."""
         in_first = self.time is not None and self.time < len(self.table.first)
