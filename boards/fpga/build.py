@@ -52,19 +52,9 @@ def prepared(core: "wiring.Component", board: Board) -> Any:
 
 
 def build(core: "wiring.Component", board: Board, say: Callable[[str], None]) -> Built:
-    """Build a component for a board.
+    """Build a component for a board; `say` is told what is being done.
 
-    Parameters
-    ----------
-    say : callable of str
-        Is told what is being done.
-
-    Raises
-    ------
-    ToolError
-        If a tool is missing or fails.
-    TimingError
-        If no seed of place and route meets the timing.
+    It raises ToolError if a tool is missing or fails, and TimingError if no seed of place and route meets the timing.
     """
     check_tools(board)
     say("elaborating")

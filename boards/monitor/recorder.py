@@ -13,22 +13,11 @@ TIME = "time [s]"
 
 
 class Recorder:
-    """Writes a row for each frame: its time, and the columns; a context manager.
+    """Writes a row for each frame into a .csv or .parquet: its time, and the columns; a context manager.
 
     Rows are lines of CSV as they come, so that those on the disk can be read whatever happens; at the end they become
-    Parquet where that is wanted.
-
-    Parameters
-    ----------
-    path : Path
-        Where it is written.
-    suffix : str
-        .csv or .parquet.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written, or pyarrow is not installed and must be.
+    Parquet where that is wanted. It raises OSError if the file cannot be written, or pyarrow is not installed and must
+    be.
     """
 
     def __init__(self, path: Path, suffix: str, columns: Sequence[Column]) -> None:

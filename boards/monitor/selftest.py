@@ -83,7 +83,7 @@ def selftest(
     told: Callable[[Result], None] | None = None,
     chosen: Sequence[Step] | None = None,
 ) -> list[Result]:
-    """Run all steps, and hold what the board says against the golden models.
+    """Run all steps, and hold what the board says against the golden models; NoAnswer if the board falls silent.
 
     Parameters
     ----------
@@ -95,11 +95,6 @@ def selftest(
         Is called after each step.
     chosen : sequence of Step or None
         None: those of `steps`.
-
-    Raises
-    ------
-    NoAnswer
-        If the board falls silent.
     """
     timing = registers.spec.timing
     period = period or max(1, math.ceil(timing.clock_hz / timing.tick_cycles / 500))

@@ -13,13 +13,7 @@ _BUSY = frozenset((errno.EAGAIN, errno.EBUSY))
 
 
 class Unplugged(OSError):
-    """Tells that the port is not there, for now.
-
-    Parameters
-    ----------
-    name : str
-        Of the port.
-    """
+    """Tells that the port of this name is not there, for now."""
 
     def __init__(self, name: str, why: str) -> None:
         super().__init__(f"{name}: {why}")
@@ -27,21 +21,10 @@ class Unplugged(OSError):
 
 
 class SerialPort:
-    """Opens a serial port that nobody else uses; it is a context manager.
+    """Opens a serial port, such as `/dev/ttyUSB1` or `COM5`, that nobody else uses; it is a context manager.
 
-    Parameters
-    ----------
-    name : str
-        Such as `/dev/ttyUSB1` or `COM5`.
-    baud : int
-        Bits a second.
-
-    Raises
-    ------
-    Unplugged
-        If there is no such port; `read` and `write`: no more.
-    OSError
-        If it cannot be used, or pyserial is not installed.
+    It raises Unplugged if there is no such port, as `read` and `write` do if it is no more, and OSError if it cannot be
+    used, or pyserial is not installed.
     """
 
     def __init__(self, name: str, baud: int) -> None:

@@ -40,14 +40,8 @@ class Frame:
 def connected(name: str, port: Port, manifest: Mapping[str, Any], timeout: float = 0.5) -> DemoBoard:
     """Return the demo at a port.
 
-    Raises
-    ------
-    WrongBoard
-        If another board, or another configuration, answers.
-    ForeignDevice
-        If something comes that no tachometer sends.
-    NoAnswer
-        If nothing answers.
+    It raises WrongBoard if another board, or another configuration, answers, ForeignDevice if something comes that no
+    tachometer sends, and NoAnswer if nothing answers.
     """
     try:
         return DemoBoard(port, manifest, timeout)
@@ -117,14 +111,8 @@ class Session:
     def poll(self) -> Sequence[Frame]:
         """Return telemetry that has come since the last call; connects, and waits for a short time if nothing is there.
 
-        Raises
-        ------
-        WrongBoard
-            If another board, or another configuration, is at the port.
-        ForeignDevice
-            If something else is, or the baud rate is wrong.
-        OSError
-            If the port cannot be used.
+        It raises what `connected` does, but waits for a board that does not answer, and OSError if the port cannot be
+        used.
         """
         if self._board is None and not self._connect():
             time.sleep(_PAUSE)

@@ -30,22 +30,9 @@ class Simulation(Protocol):
 class SimulatedBoard:
     """Runs a simulation in a thread, in real time, or slower where the processor is; use as a context manager.
 
-    Bytes that nobody reads are lost, as on a real line, once the pseudo-terminal holds no more.
-
-    Parameters
-    ----------
-    simulation : Simulation
-        Only this object may use it until it is closed.
-
-    Members
-    -------
-    path : str
-        The serial port.
-
-    Raises
-    ------
-    OSError
-        If the system has no pseudo-terminals, or no more of them.
+    Bytes that nobody reads are lost, as on a real line, once the pseudo-terminal holds no more. The serial port is
+    `path`. Only this object may use the simulation until it is closed. It raises OSError if the system has no
+    pseudo-terminals, or no more of them.
     """
 
     def __init__(self, simulation: Simulation, clock_hz: int) -> None:

@@ -57,13 +57,7 @@ the manifest names both.
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """Holds what `generate` is asked for.
-
-    Raises
-    ------
-    ValueError
-        If there cannot be such a module or bus, or a motion has no testbench.
-    """
+    """Holds what `generate` is asked for; ValueError if there is no such module or bus, or no bench of a motion."""
 
     spec: AnySpec
     # name, bus, baud, target and irq: see `hdl.export.export`

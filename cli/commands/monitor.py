@@ -182,15 +182,7 @@ def _kept(outputs: Outputs, recorder: Recorder, record: Path, error: Exception) 
 
 
 def _selftest(target: Target) -> int:
-    """Run the self-test, and print what its steps have shown; 1 if one has failed.
-
-    Raises
-    ------
-    OSError
-        If the port cannot be used, or nothing answers.
-    ValueError
-        If something else than the board answers.
-    """
+    """Run the self-test, and print what its steps have shown; 1 if one has failed."""
     report = SelftestReport([step.name for step in steps(target.registers)])
     with target.presence() as name, target.open(name) as port:
         board = connected(target.label(name), port, target.manifest)

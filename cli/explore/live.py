@@ -31,19 +31,9 @@ _ROOM = 1.25  # of the speed that a core is for, so that it is seen what it does
 
 
 class Live:
-    """Answers what the page asks of boards, by its `functions`.
+    """Answers what the page asks of boards, by its `functions`: of one at a port, or of simulated ones.
 
-    Parameters
-    ----------
-    port : str or None
-        Of a board that is attached; None: there are only simulated ones.
-    manifest : path or None
-        Of that board.
-
-    Raises
-    ------
-    ValueError
-        If it is not the manifest of a board at a port.
+    It raises ValueError if `manifest` is not that of a board at a port.
     """
 
     def __init__(self, port: str | None, manifest: Path | None) -> None:

@@ -123,7 +123,7 @@ class Boards(Protocol):
 
 
 def serve(port: int, load: Callable[[], tuple[Answer, Boards]], told: Callable[[str], None]) -> None:
-    """Serve the page until Ctrl-C.
+    """Serve the page until Ctrl-C; OSError if the port is taken.
 
     Parameters
     ----------
@@ -133,11 +133,6 @@ def serve(port: int, load: Callable[[], tuple[Answer, Boards]], told: Callable[[
         Gives what answers, and what is given back; who opens the page meanwhile waits.
     told : callable of str
         Is given the address, when it can be opened.
-
-    Raises
-    ------
-    OSError
-        If the port is taken.
     """
     token = secrets.token_urlsafe(24)
     try:

@@ -20,6 +20,8 @@ class Methods:
 def named_methods(text: str, make: Make, others: Collection[str] = ()) -> Methods:
     """Return the methods of a list with commas, `all` being every method and all `others`.
 
+    It raises ValueError if a name is not known, or a method that is named cannot be with its options.
+
     Parameters
     ----------
     text : str
@@ -28,11 +30,6 @@ def named_methods(text: str, make: Make, others: Collection[str] = ()) -> Method
         See `core.COMMON_CORE_OPTIONS`.
     others : collection of str
         Names that are no methods of cores; what is behind a colon of such a name is not read here.
-
-    Raises
-    ------
-    ValueError
-        If a name is not known, or a method that is named cannot be with its options.
     """
     if text.strip() == "all":
         specs: dict[str, TachometerSpec | None] = {}

@@ -107,13 +107,7 @@ class Option(click.Option):
 
 
 class Later(click.Option):
-    """Stands for options that are known when the command runs.
-
-    Parameters
-    ----------
-    make : callable
-        Gives the options.
-    """
+    """Stands for options that are known when the command runs; `make` gives them."""
 
     def __init__(self, *args: Any, make: Callable[[], Sequence[click.Option]], **attributes: Any) -> None:
         super().__init__(*args, **attributes)
@@ -240,13 +234,7 @@ def option(group: str, name: str, *others: str, **attributes: Any) -> Callable[[
 
 
 def plain_options(group: str, helps: Mapping[str, str]) -> list[Callable[[Any], Any]]:
-    """Return decorators, each of which adds an option: a text, or a flag where nothing stands for a value.
-
-    Parameters
-    ----------
-    helps : mapping of str to str
-        By the name, as of `option`.
-    """
+    """Return decorators of options by their names, as of `option`: texts, or flags where nothing stands for a value."""
     return [option(group, name, is_flag=" " not in name, help=help) for name, help in helps.items()]
 
 
@@ -306,15 +294,7 @@ def refuse_without(needed: str, options: Sequence[Callable[[Any], Any]]) -> None
 
 
 class Group:
-    """Adds options to a command that it decorates, and reads them.
-
-    Parameters
-    ----------
-    options : sequence of callable
-        Decorators, each of which adds an option, or those of `later`.
-    read : callable
-        Makes the arguments of the command of all that click gives it, among these options.
-    """
+    """Adds options to a command that it decorates; `read` makes the command's arguments of all that click gives it."""
 
     def __init__(self, options: Sequence[Callable[[Any], Any]], read: Callable[..., dict[str, Any]]) -> None:
         self.options, self._read = options, read

@@ -56,13 +56,7 @@ def refuse_plot(spec: CoreSpec, targets: Mapping[str, Path]) -> None:
 
 
 def write_outputs(simulation: Simulation, place: Callable[[str], Path | None]) -> None:
-    """Write what is wanted of a simulation, but the waveform, which it has written.
-
-    Parameters
-    ----------
-    place : callable
-        Tells where the file of an option goes; None: it is not wanted.
-    """
+    """Write what is wanted of a simulation, into the places of its options; the waveform is there already."""
     spec, run = simulation.spec, simulation.lockstep.actual
     if path := place("--trace"):
         write_trace(path, spec, run)

@@ -31,22 +31,10 @@ _UNITS = SPEED | TIME | FREQUENCY
 
 
 def points_of(settings: Settings, methods: str, earliest: float, engine: str | None) -> Points:
-    """Return all points of a sweep.
+    """Return all points of a sweep; ValueError if an axis is not known, or a point cannot be.
 
-    An option that not all methods have is for those that have it; `tick` is not for a method that has its `dt`.
-
-    Parameters
-    ----------
-    settings : Settings
-        Options of cores and encoder, and axes.
-    methods : str
-        See `listed_methods`, or `all`: then those that cannot be are left out.
-    earliest : float, seconds
-
-    Raises
-    ------
-    ValueError
-        If an axis is not known, or a point cannot be.
+    An option that not all methods have is for those that have it; `tick` is not for a method that has its `dt`. If
+    `methods` is `all`, those that cannot be are left out. `earliest` is in seconds.
     """
     listed, everything = _listed(methods)
     _check_axes(settings, {method for _, method, _ in listed if method is not None})
@@ -145,20 +133,7 @@ def _parsed_encoder(words: Words) -> tuple[Callable[[TachometerSpec], VirtualEnc
 
 
 def loops_of(settings: Settings, methods: str, n_seeds: int) -> Loops:
-    """Return all loops.
-
-    Parameters
-    ----------
-    settings : Settings
-        Options of core and loop, and axes.
-    methods : str
-        See `listed_methods`, or `all`: then those that cannot be are left out.
-
-    Raises
-    ------
-    ValueError
-        If an axis is not known, or a loop cannot be.
-    """
+    """Return all loops, as `points_of` does; ValueError if an axis is not known, or a loop cannot be."""
     listed, everything = _listed(methods)
     options = loop_options()
     for name in settings.vary:

@@ -74,12 +74,7 @@ def of_command_line(raw: Mapping[str, Any], options: Mapping[str, click.Option])
 def of_file(path: Path, options: Mapping[str, click.Option]) -> Settings:
     """Return settings of a TOML file: keys are names of options, and axes stand in its table `vary`.
 
-    Raises
-    ------
-    ValueError
-        If it is not of this form, with its name.
-    OSError
-        If it cannot be read.
+    It raises ValueError, with the name of the file, if it is not of this form, and OSError if it cannot be read.
     """
     try:
         content = tomllib.loads(read_text(path, _MOST_TOML))

@@ -48,12 +48,7 @@ def point_options() -> dict[str, click.Option]:
 class VaryingCommand(GroupedCommand):
     """A command whose options may also stand in a file, and may vary; one that varies is read with its first value.
 
-    The settings are the object of its context.
-
-    Parameters
-    ----------
-    points : callable
-        Gives the options that may vary, by their names.
+    The settings are the object of its context. `points` gives the options that may vary, by their names.
     """
 
     def __init__(self, *args: Any, points: Callable[[], dict[str, click.Option]], **attributes: Any) -> None:

@@ -24,15 +24,7 @@ def shown_time(seconds: float) -> str:
 
 
 def print_comparison(comparison: Comparison, sizes: Mapping[str, Measurement], left_out: Mapping[str, str]) -> None:
-    """Print the table, and below it what each method is.
-
-    Parameters
-    ----------
-    sizes : mapping of str to Measurement
-        Of cores, by name; empty if they were not measured.
-    left_out : mapping of str to str
-        Methods that are not compared, and why.
-    """
+    """Print the table, with sizes if they were measured, below it what each method is, and why others are left out."""
     scores, unit = comparison.scores, comparison.spec.scale.shown_unit
     if source := comparison.recording.source:
         print_rows(source_rows(source))

@@ -207,13 +207,7 @@ def received_rows(state: State) -> list[tuple[str, str]]:
 
 
 class SelftestReport:
-    """Prints a line for each step of a self-test as it comes, and the verdict.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Of all steps.
-    """
+    """Prints a line for each of these steps of a self-test as it comes, and the verdict."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self._width = max(map(len, names))

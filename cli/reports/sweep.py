@@ -26,12 +26,7 @@ COLUMNS = (
 def print_sweep(result: SweepResult, results: Path | None) -> int:
     """Print a row per method, of all its points, and what was run; values in which the hardware was wrong.
 
-    Parameters
-    ----------
-    result : SweepResult
-        With these `COLUMNS`.
-    results : Path or None
-        The file that has all rows.
+    The result must have these `COLUMNS`.
     """
     grid, columns, n_run, seconds = result.grid, result.columns, result.n_run, result.seconds
     checked = [wrong for wrong in columns["mismatches"] if wrong is not None]

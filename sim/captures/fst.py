@@ -29,13 +29,8 @@ def read_fst(
 ) -> Recording:
     """Read two to four lines of an FST file: variables of one bit, or bits of vectors, as of `read_vcd`.
 
-    Bit 0 of a vector is its last one, as pywellen does not tell how it was declared.
-
-    Raises
-    ------
-    CaptureError
-        If pywellen is not installed; if the file is missing, or damaged; for an unknown variable; if a line never is 0
-        or 1.
+    Bit 0 of a vector is its last one, as pywellen does not tell how it was declared. It raises CaptureError if pywellen
+    is not installed; if the file is missing, or damaged; for an unknown variable; if a line never is 0 or 1.
     """
     path = Path(path)
     if samplerate_hz is not None:

@@ -95,21 +95,9 @@ class Header:
 
 
 def read_header(path: Path, lines: Sequence[str], options: TextOptions, samplerate_hz: float | None) -> Header:
-    """Read what stands above the rows of a text.
+    """Read what stands above the rows of a text, of its first lines; `samplerate_hz` is for a file that has no times.
 
-    Parameters
-    ----------
-    path : Path
-        File that messages name.
-    lines : sequence of str
-        The first of it.
-    samplerate_hz : float or None
-        For a file that has no times.
-
-    Raises
-    ------
-    CaptureError
-        If columns have no names, nor numbers that are given, or if rows cannot be dated.
+    It raises CaptureError if columns have no names, nor numbers that are given, or if rows cannot be dated.
     """
     table = sniff(lines, options.time)
     first = next((line.strip() for line in lines if not is_comment(line)), "")
@@ -210,14 +198,8 @@ def check_seconds(
 ) -> None:
     """Check that times, of which nothing says the unit, make sense as seconds.
 
-    Parameters
-    ----------
-    distances : float64 array, seconds
-        Between edges, or whatever they date.
-    what : str
-        What they date.
-    whole : bool
-        Whether all times are whole numbers.
+    `distances`, a float64 array in seconds, are between edges, or whatever they date, `what`. `whole` tells whether all
+    times are whole numbers.
     """
     if not header.assumed or options.slowest_s is None or not distances.size:
         return

@@ -18,14 +18,8 @@ def fitted(recording: Recording, encoder: Encoder) -> Recording:
     """Return the recording of a sensor as its lines are: one of a line alone has none on B.
 
     Loggers of engines write a pulse as two rows with one time, 1 and 0. Where a rise is a count, such a pulse lasts for
-    half the time to the next row.
-
-    Raises
-    ------
-    OptionError
-        If pulses have no width, and each of their edges is a count.
-    CaptureError
-        If two pulses of a line come at one time.
+    half the time to the next row. It raises OptionError if pulses have no width, and each of their edges is a count,
+    and CaptureError if two pulses of a line come at one time.
     """
     if encoder.sensor in ("quadrature", "hall"):
         return recording

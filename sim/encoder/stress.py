@@ -20,10 +20,7 @@ _SPEEDS = (0.3, 1.01, 1.5, 2.2, 3.25, 0.1)  # counts per tick
 def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     """Return speeds about the unit velocity and its multiples, reversals, illegal transitions, creeping, standstill.
 
-    Parameters
-    ----------
-    n_edges : int
-        At each of six speeds.
+    There are `n_edges` at each of six speeds.
     """
     rng = np.random.default_rng(seed)
     cycles, longest = spec.timing.tick_cycles, spec.timing.tick_cycles * spec.timing.max_ticks

@@ -178,13 +178,7 @@ class VirtualEncoder(EncoderOptions):
         return Disc(2 * math.pi / n_edges, offset)
 
     def record(self, motion: Motion) -> "Encoding":
-        """Let the shaft move.
-
-        Raises
-        ------
-        ValueError
-            If that could be more than `MAX_EDGES` edges, those from angle 0 to the start included.
-        """
+        """Let the shaft move; ValueError if that could be more than `MAX_EDGES` edges, with those before the start."""
         shaft = _VibratingShaft(motion, self.vibration, self.start_angle_rad)
         n_edges = shaft.reach / self.disc.pitch_rad * (1 + 2 * self.bounce.count if self.bounce else 1)
         if not n_edges <= MAX_EDGES:

@@ -63,18 +63,7 @@ class _Transfer(ctypes.Structure):
 
 
 class BoardSimulation:
-    """Runs the demo on a UART, from its reset on.
-
-    Parameters
-    ----------
-    bus : Bus
-        The UART.
-
-    Raises
-    ------
-    OSError
-        If it cannot be compiled.
-    """
+    """Runs the demo on a UART, `bus`, from its reset on; OSError if it cannot be compiled."""
 
     def __init__(self, registers: DemoMap, bus: Bus) -> None:
         uart_rx = next(port for port in bus.ports(registers) if port.name == "uart_rx")

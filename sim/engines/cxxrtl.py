@@ -139,10 +139,8 @@ def plain(wire: str) -> str:
 class Cxxrtl(CompiledEngine):
     """Is the fastest engine; it needs a C++ compiler.
 
-    Parameters
-    ----------
-    every_clock : bool
-        Whether clocks are simulated in which only idle counters count, see `hdl.arithmetic.idle`. It only takes longer.
+    With `every_clock` it simulates clocks in which only idle counters count, too, see `hdl.arithmetic.idle`. It only
+    takes longer.
     """
 
     def __init__(self, every_clock: bool = False) -> None:

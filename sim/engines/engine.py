@@ -10,13 +10,7 @@ from tachometry.spec import CoreSpec, Port
 
 
 class Interrupted(KeyboardInterrupt):
-    """Tells of Ctrl-C in a simulation.
-
-    Parameters
-    ----------
-    run : Run
-        What was simulated before; its `n_clocks` are those that were done.
-    """
+    """Tells of Ctrl-C in a simulation; `run` is what was simulated before, its `n_clocks` those that were done."""
 
     def __init__(self, run: Run) -> None:
         super().__init__()

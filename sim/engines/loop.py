@@ -34,13 +34,7 @@ class Observer(IntEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Motor:
-    """Describes a motor with its driver and load.
-
-    Raises
-    ------
-    ParameterError
-        If one is out of range.
-    """
+    """Describes a motor with its driver and load; ParameterError if a parameter is out of range."""
 
     inertia: float = 0.003  # kg m²
     torque_constant: float = 0.0603  # Nm/A
@@ -55,13 +49,7 @@ class Motor:
 
 @dataclass(frozen=True, kw_only=True)
 class Gains:
-    """Describes a controller of velocity and position with a disturbance observer.
-
-    Raises
-    ------
-    ParameterError
-        If one is out of range.
-    """
+    """Describes a controller of velocity and position with an observer; ParameterError if a gain is out of range."""
 
     # position and velocity: 1/s², 1/s: k_p and k_v
     position: float
@@ -176,17 +164,10 @@ _LOOP = struct(
 
 
 class LoopSimulation:
-    """Runs the core of a spec in loops; it is compiled once. Runs may go on in several threads at once.
+    """Runs the core of a spec, or a design with it, in loops; it is compiled once. Runs may go on in several threads at
+    once.
 
-    Parameters
-    ----------
-    design : LoopDesign or None
-        What is compiled; None: the core of the spec alone.
-
-    Raises
-    ------
-    NoCompiler
-        If there is no C++ compiler.
+    It raises NoCompiler if there is no C++ compiler.
     """
 
     def __init__(self, spec: TachometerSpec, design: LoopDesign | None = None) -> None:

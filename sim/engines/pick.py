@@ -10,12 +10,8 @@ NAMES = (*ENGINES, "cxxrtl-every-clock")
 def pick(name: str = "auto") -> Engine:
     """Return the engine of a name; `auto` is cxxrtl where there is a C++ compiler, and pysim where there is none.
 
-    Raises
-    ------
-    ValueError
-        If there is no engine of that name.
-    OSError
-        If it lacks what it needs here, with a line that says what to install.
+    It raises ValueError if there is no engine of that name, and OSError if it lacks what it needs here, with a line
+    that says what to install.
     """
     if name == "auto":
         name = "pysim" if find_compiler() is None else "cxxrtl"

@@ -130,10 +130,7 @@ class GoldenEmulator:
     def trace(self, changes: Sequence[Change], n_clocks: int) -> PinTrace:
         """Return the lines as a core would see them whose clock 0 is that of the restart; once for each emulator.
 
-        Parameters
-        ----------
-        changes : sequence of Change
-            In the order of their clocks.
+        The changes are in the order of their clocks.
         """
         held = [EmulatorSettings(), *(change.settings for change in changes)]
         ends = [*(min(change.clock + 1, n_clocks) for change in changes), n_clocks]

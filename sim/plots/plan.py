@@ -14,15 +14,7 @@ _HEIGHTS = {"resolution": 3.4, "time": 2.4}  # inches
 
 
 def save_plan_plot(path: Path, spec: TachometerSpec, plan: Plan, unit: str) -> None:
-    """Draw a plan into a file whose kind its suffix tells: `.png` or `.pdf`.
-
-    Parameters
-    ----------
-    plan : Plan
-        At speeds that increase.
-    unit : str
-        Of the speeds in the figure: `rad/s`, `rev/s` or `rpm`.
-    """
+    """Draw a plan, whose speeds increase, into a `.png` or `.pdf`; `unit` is that of the speeds in the figure."""
     save_figure(path, lambda: _draw(spec, plan, unit))
 
 

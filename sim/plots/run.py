@@ -37,12 +37,8 @@ def save_plot(path: Path, spec: TachometerSpec, run: Run, true_speed: TrueSpeed 
     """Draw a run into a file whose kind its suffix tells: `.png` or `.pdf`.
 
     Equal runs give equal files. What has more points than the figure has columns is reduced to the first, least,
-    greatest and last of each column, which draws the same line.
-
-    Parameters
-    ----------
-    true_speed : callable or None
-        True speed in rad/s at times in seconds; without it there is no error panel.
+    greatest and last of each column, which draws the same line. Without `true_speed`, in rad/s at times in seconds,
+    there is no error panel.
     """
     save_figure(path, lambda: _draw(spec, run, true_speed))
 

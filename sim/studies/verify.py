@@ -92,14 +92,8 @@ def verification(
 ) -> Verification:
     """Verify all configurations of methods, in so many processes; method s is also that of many axes.
 
-    Parameters
-    ----------
-    n_clocks : int
-        That each engine is to run, spread over the configurations.
-    jobs : int or None
-        None: one for each core of the computer.
-    save : callable
-        Is given a configuration and an engine that has failed, as soon as it has.
+    Each engine is to run `n_clocks`, spread over the configurations. `save` is given a configuration and an engine that
+    has failed, as soon as it has. Without `jobs` there is a process for each core of the computer.
     """
     for engine in engines:
         pick(engine)  # what is missing is reported at once
@@ -220,17 +214,8 @@ def motions(spec: CoreSpec, seed: int, n_clocks: int) -> Iterator[tuple[int, Tra
 def verify(spec: CoreSpec, engines: Sequence[str], n_clocks: int, seed: int) -> dict[str, Outcome]:
     """Run motions on every engine, and compare every bit of every tick and update with the golden model.
 
-    Parameters
-    ----------
-    n_clocks : int
-        Clocks that each engine is to run at least; pysim a thousandth of them, but no fewer than 10,000.
-    seed : int
-        Of the first motion.
-
-    Returns
-    -------
-    dict of str to Outcome
-        By the engine.
+    Each engine runs `n_clocks` at least, but pysim a thousandth of them, and no fewer than 10,000; `seed` is that of
+    the first motion. It returns outcomes by the engine.
     """
     outcomes = {engine: Outcome() for engine in engines}
     used = {engine: pick(engine) for engine in engines}

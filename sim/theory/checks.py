@@ -28,12 +28,7 @@ def at_least(what: str, value: ArrayLike, least: float) -> Floats:
 def in_a_regime(what: str, value: ArrayLike, low_end: float, high_end: float) -> Floats:
     """Return the value as an array; ValueError if one is not greater than 0, or lies between the regimes.
 
-    Parameters
-    ----------
-    what : of the message
-    value : an estimate in units of ω_lim
-    low_end : greatest value at low speeds
-    high_end : least value at high speeds
+    It is an estimate in units of ω_lim: at most `low_end` at low speeds, at least `high_end` at high ones.
     """
     array = positive(what, value)
     if np.any((array > low_end * (1 + _SLACK)) & (array < high_end * (1 - _SLACK))):

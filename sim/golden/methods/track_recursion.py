@@ -36,10 +36,7 @@ def factor(x: int, bits: int) -> tuple[int, int]:
 class Recursion:
     """Keeps the state, and changes it in every tick; all numbers are as `spec.formats.tracking` describes them.
 
-    Parameters
-    ----------
-    lead : int
-        Clocks by which the velocity that is shown is ahead of the end of the tick.
+    The velocity that is shown is `lead` clocks ahead of the end of the tick.
     """
 
     def __init__(self, form: Tracking, lead: int) -> None:

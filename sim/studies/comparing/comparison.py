@@ -162,13 +162,7 @@ def _time(seconds: float) -> str:
 
 @dataclass(frozen=True)
 class Setting:
-    """Holds a method with its options.
-
-    Parameters
-    ----------
-    spec : TachometerSpec or None
-        None: it is a baseline.
-    """
+    """Holds a method with its options; without a spec it is a baseline."""
 
     name: str
     spec: TachometerSpec | None

@@ -178,17 +178,10 @@ BASELINES: dict[str, Baseline] = {
 
 
 def baseline_model(name: str) -> tuple[str, Callable[[Steps], Estimate]]:
-    """Return what a baseline with options is in words, and its model.
+    """Return what a baseline with options is in words, and its model, of a name as `kalman:order=3:process-noise=1e5`.
 
-    Parameters
-    ----------
-    name : str
-        Such as `kalman:order=3:process-noise=1e5`.
-
-    Raises
-    ------
-    ValueError
-        If there is no such baseline or option, or a text cannot be read. What is out of range is refused by the model.
+    It raises ValueError if there is no such baseline or option, or a text cannot be read. What is out of range is
+    refused by the model.
     """
     method, *words = name.split(":")
     if method not in BASELINES:

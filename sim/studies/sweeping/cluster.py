@@ -126,14 +126,9 @@ def _deaf_to_interrupts() -> Iterator[None]:
 def rows(client: Client, points: Mapping[str, Point | LoopPoint], study: str = "sweeping.sweep") -> Iterator[Row]:
     """Yield rows of points, by their digests, as they come; Dask schedules them, and again where a worker was lost.
 
-    They are run by the function `run_packed` of a module of sim.studies, `study`.
-
-    Raises
-    ------
-    ValueError
-        At the end, if a point cannot be run.
-    OSError
-        At the end, if a worker lacks what it needs; at once, if one has another version, or the scheduler goes.
+    They are run by the function `run_packed` of a module of sim.studies, `study`. At the end it raises ValueError if a
+    point cannot be run, and OSError if a worker lacks what it needs; OSError at once, if one has another version, or
+    the scheduler goes.
     """
     from distributed import KilledWorker, as_completed
 

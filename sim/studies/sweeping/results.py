@@ -54,12 +54,8 @@ class Results:
     def __enter__(self) -> Self:
         """Take the file, for this sweep alone, and read it, and what a sweep that was killed has left beside it.
 
-        Raises
-        ------
-        ValueError
-            If another sweep has it, or it is none of a sweep by the same code.
-        OSError
-            If it cannot be read or written.
+        It raises ValueError if another sweep has it, or it is none of a sweep by the same code, and OSError if it
+        cannot be read or written.
         """
         if self._path is None:
             return self

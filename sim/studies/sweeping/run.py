@@ -43,12 +43,8 @@ def run_sweep(
 ) -> SweepResult:
     """Run the points that are not in the file of results yet, which then has all.
 
-    Raises
-    ------
-    KeyboardInterrupt
-        At Ctrl-C, with how far it has come.
-    OSError
-        If the extra `sweep` is not there, or a file or the scheduler cannot be used.
+    At Ctrl-C KeyboardInterrupt says how far it has come. It raises OSError if the extra `sweep` is not there, or a file
+    or the scheduler cannot be used.
     """
     cluster.require()
     from tachometry.sim.studies.sweeping.results import Results
@@ -70,15 +66,7 @@ def run_sweep(
 
 
 def run_loops(grid: Loops, scheduler: str | None, jobs: int | None, bar: Bar) -> LoopResult:
-    """Run all loops; one that is alone runs in threads of this process.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        At Ctrl-C, with how far it has come.
-    OSError
-        If the extra `sweep` is needed and not there, or the scheduler cannot be used.
-    """
+    """Run all loops, as `run_sweep` runs points; one that is alone runs in threads of this process."""
     begun = time.monotonic()
     if len(grid.points) == 1 and scheduler is None:
         ((digest, point),) = grid.points.items()

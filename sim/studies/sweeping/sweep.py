@@ -127,13 +127,7 @@ def _content(about: Option) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class Point:
-    """Describes a core on a motion.
-
-    Raises
-    ------
-    ValueError
-        If the motion is shorter than a tick, or no two ticks of it are compared.
-    """
+    """Describes a core on a motion; ValueError if it is shorter than a tick, or no two ticks of it are compared."""
 
     method: str  # what the method is called
     spec: TachometerSpec
@@ -215,12 +209,7 @@ def _sources(place: Path) -> list[Path]:
 def run_packed(code: str, packed: bytes) -> Row:
     """Return `run_point` of a pickled point, on any machine with the same code.
 
-    Raises
-    ------
-    OtherCode
-        If the code here is not that which is meant.
-    ValueError
-        As `run_point`, with the point.
+    It raises OtherCode if the code here is not that which is meant, and ValueError as `run_point`, with the point.
     """
     if code not in (code_digest(), code_digest(hardware=True)):
         raise OtherCode(f"{platform.node()} has another one")
@@ -234,12 +223,7 @@ def run_packed(code: str, packed: bytes) -> Row:
 def run_point(point: Point) -> Row:
     """Run a point: its row, with all of `COLUMNS` and one for each of its values.
 
-    Raises
-    ------
-    ValueError
-        If the motion has too many edges.
-    OSError
-        If the engine lacks what it needs here.
+    It raises ValueError if the motion has too many edges, and OSError if the engine lacks what it needs here.
     """
     spec, encoding = point.spec, point.encoder.record(point.motion)
     duration = encoding.recording.duration
