@@ -40,20 +40,11 @@ class IdleRegister(Idle):
 
 @dataclass(frozen=True)
 class IdleCounter(IdleRegister):
-    """A counter.
+    """A counter."""
 
-    Parameters
-    ----------
-    step : int
-        What it counts by, −1 or 1.
-    stops : tuple of int
-        Values at which something else may follow from it.
-    order : tuple of int
-        Instead of these two: its values, each after the one before, if it does not count. The last is the stop.
-    """
-
-    step: int = 0
-    stops: tuple[int, ...] = ()
+    step: int = 0  # what it counts by, −1 or 1
+    stops: tuple[int, ...] = ()  # values at which something else may follow from it
+    # instead of these two: its values, each after the one before, if it does not count. The last is the stop.
     order: tuple[int, ...] = ()
 
 
@@ -72,14 +63,9 @@ class IdleEcho(IdleRegister):
 
 @dataclass(frozen=True)
 class IdleProduct(Idle):
-    """A product of `hdl.control.product.SerialProduct`, on whose steps nothing depends until the last two.
+    """A product of `hdl.control.product.SerialProduct`, on whose steps nothing depends until the last two."""
 
-    Parameters
-    ----------
-    total, factor, left, word : str
-        `word` stands still as long as the product goes on.
-    """
-
+    # total, factor, left and word: `word` stands still as long as the product goes on
     total: str
     factor: str
     left: str
@@ -93,20 +79,13 @@ class IdleProduct(Idle):
 
 @dataclass(frozen=True)
 class IdleDivision(Idle):
-    """A division of `spec.formats.reciprocal.DividedReciprocal`, on whose steps nothing depends until it is done.
+    """A division of `spec.formats.reciprocal.DividedReciprocal`, on whose steps nothing depends until it is done."""
 
-    Parameters
-    ----------
-    digits, less_one, m : str
-        m stands still as long as the division goes on.
-    steps : int
-        At most 62.
-    """
-
+    # digits, less_one and m: m stands still as long as the division goes on
     digits: str
     less_one: str
     m: str
-    steps: int
+    steps: int  # at most 62
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -116,21 +95,11 @@ class IdleDivision(Idle):
 
 @dataclass(frozen=True)
 class IdleRounds(Idle):
-    """A core that goes round its slots; rounds are alike as long as no pin, strobe or word of a memory changes.
+    """A core that goes round its slots; rounds are alike as long as no pin, strobe or word of a memory changes."""
 
-    Parameters
-    ----------
-    slot : str
-        Register that is 0 at the beginning of a round.
-    clocks : int
-        Of a round.
-    moving : tuple of Idle
-        What moves from round to round, as the others do from clock to clock.
-    """
-
-    slot: str
-    clocks: int
-    moving: tuple[Idle, ...]
+    slot: str  # register that is 0 at the beginning of a round
+    clocks: int  # of a round
+    moving: tuple[Idle, ...]  # what moves from round to round, as the others do from clock to clock
 
     @property
     def paths(self) -> tuple[str, ...]:

@@ -17,27 +17,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class CarriedReciprocal:
-    """Finds widths and contents for Q = ⌊2^(frac_bits−halvings)/m⌋ and its remainder R.
+    """Finds widths and contents for Q = ⌊2^(frac_bits−halvings)/m⌋ and its remainder R."""
 
-    Parameters
-    ----------
-    max_m : int
-        Largest divisor.
-    max_numerator : int
-        E, the largest |N|.
-    frac_bits : int
-        f, fraction bits of the result.
-    halvings : int
-        s: the result is b + N/(2^s·m).
-    entry : int
-        Where m goes on when it does not start over at 1.
-    """
-
-    max_m: int
-    max_numerator: int
-    frac_bits: int
-    halvings: int
-    entry: int
+    max_m: int  # largest divisor
+    max_numerator: int  # e, the largest |N|
+    frac_bits: int  # f, fraction bits of the result
+    halvings: int  # s: the result is b + N/(2^s·m)
+    entry: int  # where m goes on when it does not start over at 1
 
     @property
     def scale(self) -> int:

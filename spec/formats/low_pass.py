@@ -24,21 +24,11 @@ MAX_EXTRA_BITS = 26
 
 @dataclass(frozen=True)
 class LowPass:
-    """Finds widths and tables of the filter.
+    """Finds widths and tables of the filter."""
 
-    Parameters
-    ----------
-    exponent : Fraction
-        G·T: what one tick adds to the exponent.
-    max_interval : int
-        Most ticks that an update can stand for; a greater number is treated as this one.
-    native_width : int
-        Bits of u, signed.
-    """
-
-    exponent: Fraction
-    max_interval: int
-    native_width: int
+    exponent: Fraction  # G·T: what one tick adds to the exponent
+    max_interval: int  # most ticks that an update can stand for; a greater number is treated as this one
+    native_width: int  # bits of u, signed
 
     @property
     def extra_bits(self) -> int:

@@ -35,27 +35,13 @@ _LONG_SUM = 40
 
 @dataclass(frozen=True)
 class Reciprocal:
-    """Finds widths and contents of q(m), here 2^(frac_bits+guard_bits)/m rounded to the nearest, so that |δ| ≤ ½.
+    """Finds widths and contents of q(m), here 2^(frac_bits+guard_bits)/m rounded to the nearest, so that |δ| ≤ ½."""
 
-    Parameters
-    ----------
-    max_m : int
-        Largest divisor.
-    max_numerator : int
-        E, the largest |N|.
-    frac_bits : int
-        f, fraction bits of the result.
-    halvings : int
-        s: the quotient is N/(2^s·m).
-    bounds : bool
-        Quotients are also rounded down and up.
-    """
-
-    max_m: int
-    max_numerator: int
-    frac_bits: int
-    halvings: int
-    bounds: bool = False
+    max_m: int  # largest divisor
+    max_numerator: int  # e, the largest |N|
+    frac_bits: int  # f, fraction bits of the result
+    halvings: int  # s: the quotient is N/(2^s·m)
+    bounds: bool = False  # quotients are also rounded down and up
 
     @property
     def off(self) -> int:

@@ -48,41 +48,21 @@ def fixed_log(value: float) -> int:
 
 @dataclass(frozen=True)
 class Tracking:
-    """Formats and constants of a tracking recursion.
+    """Formats and constants of a tracking recursion."""
 
-    Parameters
-    ----------
-    clock_hz, tick_cycles, longest_tick : int
-        Clock, nominal and longest tick in clocks.
-    external : bool
-        Whether ticks come from outside, and differ in length.
-    max_count : int
-        Most counts of a tick.
-    counts_per_rev : int
-    max_memory : Fraction or None, seconds
-        What memory does not grow beyond; None: 4 s.
-    max_time : int
-        Clocks of silence after which 0 is shown.
-    velocity_out : int
-        Fraction bits of the velocity in counts per tick that is shown.
-    slope : Fraction
-        LSB of the acceleration that is shown in one of the recursion, less than 1.
-    quality : Fraction, quality_bits : int
-        LSB of the deviation that is shown in one count per clock, and its bits.
-    """
-
+    # clock_hz, tick_cycles and longest_tick: clock, nominal and longest tick in clocks
     clock_hz: int
     tick_cycles: int
     longest_tick: int
-    external: bool
-    max_count: int
+    external: bool  # whether ticks come from outside, and differ in length
+    max_count: int  # most counts of a tick
     counts_per_rev: int
-    max_memory: Fraction | None
-    max_time: int
-    velocity_out: int
-    slope: Fraction
-    quality: Fraction
-    quality_bits: int
+    max_memory: Fraction | None  # seconds: what memory does not grow beyond; None: 4 s
+    max_time: int  # clocks of silence after which 0 is shown
+    velocity_out: int  # fraction bits of the velocity in counts per tick that is shown
+    slope: Fraction  # LSB of the acceleration that is shown in one of the recursion, less than 1
+    quality: Fraction  # LSB of the deviation that is shown, in one count per clock
+    quality_bits: int  # of it
 
     @cached_property
     def factor_bits(self) -> int:

@@ -293,20 +293,11 @@ def _longest_of(counts: int, times: Times, output: str) -> int:
 
 @dataclass(frozen=True)
 class Program:
-    """The program of a tracking recursion on a machine, its words, and its clocks.
-
-    Parameters
-    ----------
-    form : Tracking
-    times : Times
-        Of the unit.
-    delay : int
-        Clocks from an edge to the port, less those of the program: the velocity is that of the clock in which it is
-        shown.
-    """
+    """The program of a tracking recursion on a machine, its words, and its clocks."""
 
     form: Tracking
-    times: Times
+    times: Times  # of the unit
+    # clocks from an edge to the port, less those of the program: the velocity is that of the clock in which it is shown
     delay: int
 
     @cached_property

@@ -21,22 +21,16 @@ class Start(IntEnum):
 
 @dataclass(frozen=True)
 class Times:
-    """Clocks from the begin of an operation of the unit until its result can be used.
+    """Clocks from the begin of an operation of the unit until its result can be used."""
 
-    Parameters
-    ----------
-    log, exp, over, gain, by, times : int
-        At most.
-    stages : int
-        Clocks from when an instruction is fetched until it is executed, which are lost when a jump is taken: 1, or 3.
-    """
-
+    # log, exp, over, gain, by and times: at most
     log: int
     exp: int
     over: int
     gain: int
     by: int
     times: int
+    # clocks from when an instruction is fetched until it is executed, which are lost when a jump is taken: 1, or 3
     stages: int = 1
 
     @property
@@ -59,12 +53,7 @@ QUICK = Times(log=4, exp=5, over=3, gain=3, by=2, times=5)
 
 @dataclass(frozen=True)
 class Small:
-    """Says how the small unit works: what is added at the top of its register goes right by 2 or by 8 places a clock.
-
-    Parameters
-    ----------
-    form : Tracking
-    """
+    """Says how the small unit works: what is added on top of its register goes right by 2 or by 8 places a clock."""
 
     form: Tracking
 

@@ -36,23 +36,12 @@ class VelocityOutput:
 
     One LSB of v is at most a quarter of one of the output and correctly rounded: an error of ⅛. The multiplier is
     rounded where it adds at most 1/16. So the output is off by less than 0.7 LSB.
-
-    Parameters
-    ----------
-    ratio : Fraction
-        LSBs of the output in one LSB of v, at most ¼; or 1, to hold v within fewer bits.
-    max_native : int
-        Largest |v|.
-    width : int
-        Bits of the output.
-    bounds : bool
-        Whether v may be a bound.
     """
 
-    ratio: Fraction
-    max_native: int
-    width: int
-    bounds: bool = False
+    ratio: Fraction  # LSBs of the output in one LSB of v, at most ¼; or 1, to hold v within fewer bits
+    max_native: int  # largest |v|
+    width: int  # bits of the output
+    bounds: bool = False  # whether v may be a bound
 
     @property
     def _constant(self) -> tuple[int, int]:

@@ -16,37 +16,18 @@ from tachometry.spec.registers.map import RegisterMap
 
 @dataclass(frozen=True)
 class Bus:
-    """How registers are accessed.
-
-    Parameters
-    ----------
-    help : str
-        What it is, for --help.
-    lines : tuple of Port
-        Ports that it adds to the core; one of width 0 is an address, as wide as the registers need.
-    words : bool
-        The address is that of a word, not of a byte.
-    idle : mapping of str to int
-        Levels of inputs that are not 0 when nothing happens.
-    asynchronous : tuple of str
-        Inputs that are not of the clock domain.
-    baud : int
-        Bits a second on a line without a clock; 0 if the bus has none.
-    address_bits : int
-        Bits of the address of a word in its frames; 0 if it has no frames.
-    irq : bool
-        The registers have an interrupt.
-    """
+    """How registers are accessed."""
 
     name: str
-    help: str
+    help: str  # what it is, for --help
+    # ports that it adds to the core; one of width 0 is an address, as wide as the registers need
     lines: tuple[Port, ...]
-    words: bool = False
-    idle: Mapping[str, int] = field(default_factory=dict)
-    asynchronous: tuple[str, ...] = ()
-    baud: int = 0
-    address_bits: int = 0
-    irq: bool = False
+    words: bool = False  # the address is that of a word, not of a byte
+    idle: Mapping[str, int] = field(default_factory=dict)  # levels of inputs that are not 0 when nothing happens
+    asynchronous: tuple[str, ...] = ()  # inputs that are not of the clock domain
+    baud: int = 0  # bits a second on a line without a clock; 0 if the bus has none
+    address_bits: int = 0  # bits of the address of a word in its frames; 0 if it has no frames
+    irq: bool = False  # the registers have an interrupt
 
     def bit_cycles(self, clock_hz: int) -> int:
         """Return clocks of a bit on a line without a clock.

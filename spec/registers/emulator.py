@@ -29,37 +29,19 @@ LATENCY = 3
 
 @dataclass(frozen=True)
 class EmulatorSettings:
-    """Sets the emulator; all numbers are as its registers have them.
+    """Sets the emulator; all numbers are as its registers have them."""
 
-    Parameters
-    ----------
-    speed : int
-        Phase a clock that it goes to, signed, 32 bits.
-    rate : int
-        Change of the speed in two clocks, in 2^-16; 0: at once.
-    phase_error, duty_a, duty_b : int
-        How late B rises, A falls and B falls, in 2^-10 periods, signed, 8 bits.
-    jitter : int
-        Bits that take part in the edges' random movement, in 2^-10 periods.
-    bounce : int
-        Clocks.
-    drop : int
-        So many of 256 edges of each line are left out.
-    glitches : int
-        In so many of 65536 clocks both A and B have the wrong level.
-    broken, stuck : int
-        Bits of A, B and Z: the line is high, as an open input is; it stays as it is.
-    """
-
-    speed: int = 0
-    rate: int = 0
+    speed: int = 0  # phase a clock that it goes to, signed, 32 bits
+    rate: int = 0  # change of the speed in two clocks, in 2^-16; 0: at once
+    # phase_error, duty_a and duty_b: how late B rises, A falls and B falls, in 2^-10 periods, signed, 8 bits
     phase_error: int = 0
     duty_a: int = 0
     duty_b: int = 0
-    jitter: int = 0
-    bounce: int = 0
-    drop: int = 0
-    glitches: int = 0
+    jitter: int = 0  # bits that take part in the edges' random movement, in 2^-10 periods
+    bounce: int = 0  # clocks
+    drop: int = 0  # so many of 256 edges of each line are left out
+    glitches: int = 0  # in so many of 65536 clocks both A and B have the wrong level
+    # broken and stuck: bits of A, B and Z: the line is high, as an open input is; it stays as it is
     broken: int = 0
     stuck: int = 0
 

@@ -9,46 +9,22 @@ WORD = 32  # bits
 
 @dataclass(frozen=True)
 class Field:
-    """Describes some bits of a register.
-
-    Parameters
-    ----------
-    width : int
-        Bits.
-    low : int
-        The lowest of them.
-    writable : bool
-        A write changes it; else a write has no effect on it.
-    single : bool
-        Writing 1 has an effect in that clock, and it reads 0.
-    reset : int
-        Its value after reset; of a constant, its value.
-    signed : bool
-        The register is in two's complement.
-    unit : str
-        What one LSB is.
-    port : str
-        The port that it shows, if it shows one. If it is writable, that which it sets.
-    shift : int
-        The bit of the port that is its lowest.
-    bits : int
-        Of a field of a whole register, so many are kept of what is written, and extended by sign or zeros; 0: all.
-    least, most : int or None
-        What is written is held within these.
-    """
+    """Describes some bits of a register."""
 
     name: str
-    width: int
-    low: int = 0
+    width: int  # bits
+    low: int = 0  # the lowest of them
     help: str = ""
-    writable: bool = False
-    single: bool = False
-    reset: int = 0
-    signed: bool = False
-    unit: str = ""
-    port: str = ""
-    shift: int = 0
+    writable: bool = False  # a write changes it; else a write has no effect on it
+    single: bool = False  # writing 1 has an effect in that clock, and it reads 0
+    reset: int = 0  # its value after reset; of a constant, its value
+    signed: bool = False  # the register is in two's complement
+    unit: str = ""  # what one LSB is
+    port: str = ""  # the port that it shows, if it shows one. If it is writable, that which it sets.
+    shift: int = 0  # the bit of the port that is its lowest
+    # of a field of a whole register, so many are kept of what is written, and extended by sign or zeros; 0: all
     bits: int = 0
+    # least and most: what is written is held within these
     least: int | None = None
     most: int | None = None
 
@@ -70,29 +46,15 @@ class Field:
 
 @dataclass(frozen=True)
 class Register:
-    """Describes a word of 32 bits.
-
-    Parameters
-    ----------
-    offset : int
-        Bytes.
-    fields : tuple of Field
-        Bits of none of them read 0.
-    captured : bool
-        It keeps what it shows until the next capture.
-    captures : bool
-        Reading it captures first, unless CONTROL.hold is set.
-    constant : bool
-        It never changes.
-    """
+    """Describes a word of 32 bits."""
 
     name: str
-    offset: int
+    offset: int  # bytes
     help: str
-    fields: tuple[Field, ...]
-    captured: bool = False
-    captures: bool = False
-    constant: bool = False
+    fields: tuple[Field, ...]  # bits of none of them read 0
+    captured: bool = False  # it keeps what it shows until the next capture
+    captures: bool = False  # reading it captures first, unless CONTROL.hold is set
+    constant: bool = False  # it never changes
 
     @property
     def writable(self) -> bool:

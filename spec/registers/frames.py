@@ -53,38 +53,20 @@ class FrameError(ValueError):
 
 @dataclass(frozen=True)
 class Request:
-    """Holds a request over the UART, as `decode_request` found it.
-
-    Parameters
-    ----------
-    sequence : int
-        Repeated in the answer.
-    address : int
-        Of the first word.
-    value : int
-        Number of words to be read, or the word to be written.
-    """
+    """Holds a request over the UART, as `decode_request` found it."""
 
     type: Type
-    sequence: int
-    address: int
-    value: int
+    sequence: int  # repeated in the answer
+    address: int  # of the first word
+    value: int  # number of words to be read, or the word to be written
 
 
 @dataclass(frozen=True)
 class Answer:
-    """Holds an answer.
+    """Holds an answer."""
 
-    Parameters
-    ----------
-    words : tuple of int
-        What was read; 0 where there is no register.
-    error : bool
-        There is no register at one of the addresses, or it cannot be written.
-    """
-
-    words: tuple[int, ...]
-    error: bool
+    words: tuple[int, ...]  # what was read; 0 where there is no register
+    error: bool  # there is no register at one of the addresses, or it cannot be written
 
 
 def crc(data: bytes) -> int:

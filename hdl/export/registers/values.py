@@ -9,18 +9,10 @@ from tachometry.spec.registers.map import RegisterMap
 
 @dataclass(frozen=True)
 class Value:
-    """Describes what one register shows or takes, or two.
+    """Describes what one register shows or takes, or two."""
 
-    Parameters
-    ----------
-    name : str
-        Of the port, or of what is written.
-    words : tuple of Register
-        Its registers, the lowest bits first.
-    """
-
-    name: str
-    words: tuple[Register, ...]
+    name: str  # of the port, or of what is written
+    words: tuple[Register, ...]  # its registers, the lowest bits first
 
     @property
     def field(self) -> Field:

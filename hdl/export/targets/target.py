@@ -16,26 +16,14 @@ from tachometry.spec.registers.buses import Bus
 
 @dataclass(frozen=True)
 class Target:
-    """Describes a framework.
+    """Describes a framework."""
 
-    Parameters
-    ----------
-    help : str
-        What is made for it, for --help.
-    buses : tuple of str
-        The buses that the core can have for it, first that which it has if none is asked for.
-    names : tuple of str
-        The files, in which NAME stands for that of the module.
-    files : callable
-        Texts by file name, of the spec, the name and the bus of the core, and of its files without a target.
-    axes, loops : bool
-        Cores of many axes, and with a control loop, can go into it.
-    """
-
-    help: str
-    buses: tuple[str, ...]
-    names: tuple[str, ...]
+    help: str  # what is made for it, for --help
+    buses: tuple[str, ...]  # the buses that the core can have for it, first that which it has if none is asked for
+    names: tuple[str, ...]  # the files, in which NAME stands for that of the module
+    # texts by file name, of the spec, the name and the bus of the core, and of its files without a target
     files: Callable[[Any, str, Any, Mapping[str, str]], dict[str, str]]
+    # axes and loops: cores of many axes, and with a control loop, can go into it
     axes: bool = True
     loops: bool = False
 

@@ -24,20 +24,11 @@ _FAMILIES = (
 
 @dataclass(frozen=True)
 class _Interface:
-    """Names in Vivado of a bus, of its clock and of its reset.
+    """Names in Vivado of a bus, of its clock and of its reset."""
 
-    Parameters
-    ----------
-    name : str
-        Of the interface; ports begin with it.
-    kind : str
-        Of its definition.
-    clock, reset : str
-        Names of ports; the reset is active low.
-    """
-
-    name: str
-    kind: str
+    name: str  # of the interface; ports begin with it
+    kind: str  # of its definition
+    # clock and reset: names of ports; the reset is active low
     clock: str
     reset: str
 
