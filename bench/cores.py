@@ -27,6 +27,8 @@ from tachometry.spec import (
 )
 from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.core.compare import Compare
+from tachometry.spec.core.health import Health
+from tachometry.spec.core.index import Index
 from tachometry.spec.core.stream import Stream
 from tachometry.spec.registers.buses import BUSES, bus_of, ports_on
 from tachometry.spec.registers.demo import DemoMap, demo_manifest, demo_ports
@@ -173,9 +175,9 @@ CONFIGURATIONS = (
     Configuration("x1", "x1 decoding", replace(REFERENCE, encoder=Encoder(500, 1))),
     Configuration("position-16", "16-bit position", replace(REFERENCE, position_width=16)),
     Configuration("filter-4", "glitch filter, 4 clocks", replace(REFERENCE, filter_clocks=4)),
-    Configuration("index", "index captures the position", replace(REFERENCE, index=True)),
-    Configuration("index-reset", "and resets it", replace(REFERENCE, index=True, index_reset=True)),
-    Configuration("index-once", "and is taken once", replace(REFERENCE, index=True, index_once=True)),
+    Configuration("index", "index captures the position", replace(REFERENCE, index=Index())),
+    Configuration("index-reset", "and resets it", replace(REFERENCE, index=Index(reset=True))),
+    Configuration("index-once", "and is taken once", replace(REFERENCE, index=Index(once=True))),
     Configuration("preset", "position is set by an input", replace(REFERENCE, preset=0)),
     Configuration("probe", "a probe latches position and time", replace(REFERENCE, probe="rising")),
     Configuration("compare", "pulses at positions", replace(REFERENCE, compare=Compare(100, 100, 50, "10us"))),
@@ -183,9 +185,11 @@ CONFIGURATIONS = (
     Configuration("compare-list", "of a list of 64", replace(REFERENCE, compare=Compare(0, 0, 0, "10us", "both", 64))),
     Configuration("stream", "AXI4-Stream of records", replace(REFERENCE, stream=Stream())),
     Configuration("over-speed", "trips at 900 rad/s", replace(REFERENCE, over_speed=Speed.parse("900rad/s"))),
-    Configuration("health", "faults of lines and index", replace(REFERENCE, index=True, health=True)),
+    Configuration("health", "faults of lines and index", replace(REFERENCE, index=Index(), health=Health())),
     Configuration(
-        "complements", "and open circuits of three pairs", replace(REFERENCE, index=True, health=True, complements=48)
+        "complements",
+        "and open circuits of three pairs",
+        replace(REFERENCE, index=Index(), health=Health(complements=48)),
     ),
     Configuration("position-modulo", "position within a revolution", replace(REFERENCE, position_modulo="rev")),
     Configuration(

@@ -89,8 +89,7 @@ def of_disc(ppr: int, more: dict[str, str]) -> TachometerSpec:
 
 def record(spec: TachometerSpec, motion: str, **values: Any) -> Recording:
     """Return what an encoder of the core does, with its complements if the core has these."""
-    lines = dict(index=spec.index, index_state=spec.front_end.index_place, complemented=spec.front_end.complemented)
-    return VirtualEncoder.of(spec.encoder, **lines, **values).record(parse_motion(motion)).recording
+    return VirtualEncoder.of_core(spec, **values).record(parse_motion(motion)).recording
 
 
 def skewed(recording: Recording) -> Recording:

@@ -272,8 +272,7 @@ def _recorded(spec: AnySpec, motion: str, axis: int, encoder: dict[str, Any]) ->
             raise ParameterError(name, f"must be an option of the encoder: {', '.join(known)}")
     texts = {name.replace("_", "-"): _text(value) for name, value in encoder.items()}
     values = read_options(EncoderOptions, texts)
-    alone = spec.tachometer
-    whole = VirtualEncoder.of(alone.encoder, index=alone.index, index_state=alone.front_end.index_place, **values)
+    whole = VirtualEncoder.of_core(spec.tachometer, **values)
     return replace(whole, seed=whole.seed + axis).record(parse_motion(motion))
 
 

@@ -88,8 +88,8 @@ def _read(
             slowest_s=float(alone.times.seconds(alone.times.longest)),
         )
         if count is not None:
-            more = {"sensor": None if alone.encoder.plain else sensor, "index": alone.index or None}
-            _refuse_lines({**lines, **more, "complements": alone.complements})
+            more = {"sensor": None if alone.encoder.plain else sensor, "index": alone.index}
+            _refuse_lines({**lines, **more, "complements": alone.front_end.complemented or None})
             log = read_count_log(capture, _of_axis("count", count, axis, axes) or "", text, wrap)
             return with_last_tick(log.recording(alone.encoder.decoding), spec)
         if wrap is not None:

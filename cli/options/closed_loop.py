@@ -153,7 +153,7 @@ def _core_motor_and_gains(
 ) -> tuple[TachometerSpec, Any, Any]:
     from tachometry.sim.engines.loop import Gains, Motor, Observer
 
-    if measured_acceleration and "acceleration" not in spec.method_entries:
+    if measured_acceleration and "acceleration" not in spec.scale.entries:
         raise ParameterError("measured_acceleration", f"must not be given with method {spec.method}, which has none")
     law = Law(tachometer=spec, **take_values(Law, of_law, vars(spec.timing)))
     inertia, torque_constant = float(law.inertia), float(law.torque_constant)

@@ -92,8 +92,7 @@ def _read_encoder(**given: Any) -> dict[str, Any]:
     def encoder(spec: TachometerSpec) -> VirtualEncoder:
         from tachometry.sim.encoder.virtual import VirtualEncoder
 
-        wires = dict(index=spec.index, index_state=spec.front_end.index_place, complemented=spec.front_end.complemented)
-        return VirtualEncoder.of(spec.encoder, **wires, **values)
+        return VirtualEncoder.of_core(spec, **values)
 
     return dict(encoder=encoder, **given)
 

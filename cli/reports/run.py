@@ -134,7 +134,7 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         when = format_time(spec.times.seconds(int(run.ticks.clock[synced[0]]))) if len(synced) else ""
         lost = "" if run.ticks.synced[-1] or not when else ", and lost"
         rows.append(("gap of the wheel", f"found within {when}{lost}" if when else "not found"))
-    if spec.index_once:
+    if spec.front_end.index_once:
         rows.append(("homed", "yes" if run.ticks.homed[-1] else "no"))
     if spec.preset is not None:
         rows.append(("position", f"{run.ticks.position[-1]} at the end; counts out are without presets"))

@@ -50,7 +50,7 @@ class AxesDatapath(wiring.Component):
         Whose count it is.
     count : In(signed)
     handed_position : In(signed)
-        Of this axis, only with `index_reset`; else it is the sum of the counts.
+        Of this axis, only where the index resets it; else it is the sum of the counts.
     tick : Out(1)
         One clock for every axis in every tick.
     axis : Out(range(axes))
@@ -86,7 +86,7 @@ class AxesDatapath(wiring.Component):
                 "complete": In(1),
                 "slot": In(range(spec.slots)),
                 "count": In(signed(axis.times.longest_tick.bit_length() + 1)),
-                **({"handed_position": In(signed(axis.position_width))} if axis.index_reset else {}),
+                **({"handed_position": In(signed(axis.position_width))} if axis.front_end.index_resets else {}),
                 "tick": Out(1),
                 "axis": Out(len(self.turns.axis)),
                 "pulse_count": Out(signed(axis.widths.count)),

@@ -33,7 +33,7 @@ class AxesTrackDatapath(wiring.Component):
         Whose count it is.
     count : In(counts_layout(form))
     handed_position : In(signed)
-        Of this axis, only with `index_reset`; else it is the sum of the counts.
+        Of this axis, only where the index resets it; else it is the sum of the counts.
     tick, velocity_valid : Out(1)
         One clock for every axis in every tick.
     axis : Out(range(axes))
@@ -52,7 +52,7 @@ class AxesTrackDatapath(wiring.Component):
             self.velocity_output = PipelinedVelocityOutput(axis.scale.output, layout)
             layout = shown_layout(layout, axis.scale.output)
         self._update = layout
-        position = {"handed_position": In(signed(axis.position_width))} if axis.index_reset else {}
+        position = {"handed_position": In(signed(axis.position_width))} if axis.front_end.index_resets else {}
         super().__init__(
             {
                 "complete": In(1),
@@ -79,7 +79,7 @@ class AxesTrackDatapath(wiring.Component):
             m.submodules[f"machine_{number}"] = turns
             m.d.comb += [getattr(turns, name).eq(getattr(self, name)) for name in ("complete", "slot", "count")]
             m.d.comb += turns.length.eq(length)
-            if self._axis.index_reset:
+            if self._axis.front_end.index_resets:
                 m.d.comb += turns.handed_position.eq(self.handed_position)
         valid = [turns.valid for turns in self.machines]
         update = Signal(self.machines[0].update.shape())

@@ -52,7 +52,7 @@ class TrackTurns(wiring.Component):
         self._spec, self._axis, self._number = spec, axis, machine
         self._own = range(machine, spec.axes, spec.plan.machines)
         self.machine = TrackMachine(*(axis.at(number, spec.delay(number)).program for number in self._own))
-        position = {"handed_position": In(signed(axis.position_width))} if axis.index_reset else {}
+        position = {"handed_position": In(signed(axis.position_width))} if axis.front_end.index_resets else {}
         super().__init__(
             {
                 "complete": In(1),
@@ -109,7 +109,7 @@ class TrackTurns(wiring.Component):
 
     def _handed(self, m: Module, whose: Signal, reads: Signal) -> tuple[data.View, Signal | None]:
         """Return counts of the axis that has its turn, and its position if an index may reset it."""
-        names = ("count", "handed_position") if self._axis.index_reset else ("count",)
+        names = ("count", "handed_position") if self._axis.front_end.index_resets else ("count",)
         shape = data.StructLayout({name: getattr(self, name).shape() for name in names})
         m.submodules.handed_over = handed = Memory(shape=shape, depth=self._spec.slots, init=[], attrs=BLOCK)
         read = handed.read_port()
@@ -123,7 +123,7 @@ class TrackTurns(wiring.Component):
         ]
         with m.If(reads):
             m.d.sync += taken.eq(read.data)
-        return taken.count, taken.handed_position if self._axis.index_reset else None
+        return taken.count, taken.handed_position if self._axis.front_end.index_resets else None
 
     def _follow(
         self, m: Module, turn: Signal, first: Signal, counts: data.View, position: Signal | None, at: dict[str, Signal]

@@ -55,7 +55,9 @@ class AxesTachometer(wiring.Component):
             self.datapath = AxesDatapath(spec)
         self.axis_index: AxisIndex | None = None
         if spec.axis.index:
-            self.axis_index = AxisIndex(slots=spec.slots, width=spec.axis.position_width, resets=spec.axis.index_reset)
+            self.axis_index = AxisIndex(
+                slots=spec.slots, width=spec.axis.position_width, resets=spec.axis.front_end.index_resets
+            )
 
     @property
     def spec(self) -> AxesSpec:
@@ -90,7 +92,7 @@ class AxesTachometer(wiring.Component):
             self.decode_error_axis.eq(counters.axis),
         ]
         handed: Sequence[Signal] = counters.complete, counters.axis, counters.count
-        if spec.axis.index_reset:  # the position is a clock later
+        if spec.axis.front_end.index_resets:  # the position is a clock later
             handed = delay(m, *handed)
         m.d.comb += [
             box.eq(value) for box, value in zip((datapath.complete, datapath.slot, datapath.count), handed, strict=True)
@@ -109,7 +111,7 @@ class AxesTachometer(wiring.Component):
                 ),
                 index.step.eq(counters.step),
             ]
-            if spec.axis.index_reset:
+            if spec.axis.front_end.index_resets:
                 m.d.comb += datapath.handed_position.eq(index.position)
             self._show(m, INDEX, index.index_valid, "index_axis", index.axis, index)
         return m

@@ -73,7 +73,7 @@ class Tachometer(wiring.Component):
         self.modulo_counter = None if front.modulus is None else ModuloCounter(front.modulus, spec.latency.tick)
         self.index_capture: IndexCapture | None = None
         if spec.index:
-            self.index_capture = IndexCapture(spec.position_width, spec.latency.tick, once=spec.index_once)
+            self.index_capture = IndexCapture(spec.position_width, spec.latency.tick, once=front.index_once)
         self.index_state: IndexState | None = None
         if front.index_state is not None:
             after = spec.encoder.kind.after(front.index_state)
@@ -95,13 +95,13 @@ class Tachometer(wiring.Component):
         if spec.health:
             self.watch = EncoderWatch(
                 second=spec.timing.clock_hz,
-                edges=spec.health_edges,
-                errors=spec.health_errors,
+                edges=spec.health.edges,
+                errors=spec.health.errors,
                 counts_per_rev=spec.encoder.counts_per_rev if front.index_watched else 0,
                 position_width=spec.position_width if front.index_watched else 0,
-                index_reset=spec.index_reset,
+                index_reset=front.index_resets,
                 presets=front.index_watched and spec.preset is not None,
-                complements=dict.fromkeys(front.complemented, spec.complements or 0),
+                complements=dict.fromkeys(front.complemented, spec.health.complements or 0),
                 misses=front.index_state is not None,
             )
         self.datapath = DATAPATHS[spec.method](spec)
@@ -300,11 +300,11 @@ class Tachometer(wiring.Component):
             index.level_z.eq(level),
             index.ready.eq(ready),
             index.position.eq(self.position_counter.next),
-            self.position_counter.clear.eq(index.rises & int(self._spec.index_reset)),
+            self.position_counter.clear.eq(index.rises & int(self._spec.front_end.index_resets)),
             self.index_position.eq(index.index_position),
             self.index_valid.eq(index.index_valid),
         ]
-        if self._spec.index_once:
+        if self._spec.front_end.index_once:
             m.d.comb += [index.arm.eq(self.controls["home"].rises), self.homed.eq(index.homed)]
 
     def _index_level(self, m: Module) -> tuple[Value, Value]:

@@ -17,7 +17,7 @@ from tachometry.sim.encoder.imperfections import BOUNCE, ILLEGAL, JITTER, LOST, 
 from tachometry.sim.encoder.motion import FloatArray, Motion, Vibration, sin2pi
 from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.sim.signals.recording import MAX_EDGES, Recording, packed, quadrature
-from tachometry.spec import Encoder
+from tachometry.spec import Encoder, TachometerSpec
 from tachometry.spec.core.sensors import SENSORS
 from tachometry.spec.language.option import ParameterError
 
@@ -134,6 +134,13 @@ class VirtualEncoder(EncoderOptions):
         if encoder.missing:  # its gap is the index
             values["index"] = False
         return cls(encoder.pulses_per_rev, **own, **values)
+
+    @classmethod
+    def of_core(cls, spec: TachometerSpec, **values: Any) -> "VirtualEncoder":
+        """Return the encoder of `of`, with the lines of the index and complements that the core has."""
+        front = spec.front_end
+        lines = dict(index=spec.index is not None, index_state=front.index_place, complemented=front.complemented)
+        return cls.of(spec.encoder, **lines, **values)
 
     def __post_init__(self) -> None:
         super().__post_init__()

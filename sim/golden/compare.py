@@ -79,7 +79,8 @@ def _carried(
     way = spec.scale.carrying
     half = 1 << spec.position_width - 1 + way.fine_bits
     widest = half << way.more_bits
-    jumps = np.concatenate([steps.presets, steps.index[: len(steps.index) * spec.index_reset]]) + spec.latency.tick
+    resets = steps.index[: len(steps.index) * spec.front_end.index_resets]
+    jumps = np.concatenate([steps.presets, resets]) + spec.latency.tick
     before = np.searchsorted(np.sort(jumps), updates.clock - spec.latency.datapath, side="right")
     begins = [*(updates.clock + way.latency).tolist(), n_clocks]
     columns = (updates.velocity, updates.position_fine, np.diff(before, prepend=0))

@@ -157,7 +157,7 @@ class Steps:
     ) -> "Steps":
         """Return the same steps with presets, and with the indices that are taken."""
         index = self.z
-        if spec.index_once:
+        if spec.front_end.index_once:
             after = np.unique(np.searchsorted(index, arms, side="right"))
             index = index[after[after < len(index)]]
         return replace(self, index=index, presets=presets, values=values, arms=arms)
@@ -259,7 +259,7 @@ class _Origins:
         sums = np.append(0, np.cumsum(steps.step))
         captured = sums[np.searchsorted(steps.clock, steps.index, side="right")]
         preset = sums[np.searchsorted(steps.clock, steps.presets, side="left")] - steps.values
-        resets = len(steps.index) * spec.index_reset
+        resets = len(steps.index) * spec.front_end.index_resets
         clock = np.concatenate([steps.presets, steps.index[:resets]])
         order = np.argsort(clock, kind="stable")
         clock = clock[order]
@@ -321,7 +321,7 @@ def count(
         overflow = (left != 0) | beyond
     origins = _Origins.of(spec, steps)
     shaft = reached
-    if spec.index_reset:
+    if spec.front_end.index_resets:
         shaft = reached - np.append(0, origins.captured)[np.searchsorted(steps.index, last, side="right")]
     strobe = last + spec.latency.tick
     glitches = places(steps.swallowed, strobe, "right")

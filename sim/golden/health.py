@@ -8,27 +8,27 @@ from tachometry.sim.golden.ordered import places
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.health import FAULTS_WIDTH, OPEN, Fault
+from tachometry.spec.core.health import FAULTS_WIDTH, OPEN, Fault, Health
 
 Ints = NDArray[np.int64]
 _NONE = np.empty(0, dtype=np.int64)
 _OTHER = {1: Fault.B_STANDS, 2: Fault.A_STANDS}  # of what changes alone
 
 
-def _standing(spec: TachometerSpec, steps: Steps) -> tuple[Ints, Ints]:
+def _standing(spec: TachometerSpec, health: Health, steps: Steps) -> tuple[Ints, Ints]:
     """Return clocks in which a line has had too many edges without one of the other in a second, and the faults."""
     second = steps.clock // spec.timing.clock_hz
     anew = np.append(True, (steps.changed[1:] != steps.changed[:-1]) | (second[1:] != second[:-1]))[: len(second)]
     row = np.arange(len(second))
     number = row - np.maximum.accumulate(np.where(anew, row, 0)) + 1
-    found = np.flatnonzero((number % spec.health_edges == 0) & (steps.changed != 3))
+    found = np.flatnonzero((number % health.edges == 0) & (steps.changed != 3))
     return steps.clock[found], np.where(steps.changed[found] == 1, _OTHER[1], _OTHER[2]).astype(np.int64)
 
 
-def _illegal(spec: TachometerSpec, errors: Ints) -> Ints:
+def _illegal(spec: TachometerSpec, health: Health, errors: Ints) -> Ints:
     """Return clocks of the errors of a second that are one too many."""
     second = errors // spec.timing.clock_hz
-    return errors[np.arange(len(errors)) - np.searchsorted(second, second) == spec.health_errors]
+    return errors[np.arange(len(errors)) - np.searchsorted(second, second) == health.errors]
 
 
 def _index(spec: TachometerSpec, steps: Steps, index: Table) -> tuple[Ints, Ints]:
@@ -37,7 +37,7 @@ def _index(spec: TachometerSpec, steps: Steps, index: Table) -> tuple[Ints, Ints
     before = places(steps.clock[stepped], index.clock, "left")
     back = np.append(0, steps.step[stepped])[before] < 0
     position = index["index_position"]
-    way = position[1:] - (0 if spec.index_reset else position[:-1])
+    way = position[1:] - (0 if spec.front_end.index_resets else position[:-1])
     size = 1 << spec.position_width
     turn = np.where(back[1:], -spec.encoder.counts_per_rev, spec.encoder.counts_per_rev)
     off = (way - turn + size // 2) % size - size // 2
@@ -46,7 +46,7 @@ def _index(spec: TachometerSpec, steps: Steps, index: Table) -> tuple[Ints, Ints
     return index.clock[1:][wrong] + 1, off[wrong]
 
 
-def _open(spec: TachometerSpec, trace: PinTrace, clears: Ints) -> tuple[Ints, Ints]:
+def _open(spec: TachometerSpec, health: Health, trace: PinTrace, clears: Ints) -> tuple[Ints, Ints]:
     """Return clocks in which lines have equalled their complements for too long, and the faults; what lasts when it is
     cleared is found again.
     """
@@ -58,7 +58,7 @@ def _open(spec: TachometerSpec, trace: PinTrace, clears: Ints) -> tuple[Ints, In
         lasts = np.searchsorted(begin, clears, side="right") > np.searchsorted(end, clears + 1, side="right")
         start = np.sort(np.append(begin, clears[lasts] + 1))
         until = np.minimum(end[np.searchsorted(end, start, side="right")], np.append(start[1:], 1 << 62))
-        late = start + (spec.complements or 0)
+        late = start + (health.complements or 0)
         found.append(late[late < until])
         codes.append(np.full_like(found[-1], int(OPEN[name])))
     return np.concatenate(found), np.concatenate(codes)
@@ -68,12 +68,12 @@ def faults(spec: TachometerSpec, trace: PinTrace, steps: Steps, index: Table, cl
     """Return the clocks from which faults are shown, each with its code, and with the error of a wrong turn; `clears`
     are clocks in which a program clears them.
     """
-    if not spec.health:
+    if (health := spec.health) is None:
         return Table(_NONE, {})
-    standing, codes = _standing(spec, steps)
-    illegal = _illegal(spec, steps.errors)
+    standing, codes = _standing(spec, health, steps)
+    illegal = _illegal(spec, health, steps.errors)
     wrong, off = _index(spec, steps, index) if spec.front_end.index_watched else (_NONE, _NONE)
-    opened, lines = _open(spec, trace, clears)
+    opened, lines = _open(spec, health, trace, clears)
     missed = steps.missed + spec.latency.tick
     others = {Fault.ILLEGAL: illegal, Fault.INDEX_MISSED: missed, Fault.INDEX_COUNTS: wrong}
     clock = np.concatenate([standing, opened, *others.values()])

@@ -247,7 +247,7 @@ class GoldenBank:
 
     def _clear(self, accesses: Sequence[Access]) -> None:
         """Find the faults that are there again if a program clears them."""
-        if self._map.spec.complements is not None:
+        if self._map.spec.front_end.complemented:
             number = self._map.registers.index(self._map["CONTROL"])
             clears = [one.clock for one in accesses if one.address == number and (one.data or 0) & 1]
             given = self._map.spec, self._trace, self._steps, self._tables[INDEX]

@@ -66,10 +66,10 @@ class Axis:
     @property
     def index_distances(self) -> Ints:
         """Counts from each index to the next; the position may have wrapped, or each index resets it."""
-        if self.spec.index_once or self.spec.preset is not None:
+        if self.spec.front_end.index_once or self.spec.preset is not None:
             return self.run.index.clock[:0]  # they tell of no turn
         position, half = self.run.index.index_position, 1 << (self.spec.position_width - 1)
-        distance = position[1:] if self.spec.index_reset else np.diff(position)
+        distance = position[1:] if self.spec.front_end.index_resets else np.diff(position)
         return (distance + half) % (2 * half) - half
 
     @property
@@ -220,6 +220,6 @@ def _(spec: AxesSpec, run: Run, axis: int, recording: Recording, truth: Encoding
         error = velocity_error(held, truth.true_speed)
     counts_out = 0
     if len(own.ticks):
-        counts_out = int(own.ticks.pulse_count.sum() if alone.index_reset else own.ticks.position[-1])
+        counts_out = int(own.ticks.pulse_count.sum() if alone.front_end.index_resets else own.ticks.position[-1])
     n_merged = recording.n_merged(spec.timing.clock_hz // spec.slots, run.n_clocks // spec.slots)
     return Axis(alone, own, recording, truth, n_merged, counts_in, counts_out, held, error)

@@ -146,7 +146,7 @@ def usual_motion(spec: TachometerSpec, seed: int = 1, most: int = _MOVING) -> Re
         bounce=Bounce(1, float(spec.filter_clocks / spec.timing.clock_hz)) if bounces else None,
         start_angle_rad=-3.5 * np.pi / (2 * spec.encoder.pulses_per_rev),
         seed=seed,
-        index=spec.index,
+        index=spec.index is not None,
         index_state=spec.front_end.index_place,
     )
     usual = _usual_form(spec, most, backward=seed % 2 == 0)

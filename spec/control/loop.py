@@ -12,9 +12,10 @@ from tachometry.spec.control.coefficients import control_form, ratios_of
 from tachometry.spec.control.form import ControlForm, Term, factor_bits
 from tachometry.spec.control.generator import GeneratorForm, generator_clocks, generator_form
 from tachometry.spec.control.law import Law
-from tachometry.spec.control.ports import loop_entries, loop_ports
+from tachometry.spec.control.ports import loop_ports
 from tachometry.spec.control.units import Units
 from tachometry.spec.core.described import written
+from tachometry.spec.core.front_end import OF_CONTROLS
 from tachometry.spec.core.scale import Scale
 from tachometry.spec.language.option import ParameterError, option, options_of
 from tachometry.spec.language.port import Port, Ports
@@ -123,9 +124,8 @@ class LoopSpec(Law):
         if not encoder.plain:
             named = "reverse" if encoder.reverse else "invert" if encoder.invert else "sensor"
             raise ParameterError(named, "must not be given together with --loop, which takes A and B as they come")
-        for name in ("preset", "index_once"):
-            if getattr(self.tachometer, name) not in (None, False):
-                raise ParameterError(name, "must not be given together with --loop, whose position would jump")
+        for name in self.tachometer.front_end.controls:
+            raise ParameterError(OF_CONTROLS[name], "must not be given together with --loop, whose position would jump")
         if self.tachometer.compare is not None and self.tachometer.compare.depth:
             raise ParameterError("compare", "must not be a list together with --loop, whose inputs are commands")
         if not 8 <= self.current_width <= 24:
@@ -222,12 +222,6 @@ class LoopSpec(Law):
         )
 
     @property
-    def entries(self) -> dict[str, Any]:
-        """Entries of the manifest: those of the tachometer, and of the loop, which forgets gradually."""
-        of_tachometer = {name: entry for name, entry in self.tachometer.entries.items() if name != "recovery_cycles"}
-        return of_tachometer | {"loop": loop_entries(self)}
-
-    @property
     def options(self) -> dict[str, str]:
         """Texts of all options that are asked for, by their names."""
         return {**self.tachometer.options, "loop": "yes", **written(self, self.tachometer)}
@@ -243,6 +237,6 @@ class LoopSpec(Law):
         return {**self.tachometer.parameters, "loop": own}
 
 
-# A core of any kind: all have ports, options, parameters, entries of a manifest, `axes`, `latency.tick_to_result`, and
-# a `tachometer`, the core of one axis that they are, or that is in them.
+# A core of any kind: all have ports, options, parameters, `axes`, `latency.tick_to_result`, and a `tachometer`,
+# the core of one axis that they are, or that is in them.
 AnySpec = CoreSpec | LoopSpec

@@ -6,6 +6,7 @@ import math
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
+from tachometry.spec.core.front_end import OF_CONTROLS
 from tachometry.spec.core.probe import edges_of
 from tachometry.spec.core.timing import MAX_TICK_CYCLES
 from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS
@@ -34,15 +35,16 @@ def check(spec: TachometerSpec) -> None:
     if not 0 <= spec.filter_clocks <= most:
         longest = format_time(Fraction(most) / spec.timing.clock_hz)
         raise ParameterError("filter_clocks", f"must be from 0 to {most} clocks, {longest}, not {spec.filter_clocks}")
-    if spec.index_reset and not spec.index:
-        raise ParameterError("index_reset", "must be given together with --index")
     if "z" in spec.encoder.inverted and "z" not in spec.front_end.lines:
         raise ParameterError("invert", "must not have z without --index, which makes the line z")
     if spec.encoder.missing and spec.bounds:
         raise ParameterError("bounds", "must not be given with --missing-teeth: teeth that are not there have no edges")
     _check_index_state(spec)
     _check_place(spec)
-    _check_health(spec)
+    if spec.health and spec.encoder.sensor != "quadrature":
+        raise ParameterError(
+            "health", f"must be left out for {spec.encoder.sensor}: it watches two lines in quadrature"
+        )
     edges_of(spec.probe)
     if spec.compare is not None:
         fastest = Fraction(0)
@@ -62,31 +64,27 @@ def check(spec: TachometerSpec) -> None:
 
 
 def _check_index_state(spec: TachometerSpec) -> None:
-    if spec.index_at is None:
+    if spec.index is None or spec.index.at is None:
         return
     kind, state = spec.encoder.kind, spec.front_end.index_state
-    if not spec.index:
-        raise ParameterError("index_at", "must be given together with --index")
     if state is None:
         return
     if not kind.cycle:
         raise ParameterError("index_at", f"must be edge for {kind.name}, whose levels are no place")
     if spec.encoder.missing:
         raise ParameterError("index_at", "must be left out with --missing-teeth, where a gap is the index")
-    named = [word[0].lower() for word in spec.index_at.split(",")]
+    named = [word[0].lower() for word in spec.index.at.split(",")]
     if named != [*kind.lines] or state not in kind.cycle:
         states = " or ".join(
             ",".join(f"{line.upper()}={level}" for line, level in zip(kind.lines, levels, strict=True))
             for levels in sorted(kind.cycle)
         )
-        raise ParameterError("index_at", f"must be edge, {states} for {kind.name}, not {spec.index_at}")
+        raise ParameterError("index_at", f"must be edge, {states} for {kind.name}, not {spec.index.at}")
 
 
 def _check_place(spec: TachometerSpec) -> None:
-    if spec.index_once and not spec.index:
-        raise ParameterError("index_once", "must be given together with --index")
     if spec.front_end.wheel is not None and spec.front_end.controls:
-        name = {"preset": "preset", "home": "index_once"}[spec.front_end.controls[0]]
+        name = OF_CONTROLS[spec.front_end.controls[0]]
         raise ParameterError(name, "must not be given together with --missing-teeth, whose gap is the index")
     half = 1 << spec.position_width - 1
     if spec.preset is not None and not -half <= spec.preset < half:
@@ -100,20 +98,6 @@ def _check_place(spec: TachometerSpec) -> None:
         )
     if not 2 <= counts <= MAX_MODULUS:
         raise ParameterError("position_modulo", f"must be from 2 to {MAX_MODULUS} counts, not {counts}")
-
-
-def _check_health(spec: TachometerSpec) -> None:
-    if spec.health and spec.encoder.sensor != "quadrature":
-        raise ParameterError(
-            "health", f"must be left out for {spec.encoder.sensor}: it watches two lines in quadrature"
-        )
-    if spec.complements is not None and not spec.health:
-        raise ParameterError("complements", "must be given together with --health")
-    ranges = {"health_edges": (2, 1 << 16), "health_errors": (0, (1 << 16) - 1), "complements": (2, 1 << 20)}
-    for name, (least, most) in ranges.items():
-        value = getattr(spec, name)
-        if value is not None and not least <= value <= most:
-            raise ParameterError(name, f"must be from {least} to {most}, not {value}")
 
 
 def _check_edge_error(spec: TachometerSpec) -> None:

@@ -1,10 +1,9 @@
-"""A spec as files have it: its entries of the manifest, and its options as texts and in canonical form."""
+"""A spec as files have it: its options as texts and in canonical form."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tachometry.spec.core.stream import stream_entry
 from tachometry.spec.language.option import options_of
 from tachometry.spec.language.units import written_time
 
@@ -12,40 +11,6 @@ if TYPE_CHECKING:
     from tachometry.spec.core.tachometer import TachometerSpec
 
 CHOSEN = "method-chosen"  # what `options_as_asked` call why a method was taken
-
-
-def entries_of(spec: TachometerSpec) -> dict[str, Any]:
-    """Return entries of the manifest, beside ports and options."""
-    times, scale, frac_bits = spec.times, spec.scale, spec.widths.frac_bits
-    found = {
-        "method": spec.method,
-        "clock_hz": spec.timing.clock_hz,
-        "tick_cycles": spec.timing.tick_cycles,
-        "max_ticks": spec.timing.max_ticks,
-        "stalled_after_ticks": times.stalled_after_ticks,
-        "counts_per_rev": spec.encoder.counts_per_rev,
-        "decoding": spec.encoder.decoding,
-        "velocity": {
-            "width": spec.widths.velocity,
-            "frac_bits": frac_bits,
-            "unit": spec.unit,
-            "rad_per_s_per_lsb": scale.rad_per_s_per_lsb,
-            "full_scale": scale.full_scale * 2.0**-frac_bits,
-            "full_scale_rad_per_s": scale.full_scale * scale.rad_per_s_per_lsb,
-        },
-        **spec.method_entries,
-        "stream": stream_entry(spec),
-        "max_time_cycles": times.longest,
-        "min_time_cycles": times.shortest,
-        "bounds": {"none": spec.bound.shown_absent} if spec.bounds else None,
-        "interval_unit_cycles": times.interval_unit,
-        "latency_cycles": spec.latency.entries,
-        "recovery_cycles": spec.recovery.clocks,
-        "external_tick_cycles": (
-            {"min": times.min_tick_cycles, "max": times.longest_tick} if spec.external_tick else None
-        ),
-    }
-    return {name: entry for name, entry in found.items() if entry is not None}
 
 
 def options_as_asked(spec: TachometerSpec) -> dict[str, str]:
@@ -61,7 +26,7 @@ def parameters_of(spec: TachometerSpec) -> dict[str, Any]:
     found: dict[str, Any] = {"method": spec.method}
     for part in (spec.encoder, spec.timing, spec):
         for about in options_of(type(part)):
-            value = getattr(part, about.field)
+            value = about.value_in(part)
             if not (about.tacit and value == about.default):
                 found[about.field] = about.canonical(value)
     del found["external_tick"]
@@ -78,7 +43,7 @@ def written(part: Any, spec: TachometerSpec) -> dict[str, str]:
     fitting = {about.field: about for about in reversed(options_of(type(part))) if about.fits_in(spec)}
     found = {}
     for about in reversed(fitting.values()):
-        value = getattr(part, about.field)
+        value = about.value_in(part)
         if value is None or ((about.needs or about.tacit) and value == about.default):
             continue
         clocks = spec.timing.tick_cycles if about.unit == "ticks" else 1

@@ -5,6 +5,9 @@ from tachometry.spec.core.probe import edges_of
 from tachometry.spec.core.sensors import EDGE, USUAL_STATE, Levels
 from tachometry.spec.core.tooth_wheel import ToothWheel
 
+# The options that inputs of `controls` come with.
+OF_CONTROLS = {"preset": "preset", "home": "index_once"}
+
 
 class FrontEnd(Follows[S]):
     """Names the inputs of a core, and says where its index and its modulus are."""
@@ -19,7 +22,9 @@ class FrontEnd(Follows[S]):
     def complemented(self) -> tuple[str, ...]:
         """Lines that come with their complements, which are inputs as well: `a_n` of `a`."""
         spec = self.spec
-        return () if spec.complements is None else (*spec.encoder.kind.lines, *("z",) * spec.index)
+        if spec.health is None or spec.health.complements is None:
+            return ()
+        return (*spec.encoder.kind.lines, *("z",) * (spec.index is not None))
 
     @property
     def wheel(self) -> ToothWheel | None:
@@ -32,7 +37,7 @@ class FrontEnd(Follows[S]):
     @property
     def controls(self) -> tuple[str, ...]:
         """Inputs whose rises a program or a switch makes."""
-        return ("preset",) * (self.spec.preset is not None) + ("home",) * self.spec.index_once
+        return ("preset",) * (self.spec.preset is not None) + ("home",) * self.index_once
 
     @property
     def pulsed(self) -> tuple[str, ...]:
@@ -47,12 +52,22 @@ class FrontEnd(Follows[S]):
     @property
     def moves_position(self) -> bool:
         """Whether something else than counts changes the position."""
-        return self.spec.index_reset or self.spec.preset is not None
+        return self.index_resets or self.spec.preset is not None
+
+    @property
+    def index_resets(self) -> bool:
+        """Whether the index sets the position to 0."""
+        return self.spec.index is not None and self.spec.index.reset
+
+    @property
+    def index_once(self) -> bool:
+        """Whether the index is taken once, after input `home` rises."""
+        return self.spec.index is not None and self.spec.index.once
 
     @property
     def index_watched(self) -> bool:
         """Whether a watch counts from index to index, each of which is taken."""
-        return self.spec.index and not self.spec.index_once
+        return self.spec.index is not None and not self.spec.index.once
 
     @property
     def modulus(self) -> int | None:
@@ -65,8 +80,9 @@ class FrontEnd(Follows[S]):
     @property
     def index_state(self) -> Levels | None:
         """Levels of the lines in which the index is taken; None: it is where Z rises, or there is none."""
-        usual = USUAL_STATE if self.spec.index and self.spec.encoder.sensor == "quadrature" else EDGE
-        at = self.spec.index_at or usual
+        if self.spec.index is None:
+            return None
+        at = self.spec.index.at or (USUAL_STATE if self.spec.encoder.sensor == "quadrature" else EDGE)
         return None if at == EDGE else tuple(int(word[-1]) for word in at.split(","))
 
     @property

@@ -1,6 +1,10 @@
-"""Codes of what can be wrong with an encoder, which a core that watches it shows."""
+"""Codes of what can be wrong with an encoder, which a core that watches it shows, and when it finds so."""
 
+from dataclasses import dataclass
 from enum import IntEnum
+
+from tachometry.spec.core.timing import parse_filter
+from tachometry.spec.language.option import ParameterError, option, options_of
 
 
 class Fault(IntEnum):
@@ -28,4 +32,57 @@ FAULT_TEXTS = {
     Fault.Z_OPEN: "line z equals its complement z_n: an open circuit",
     Fault.INDEX_MISSED: "z comes and goes without the state of --index-at",
 }
+_RANGES = {"health_edges": (2, 1 << 16), "health_errors": (0, (1 << 16) - 1), "complements": (2, 1 << 20)}
 OPEN = {"a": Fault.A_OPEN, "b": Fault.B_OPEN, "z": Fault.Z_OPEN}  # of lines that have a complement
+
+
+@dataclass(frozen=True)
+class Health:
+    """Says when a core that watches its encoder finds a fault of it.
+
+    Parameters
+    ----------
+    edges, errors : int
+    complements : int or None
+        Clocks for which a line may equal its complement; None: there are no complements.
+
+    Raises
+    ------
+    ParameterError
+        If a number is out of range.
+    """
+
+    edges: int = option(
+        256,
+        "N edges of a line in a second, 2 to 65536, and none of the other, are a fault of the other. A shaft that "
+        "swings about one edge has such edges as well (with --health).",
+        name="health-edges",
+        metavar="N",
+        tests=("5",),
+        tacit=True,
+    )
+    errors: int = option(
+        10,
+        "More than N illegal transitions in a second, 0 to 65535, are a fault (with --health).",
+        name="health-errors",
+        metavar="N",
+        tests=("0",),
+        tacit=True,
+    )
+    complements: int | None = option(
+        None,
+        "Inputs a_n and b_n, and z_n with --index, of a differential encoder (with --health): a line that equals its "
+        "complement for longer than TIME is an open circuit, a fault. In s, ms, us or ns, rounded up to clocks; a "
+        "plain number is clocks. 1us is more than receivers and cables skew.",
+        name="complements",
+        metavar="TIME",
+        parse_at=parse_filter,
+        tests=("2", "40"),
+        tacit=True,
+    )
+
+    def __post_init__(self) -> None:
+        for about in options_of(Health):
+            (least, most), value = _RANGES[about.parameter], about.value_in(self)
+            if value is not None and not least <= value <= most:
+                raise ParameterError(about.parameter, f"must be from {least} to {most}, not {value}")

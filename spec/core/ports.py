@@ -38,7 +38,7 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
                 f"Preset, asynchronous; its rising edge sets the position to {spec.preset}, or to register PRESET.",
             ),
         ),
-        *_if(spec.index_once, pin("home", "Homing, asynchronous; its rising edge lets the next index be taken.")),
+        *_if(front.index_once, pin("home", "Homing, asynchronous; its rising edge lets the next index be taken.")),
         *_probe_pins(spec),
         *_list_pins(spec),
         *_if(spec.stream, pin(READY, "The record is taken in this clock; synchronous to clk.")),
@@ -122,7 +122,7 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> tuple[Port, ...]:
             ),
         ),
         *_if(
-            spec.index_once,
+            front.index_once,
             held(TICK, "homed", help="The index was taken, since home rose. It does not wait for a tick."),
         ),
         *_if(

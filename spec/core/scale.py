@@ -2,6 +2,7 @@
 
 import math
 from fractions import Fraction
+from typing import Any
 
 from tachometry.spec.core.follows import Follows, S
 from tachometry.spec.formats.low_pass import LowPass
@@ -80,6 +81,11 @@ class Scale(Follows[S]):
     def rounding_lsb(self) -> float:
         """Most that rounding takes from `velocity` or adds to it, in its LSB."""
         return 0.5 if self.spec.unit == NATIVE else 0.7
+
+    @property
+    def entries(self) -> dict[str, dict[str, Any]]:
+        """Entries of the manifest that say how outputs of this method alone are read, by the names of the ports."""
+        return {}
 
     @property
     def over_speed(self) -> int:

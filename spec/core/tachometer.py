@@ -8,16 +8,18 @@ from typing import Any, ClassVar
 from tachometry.spec.core.bound import Bound
 from tachometry.spec.core.checks import check
 from tachometry.spec.core.compare import Compare
-from tachometry.spec.core.described import entries_of, options_as_asked, parameters_of
+from tachometry.spec.core.described import options_as_asked, parameters_of
 from tachometry.spec.core.encoder import Encoder
 from tachometry.spec.core.facts import Facts
 from tachometry.spec.core.front_end import FrontEnd
+from tachometry.spec.core.health import Health
+from tachometry.spec.core.index import Index
 from tachometry.spec.core.latency import Latency
 from tachometry.spec.core.ports import bound_ports, ports_of
 from tachometry.spec.core.probe import PROBE_HELP, parse_probes
 from tachometry.spec.core.recovery import Recovery
 from tachometry.spec.core.scale import Scale
-from tachometry.spec.core.sensors import USUAL_STATE, parse_modulo, parse_state
+from tachometry.spec.core.sensors import parse_modulo
 from tachometry.spec.core.stream import STREAM_HELP, Stream
 from tachometry.spec.core.times import Times
 from tachometry.spec.core.timing import Timing, parse_clocks, parse_filter
@@ -100,26 +102,8 @@ class TachometerSpec:
         parse_at=parse_filter,
         tests=("", "1", "5"),
     )
-    index: bool = option(False, "Index line z: the index captures the position in index_position.")
-    index_reset: bool = option(False, "The index also sets the position to 0 (with --index).", needs="index")
-    index_at: str | None = option(
-        None,
-        "Where the index is taken (with --index): in a state of the lines, such as A=1,B=1, while z is high, which is "
-        "one place in both directions, or edge, where z rises, which is another place backward than forward. Outputs "
-        "index_missed and index_wide tell if z comes without its state, or meets it twice.",
-        metavar="[edge|A=1,B=1]",
-        shown=f"{USUAL_STATE}; edge for sensors other than quadrature",
-        parse=parse_state,
-        needs="index",
-        tests=("edge", "A=0,B=1"),
-        tacit=True,
-    )
-    index_once: bool = option(
-        False,
-        "The index is taken once (with --index): the first one after input home rises, or CONTROL.home is written. "
-        "Output homed tells that it was.",
-        needs="index",
-        tacit=True,
+    index: Index | None = option(  # noqa: RUF009
+        None, "Index line z: the index captures the position in index_position.", part=Index
     )
     preset: int | None = option(
         None,
@@ -181,41 +165,12 @@ class TachometerSpec:
         parse=parse_bandwidth,
         tests=("", "20kHz"),
     )
-    health: bool = option(
-        False,
+    health: Health | None = option(  # noqa: RUF009
+        None,
         "Watch the encoder: outputs health (the first fault), faults (how many) and fault (there is one), and with "
         "--index index_error. A reset clears them, and CONTROL.clear.",
         tacit=True,
-    )
-    health_edges: int = option(
-        256,
-        "N edges of a line in a second, 2 to 65536, and none of the other, are a fault of the other. A shaft that "
-        "swings about one edge has such edges as well (with --health).",
-        metavar="N",
-        needs="health",
-        parse=parse_whole,
-        tests=("5",),
-        tacit=True,
-    )
-    health_errors: int = option(
-        10,
-        "More than N illegal transitions in a second, 0 to 65535, are a fault (with --health).",
-        metavar="N",
-        needs="health",
-        parse=parse_whole,
-        tests=("0",),
-        tacit=True,
-    )
-    complements: int | None = option(
-        None,
-        "Inputs a_n and b_n, and z_n with --index, of a differential encoder (with --health): a line that equals its "
-        "complement for longer than TIME is an open circuit, a fault. In s, ms, us or ns, rounded up to clocks; a "
-        "plain number is clocks. 1us is more than receivers and cables skew.",
-        metavar="TIME",
-        needs="health",
-        parse_at=parse_filter,
-        tests=("2", "40"),
-        tacit=True,
+        part=Health,
     )
     over_speed: Speed | None = option(  # noqa: RUF009
         None,
@@ -283,16 +238,6 @@ class TachometerSpec:
     def ports(self) -> Ports:
         """Ports of the exported core, in order."""
         return Ports(ports_of(self, (*bound_ports(self), *self.method_ports)))
-
-    @property
-    def method_entries(self) -> dict[str, dict[str, Any]]:
-        """Entries of the manifest that say how numbers of these outputs are read, by the names of the ports."""
-        return {}
-
-    @property
-    def entries(self) -> dict[str, Any]:
-        """Entries of the manifest, beside ports and options."""
-        return entries_of(self)
 
     @property
     def options(self) -> dict[str, str]:

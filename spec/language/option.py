@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from fractions import Fraction
 from functools import cache
@@ -106,10 +106,14 @@ class Option:
         For a method that hardly depends on the option, the first so many of these values are enough.
     tacit : bool
         Whether manifests say nothing of it where it has its default.
+    part : type or None
+        For a flag whose field is None or an object of this class: the fields of that are options that need the flag.
     field : str
         Name of the field; set by `options_of`.
     default : object
         Default of the field; set by `options_of`.
+    within : tuple of str
+        The field of a part, and the one of its own in that; set by `options_of`.
     """
 
     help: str
@@ -128,8 +132,10 @@ class Option:
     tests: tuple[str, ...] | None = None
     few: int = 2
     tacit: bool = False
+    part: type[Any] | None = None
     field: str = ""
     default: Any = None
+    within: tuple[str, ...] = ()
 
     @property
     def parameter(self) -> str:
@@ -159,6 +165,14 @@ class Option:
         """Tell whether a spec, or its class, has the option."""
         return self.fits is None or self.fits(spec)
 
+    def value_in(self, spec: Any) -> Any:
+        """Return its value in a spec, or in what has some of its options."""
+        if self.within:
+            part = getattr(spec, self.within[0])
+            return self.default if part is None else getattr(part, self.within[1])
+        value = getattr(spec, self.field)
+        return value is not None if self.part else value
+
     def canonical(self, value: Any) -> Any:
         """Return a value of the field for a manifest."""
         if isinstance(value, Fraction):
@@ -186,8 +200,8 @@ def option(default: Any, help: str, *, text: str | None = None, also: tuple[Opti
     **about
         See `Option`. Without `parse`, the kind of the default tells how the text is read.
     """
-    if isinstance(default, bool):
-        about = {"flag": True, "parse": parse_flag} | about
+    if isinstance(default, bool) or "part" in about:
+        about.update(flag=True, parse=parse_flag)
     elif type(default) is int:
         about = {"parse": parse_whole} | about
     main = Option(help, shown=about.pop("shown", text), text=text, **about)
@@ -205,13 +219,17 @@ def options_of(spec: Any) -> tuple[Option, ...]:
 
 @cache
 def _declared(spec: Any) -> tuple[Option, ...]:
-    return tuple(_of_field(about, item) for item in fields(spec) for about in item.metadata.get("options", ()))
+    return tuple(about for item in fields(spec) for about in _of_field(item))
 
 
-def _of_field(about: Option, item: Field[Any]) -> Option:
-    text = item.metadata["options"][0].text  # of the main option, whichever is given
-    name = about.name or item.name.replace("_", "-")
-    return replace(about, name=name, text=text, field=item.name, default=item.default)
+def _of_field(item: Field[Any]) -> Iterator[Option]:
+    options = item.metadata.get("options", ())
+    for about in options:
+        name = about.name or item.name.replace("_", "-")
+        text = options[0].text  # of the main option, whichever is given
+        yield replace(about, name=name, text=text, field=item.name, default=False if about.part else item.default)
+        for own in options_of(about.part) if about.part else ():
+            yield replace(own, needs=name, field=own.parameter, within=(item.name, own.field))
 
 
 def read_options(
@@ -257,4 +275,8 @@ def read_options(
             values[about.field] = about.parse(about.parameter, text)
         else:
             values[about.field] = about.parse_at(about.parameter, text, {**known, **values})
+    for part in (about for about in options_of(spec) if about.part and about.field in values):
+        own = [about for about in options_of(spec) if about.within[:1] == (part.field,) and about.field in values]
+        made = {about.within[1]: values.pop(about.field) for about in own}
+        values[part.field] = part.part(**made) if values[part.field] and part.part else None
     return values

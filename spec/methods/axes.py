@@ -30,9 +30,8 @@ _LEFT_OUT: tuple[tuple[str, Any, str], ...] = (
     ("over_speed", None, f"what trips {_FOR_ONE}"),
     ("stream", None, f"what sends records {_FOR_ONE}"),
     ("preset", None, f"what sets the position {_FOR_ONE}"),
-    ("index_once", False, f"what waits for home {_FOR_ONE}"),
     ("position_modulo", None, f"its counter {_FOR_ONE}"),
-    ("health", False, f"what watches the lines {_FOR_ONE}"),
+    ("health", None, f"what watches the lines {_FOR_ONE}"),
     ("lowpass", None, f"the filter {_FOR_ONE}"),
 )
 _STROBES = {
@@ -213,6 +212,10 @@ class AxesSpec:
         for name, value, why in _LEFT_OUT:
             if getattr(spec, name) != value:
                 raise ParameterError(name, f"must not be given together with --axes: {why}")
+        if spec.front_end.index_once:
+            raise ParameterError(
+                "index_once", f"must not be given together with --axes: what waits for home {_FOR_ONE}"
+            )
         if spec.encoder.sensor != "quadrature":
             why = f"the decoder of {spec.encoder.sensor} {_FOR_ONE}"
             raise ParameterError("sensor", f"must not be given together with --axes: {why}")
@@ -298,7 +301,7 @@ class AxesSpec:
 
     def shown(self, axis: int, last: Any) -> Any:
         """Return the clock in which `tick` is high for a tick of an axis that ends with the round `last`."""
-        begun = self.look(0, last) + self.latency.count + 1 + self.tachometer.index_reset
+        begun = self.look(0, last) + self.latency.count + 1 + self.tachometer.front_end.index_resets
         return begun + self.plan.start(axis) + self.plan.latency + self.parallel
 
     @cached_property
@@ -338,37 +341,6 @@ class AxesSpec:
         """Return those of the core that each axis is, whose clocks are rounds, in clocks of this core."""
         unit = next(port.unit for port in self.tachometer.ports if port.name == "interval")
         return tuple(replace(port, unit=unit) if port.name == "interval" else port for port in self.axis.ports.outputs)
-
-    @property
-    def entries(self) -> dict[str, Any]:
-        """Entries of the manifest: those of the core of one axis, and of the axes together."""
-        alone, axis = self.tachometer, self.axis
-        of_one = alone.entries
-        of_velocity = {
-            "width": axis.widths.velocity,
-            "full_scale": axis.scale.full_scale * 2.0**-axis.widths.frac_bits,
-            "full_scale_rad_per_s": axis.scale.full_scale * axis.scale.rad_per_s_per_lsb,
-        }
-        return of_one | {
-            "velocity": of_one["velocity"] | of_velocity,
-            **axis.method_entries,
-            **({} if self.recovery.clocks is None else {"recovery_cycles": self.recovery.clocks}),
-            **({"external_tick_cycles": self._external} if alone.external_tick else {}),
-            "axes": {
-                "axes": self.axes,
-                "parallel": self.parallel,
-                "round_cycles": self.slots,
-                "turn_cycles": self.turn_cycles,
-                "machines": self.plan.machines,
-                "first_tick": self.tick_clock(0, 0),
-            },
-            "latency_cycles": self.latency.entries,
-        }
-
-    @property
-    def _external(self) -> dict[str, int]:
-        times = self.axis.times
-        return {"min": times.min_tick_cycles * self.slots, "max": times.longest_tick * self.slots}
 
     @property
     def options(self) -> dict[str, str]:

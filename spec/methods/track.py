@@ -109,6 +109,18 @@ class TrackScale(Scale["TrackTachometer"]):
         """The format of the acceleration."""
         return Acceleration(self.spec)
 
+    @property
+    def entries(self) -> dict[str, dict[str, Any]]:
+        return {
+            "acceleration": {
+                "width": self.acceleration.width,
+                "frac_bits": self.acceleration.frac_bits,
+                "unit": self.acceleration.unit,
+                "rad_per_s2_per_lsb": self.acceleration.rad_per_s2_per_lsb,
+            },
+            "position_fine": {"frac_bits": self.spec.fine_bits},
+        }
+
     @cached_property
     def carrying(self) -> Carrying:
         """How `position_fine` is carried on to the pulses of a fine compare output."""
@@ -304,18 +316,6 @@ class TrackTachometer(TachometerSpec):
                 help="Standard deviation that the velocity is expected to have, by the noise that was seen.",
             ),
         )
-
-    @property
-    def method_entries(self) -> dict[str, dict[str, Any]]:
-        return {
-            "acceleration": {
-                "width": self.scale.acceleration.width,
-                "frac_bits": self.scale.acceleration.frac_bits,
-                "unit": self.scale.acceleration.unit,
-                "rad_per_s2_per_lsb": self.scale.acceleration.rad_per_s2_per_lsb,
-            },
-            "position_fine": {"frac_bits": self.fine_bits},
-        }
 
 
 def in_loop(spec: TachometerSpec, velocity_gain: Fraction) -> TachometerSpec:

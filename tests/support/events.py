@@ -204,7 +204,7 @@ def covered(spec: TachometerSpec, trace: PinTrace, run: Run) -> Counter[str]:
             "stalled": _count(run.ticks.stalled),
             "count after stalled": _count(np.diff(run.ticks.stalled.astype(np.int64)) < 0),
             "index captured": len(run.index.clock),
-            "position reset": len(run.index.clock) * spec.index_reset,
+            "position reset": len(run.index.clock) * spec.front_end.index_resets,
             "external tick": len(run.ticks.clock) * spec.external_tick,
             "external tick too early": _count(~np.isin(run.tick_errors, run.ticks.clock)),
             "external tick missing": _count(np.isin(run.tick_errors, run.ticks.clock)),

@@ -17,9 +17,10 @@ from tachometry.sim.engines.verilator import home, runtimes, verilate
 from tachometry.sim.golden.registers import GoldenBank
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import Encoder, STachometer, Timing
+from tachometry.spec.core.index import Index
 from tachometry.spec.registers.map import RegisterMap
 
-SPEC = STachometer(encoder=Encoder(100), timing=Timing(1_000_000, 64, 20), filter_clocks=1, index=True, age=True)
+SPEC = STachometer(encoder=Encoder(100), timing=Timing(1_000_000, 64, 20), filter_clocks=1, index=Index(), age=True)
 START = 30_000  # there has been an update: before, not all is defined
 
 _VERILATOR = """

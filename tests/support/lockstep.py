@@ -27,6 +27,8 @@ from tachometry.spec import (
     Timing,
 )
 from tachometry.spec.core.compare import DIRECTIONS, Compare
+from tachometry.spec.core.health import Health
+from tachometry.spec.core.index import Index
 from tachometry.spec.methods.timed import TimedTachometer
 
 PULSES_PER_REV = 100
@@ -104,8 +106,7 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
         **(options := random_options(method, rng)),
         position_width=int(rng.choice([8, 16, 32, 48])),
         filter_clocks=filter_of(method, int(rng.choice([0, 0, 0, 1, 2, 5])), tick_cycles),
-        index=encoder.index,
-        index_reset=encoder.index and bool(rng.random() < 0.5),
+        index=Index(reset=bool(rng.random() < 0.5)) if encoder.index else None,
         external_tick=external,
         max_tick_cycles=int(tick_cycles * rng.choice([1, 2, 3, 6] if method == "track" else [1, 2, 3]))
         if external
@@ -141,7 +142,7 @@ def watched(spec: TachometerSpec, rng: np.random.Generator) -> TachometerSpec:
     compare = Compare(int(rng.integers(-3, 4)), int(rng.integers(3, 6)), int(rng.choice([0, 3, 40])), "2clk")
     compare = replace(compare, direction=str(rng.choice(DIRECTIONS)))
     limit = Speed(Fraction(str(round(spec.scale.greatest_speed * rng.uniform(0.02, 0.5), 3) or 0.001)))
-    return replace(spec, health=True, health_edges=edges, health_errors=errors, over_speed=limit, compare=compare)
+    return replace(spec, health=Health(edges, errors), over_speed=limit, compare=compare)
 
 
 def filter_of(method: str, clocks: int, tick_cycles: int) -> int:
@@ -238,7 +239,7 @@ def _lost_counts(spec: TachometerSpec, encoding: Encoding, trace: PinTrace, run:
 
     Jitter makes an edge come early or late, but never twice or not at all.
     """
-    if len(run.errors) or run.ticks.get("swallowed_edges")[-1] or spec.index_reset:
+    if len(run.errors) or run.ticks.get("swallowed_edges")[-1] or spec.front_end.index_resets:
         return []
     sampled = (run.ticks.clock - spec.latency.tick - spec.latency.pin_to_count) / CLOCK_HZ
     turned = encoding.true_position(sampled, spec.encoder.decoding) - _before_known(spec, trace)

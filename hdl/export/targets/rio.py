@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from tachometry.hdl.export.render import render_files
+from tachometry.spec.core.front_end import OF_CONTROLS
 from tachometry.spec.core.ports import bound_ports
 from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.language.option import ParameterError
@@ -83,11 +84,10 @@ def rio(spec: TachometerSpec, name: str, bus: Bus | None, made: Mapping[str, str
 
 def _check(spec: TachometerSpec, values: Iterable[Port]) -> None:
     for name in spec.front_end.controls:
-        option = {"preset": "preset", "home": "index_once"}[name]
-        raise ParameterError(option, "must not be given for RIO, which has no pin for it")
+        raise ParameterError(OF_CONTROLS[name], "must not be given for RIO, which has no pin for it")
     if spec.stream:
         raise ParameterError("stream", "must not be given for RIO, which has no DMA for it")
-    if spec.index_reset:
+    if spec.front_end.index_resets:
         raise ParameterError("index_reset", "must not be given for RIO: its pin index-enable resets the position")
     for port in values:
         if port.width > WORD:
@@ -102,7 +102,9 @@ def hal_pins(spec: TachometerSpec) -> dict[str, HalPin]:
         "velocity": HalPin("float", "Velocity, in units of the position per second.", "velocity"),
         "velocity-rpm": HalPin("float", "Velocity of the encoder in rpm, whatever position-scale is.", "velocity"),
         "position": HalPin("float", "The sum of count and position-offset, divided by position-scale.", "position"),
-        "count": HalPin("s32", "Counts since power-up" + ", or since the index that reset them." * spec.index),
+        "count": HalPin(
+            "s32", "Counts since power-up" + (", or since the index that reset them." if spec.index else "")
+        ),
     }
     if spec.index:
         help = "While it is true, the next index sets count to 0, and this to false."

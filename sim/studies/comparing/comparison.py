@@ -216,7 +216,7 @@ class _Trial:
         if not speed:
             raise ValueError("--motion must move the shaft where there is a --tradeoff")
         found: dict[str, list[Cost]] = {}
-        index = any(spec is not None and spec.index for spec in specs.values())
+        index = any(spec is not None and spec.index is not None for spec in specs.values())
         moving = VirtualEncoder.of(self.encoder, index=index).record(parse_motion(triangle(speed)))
         tick_s = float(self.instants[1] - self.instants[0])
         after = common_instants([], moving.recording.duration, tick_s, SETTLED_S)

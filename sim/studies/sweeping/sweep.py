@@ -61,8 +61,8 @@ _CORE: dict[str, tuple[str, str, Callable[[TachometerSpec], Any]]] = {
     "max_speed_rad_s": ("float", "rad/s", lambda spec: spec.max_speed and spec.max_speed.rad_per_s),
     "position_width": ("int", "bits", lambda spec: spec.position_width),
     "filter": ("int", "clocks", lambda spec: spec.filter_clocks),
-    "index": ("bool", "as the option", lambda spec: spec.index),
-    "index_reset": ("bool", "as the option", lambda spec: spec.index_reset),
+    "index": ("bool", "as the option", lambda spec: spec.index is not None),
+    "index_reset": ("bool", "as the option", lambda spec: spec.front_end.index_resets),
     "age": ("bool", "as the option", lambda spec: spec.age),
     "bounds": ("bool", "as the option", lambda spec: spec.bounds),
     "edge_error": (

@@ -8,13 +8,14 @@ from support.simulate import clock_by_clock
 from tachometry.hdl.core import axes_registers
 from tachometry.sim.golden.axes_registers import GoldenAxesBank
 from tachometry.spec import AxesSpec
+from tachometry.spec.core.index import Index
 from tachometry.spec.registers.axes import AxesMap
 
 
 @pytest.mark.parametrize(
     ("seed", "spec"),
     [
-        (5, small(3, parallel=True, index=True)),
+        (5, small(3, parallel=True, index=Index())),
         (4, small(2, parallel=True, most=None, velocity_width=9, external_tick=True, position_width=40)),
     ],
 )
@@ -41,7 +42,7 @@ def test_registers_are_those_of_the_golden_model(seed: int, spec: AxesSpec) -> N
 
 
 def test_every_axis_has_a_window_of_the_same_size() -> None:
-    spec = small(3, parallel=True, index=True)
+    spec = small(3, parallel=True, index=Index())
     registers = AxesMap(spec.tachometer, spec)
     windows = [[one for one in registers if one.name.endswith(f"_{axis}")] for axis in range(3)]
     assert [one.offset - windows[0][0].offset for one in windows[2]] == [

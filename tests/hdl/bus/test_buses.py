@@ -28,6 +28,7 @@ from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.golden.registers import Access, GoldenBank
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import Encoder, STachometer, Timing
+from tachometry.spec.core.index import Index
 from tachometry.spec.language.port import Port
 from tachometry.spec.registers.buses import BUSES, CAPTURE
 from tachometry.spec.registers.map import RegisterMap
@@ -37,7 +38,7 @@ SPEC = STachometer(
     encoder=Encoder(8, 4),
     timing=Timing(1_000_000, 8, 20),
     position_width=48,
-    index=True,
+    index=Index(),
     age=True,
     filter_clocks=2,
     external_tick=True,

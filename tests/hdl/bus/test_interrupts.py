@@ -24,6 +24,7 @@ from tachometry.sim.signals.axes import AxesTrace
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.spec import AxesSpec, ParameterError, Timing, of_texts
 from tachometry.spec.control import AnySpec, LoopSpec
+from tachometry.spec.core.index import Index
 from tachometry.spec.registers.axes import AxesMap
 from tachometry.spec.registers.buses import BUSES, bus_of, ports_on, registers_on
 from tachometry.spec.registers.map import RegisterMap
@@ -33,7 +34,7 @@ CORES: dict[str, AnySpec] = {
     "s": of_texts("s", BASE | {"index": "yes", "health": "yes", "health-errors": "0", "over-speed": "200rev/s"}),
     "external ticks": of_texts("m", BASE | {"external-tick": "yes", "max-speed": "200rev/s"}),
     "rairan": of_texts("rairan", BASE | {"tick": "20clk"}),
-    "axes": small(2, parallel=True, index=True),
+    "axes": small(2, parallel=True, index=Index()),
     "loop": replace(SMALL, tachometer=replace(SMALL.tachometer, timing=Timing(1_000_000, 100, 3)), gains="inputs"),
 }
 CLOCKS = 3000

@@ -10,17 +10,18 @@ from tachometry.sim import golden
 from tachometry.sim.signals.axes import AxesTrace
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import AxesSpec
+from tachometry.spec.core.index import Index
 
 SPECS = {
     "three axes": small(),
-    "one axis": small(1, index=True, cancel=False),
-    "two held": small(2, parallel=True, index=True),
+    "one axis": small(1, index=Index(), cancel=False),
+    "two held": small(2, parallel=True, index=Index()),
     "no greatest speed": small(3, most=None, position_width=8),
-    "rpm, and an index that resets": small(3, unit="rpm", index=True, index_reset=True, tick=60),
+    "rpm, and an index that resets": small(3, unit="rpm", index=Index(reset=True), tick=60),
     "few bits": small(2, most=None, velocity_width=9, parallel=True),
-    "filter": small(3, filter_clocks=5, index=True),
+    "filter": small(3, filter_clocks=5, index=Index()),
     "ticks from outside, held": small(2, external_tick=True, filter_clocks=1, parallel=True),
-    "all": small(3, external_tick=True, tick=60, unit="rad/s", index=True, index_reset=True),
+    "all": small(3, external_tick=True, tick=60, unit="rad/s", index=Index(reset=True)),
 }
 
 
@@ -60,7 +61,7 @@ def test_the_first_edge_that_counts_is_between_the_looks_of_the_second_and_third
 
 def test_a_run_that_ends_earlier_has_the_same_rows_until_then() -> None:
     """Wherever it ends."""
-    spec = small(2, index=True)
+    spec = small(2, index=Index())
     trace = motions(spec, 400)
     whole = golden.run(spec, trace)
     for n_clocks in range(300, 400):
@@ -75,7 +76,7 @@ def test_a_run_that_ends_earlier_has_the_same_rows_until_then() -> None:
 
 def test_a_reset_clears_what_is_in_memory() -> None:
     """The content of the memories at a reset does not matter."""
-    spec = small(2, index=True)
+    spec = small(2, index=Index())
     trace, names = motions(spec, 900), [port.name for port in spec.ports.outputs]
     rows: list[dict[str, int]] = [{} for _ in range(trace.n_clocks)]
     for clock, *levels in zip(trace.clock.tolist(), *(line.tolist() for line in trace.lines.values()), strict=True):

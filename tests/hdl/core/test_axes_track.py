@@ -13,6 +13,7 @@ from tachometry.sim.engines.pysim import PySim
 from tachometry.sim.signals.run import compare
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import AxesSpec, Encoder, ParameterError, Speed, Timing, TrackTachometer
+from tachometry.spec.core.index import Index
 from tachometry.spec.methods.track_axis import TrackAxis
 
 
@@ -24,7 +25,7 @@ def spec_of(axes: int, tick: int, max_ticks: int = 8, *, parallel: bool = False,
 
 def test_gates_and_golden_model_agree() -> None:
     """Of three axes on two machines, one of which has two in turn; a unit, an index that resets, a filter."""
-    spec = spec_of(3, 960, unit="rpm", index=True, index_reset=True, filter_clocks=3)
+    spec = spec_of(3, 960, unit="rpm", index=Index(reset=True), filter_clocks=3)
     assert spec.plan.machines == 2
     trace = motions(spec, 16 * 960)
     found = lockstep(spec, trace, PySim())

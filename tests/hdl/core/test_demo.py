@@ -13,6 +13,7 @@ from tachometry.boards.host.loop import LoopClient
 from tachometry.boards.monitor.selftest import Step, selftest
 from tachometry.spec import of_texts
 from tachometry.spec.control import LoopSpec
+from tachometry.spec.core.index import Index
 from tachometry.spec.registers.demo import DemoMap, demo_manifest, demo_map
 from tachometry.spec.registers.emulator import EmulatorSettings, fastest, rate_of, speed_of
 
@@ -106,7 +107,7 @@ def test_the_speed_goes_where_it_shall_at_the_rate_that_is_set_with_it() -> None
 
 def test_the_index_is_high_in_a_quarter_of_each_revolution() -> None:
     """Found by the core, which captures its position."""
-    spec = replace(CORES["index, filter, age"], index=True)
+    spec = replace(CORES["index, filter, age"], index=Index())
     board = DemoBoard(DemoPort(spec), demo_manifest(DemoMap(spec), uart()), timeout=60)
     board.set(emulated=1, speed=speed_of(spec, 0.1 * fastest(spec)))
     seen = set()

@@ -19,6 +19,7 @@ from tachometry.sim import golden
 from tachometry.sim.golden.control import run_loop
 from tachometry.sim.signals.run import compare
 from tachometry.spec import Encoder, ParameterError, Timing, TTachometer
+from tachometry.spec.core.index import Index
 
 CORE = replace(SMALL, tachometer=replace(SMALL.tachometer, timing=Timing(1_000_000, 100, 3)))
 
@@ -34,7 +35,7 @@ def test_as_the_golden_model() -> None:
 
 def test_exported_verilog_in_icarus(tmp_path: Path) -> None:
     """With a generator, gains as inputs, and a method and options of the tachometer that change nothing about it."""
-    options: dict[str, Any] = {"lowpass": Fraction(4000), "filter_clocks": 3, "index": True, "index_reset": True}
+    options: dict[str, Any] = {"lowpass": Fraction(4000), "filter_clocks": 3, "index": Index(reset=True)}
     tachometer = TTachometer(encoder=Encoder(500), timing=Timing(1_000_000, 100, 3), frac_bits=6, **options)
     spec = replace(SERIAL, tachometer=tachometer, command="generator", gains="inputs")
     trace, commands, gains, changes = core_case(spec, 3, 5)

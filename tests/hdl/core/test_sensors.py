@@ -59,7 +59,7 @@ def test_the_virtual_encoder_makes_what_the_core_counts(sensor: str) -> None:
     """Also one that is mounted the other way round, with lines that are inverted."""
     texts = BASE | CASES[sensor] | {"sensor": sensor, "filter": "0"}
     spec = of_texts("s", texts)
-    encoder = VirtualEncoder.of(spec.encoder, index=spec.index, jitter=0.2, seed=3, start_angle_rad=0.013)
+    encoder = VirtualEncoder.of(spec.encoder, index=spec.index is not None, jitter=0.2, seed=3, start_angle_rad=0.013)
     truth = encoder.record(parse_motion("ramp:0:90rad/s:30ms+sine:60rad/s:40Hz:40ms+constant:150rad/s:60ms"))
     found = golden.run(spec, PinTrace.of(truth.recording, spec))
     assert len(found.errors) == 0

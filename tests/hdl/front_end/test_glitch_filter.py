@@ -13,6 +13,7 @@ from tachometry.sim.golden.front_end import filter_line
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import Encoder, STachometer, Timing
+from tachometry.spec.core.index import Index
 
 
 def definition(levels: list[int], clocks: int) -> tuple[list[int], int]:
@@ -84,7 +85,12 @@ def test_the_first_samples_are_filtered(line: str) -> None:
     """Neither a step nor an error comes of what rattles at first, whatever level the lines rest at."""
     rattles = [[1], [0, 1], [1, 1, 1, 1], [0, 0, 0, 0, 1], [1, 0, 1, 1, 0, 0, 0, 0, 1, 0, 1]]
     spec = STachometer(
-        encoder=Encoder(25), timing=Timing(1_000_000, 4, 3), filter_clocks=5, index=True, position_width=8, frac_bits=4
+        encoder=Encoder(25),
+        timing=Timing(1_000_000, 4, 3),
+        filter_clocks=5,
+        index=Index(),
+        position_width=8,
+        frac_bits=4,
     )
     for rest, rattle in itertools.product((0, 1), rattles):
         lines = {name: np.full(60, rest, dtype=np.uint8) for name in ("a", "b", "z")}

@@ -8,6 +8,7 @@ from tachometry.sim.engines.pysim import PySim
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import compare
 from tachometry.spec import Encoder, STachometer, Timing
+from tachometry.spec.core.index import Index
 
 # A forward edge at each of the clocks 10, 20 … 90; Z rises with the fourth of them.
 CLOCK = np.arange(0, 100, 10)
@@ -19,9 +20,7 @@ def make_spec(*, reset: bool = False, filter_clocks: int = 0) -> STachometer:
     return STachometer(
         encoder=Encoder(25),
         timing=Timing(1_000_000, 4, 4),
-        index=True,
-        index_at="edge",
-        index_reset=reset,
+        index=Index(reset, "edge"),
         filter_clocks=filter_clocks,
     )
 

@@ -1,6 +1,5 @@
 """Lines that equal their complements: for how long they may, and what is told of it."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -113,8 +112,6 @@ def test_what_cannot_be(texts: dict[str, str], message: str) -> None:
 def test_complements_are_watched_with_health() -> None:
     with pytest.raises(ParameterError, match="complements must be given together with --health"):
         of_texts("m", {"ppr": "8", "clock": "1MHz", "complements": "1us"})
-    with pytest.raises(ParameterError, match="complements must be given together with --health"):
-        replace(spec_of(CASES[0]), health=False)
 
 
 def test_an_encoder_without_complements_breaks_none() -> None:

@@ -13,6 +13,7 @@ from tachometry.sim.encoder.stress import stress
 from tachometry.sim.signals.axes import AxesTrace
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import AxesSpec, Encoder, Speed, STachometer, TachometerSpec, Timing
+from tachometry.spec.core.index import Index
 
 _EDGES = 10  # of a motion, at each of its speeds
 
@@ -81,7 +82,7 @@ def _case(axes: int, tick_cycles: int, max_ticks: int, mutants: int, *, parallel
         max_speed=Speed.parse("2rev/s"),
         frac_bits=4,
         position_width=8,
-        index=index,
+        index=Index() if index else None,
     )
     spec = AxesSpec(tachometer=alone, axes=axes, parallel=parallel)
     return AxesCase(f"{axes} axes{', held' * parallel}", spec, mutants)

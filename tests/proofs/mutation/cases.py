@@ -14,6 +14,7 @@ from tachometry.hdl import Tachometer
 from tachometry.sim import golden
 from tachometry.sim.signals.run import Run
 from tachometry.spec import METHODS, Encoder, Port, Speed, TachometerSpec, Timing
+from tachometry.spec.core.index import Index
 
 
 @dataclass(frozen=True)
@@ -136,7 +137,7 @@ def _case(
     return Case(f"{method}, {name}", spec, mutants, max_table)
 
 
-_FRONT: dict[str, Any] = {"filter_clocks": 2, "index": True, "index_at": "edge", "index_reset": True}
+_FRONT: dict[str, Any] = {"filter_clocks": 2, "index": Index(reset=True, at="edge")}
 
 # Ticks of an odd number of clocks: inverters in a loop would cancel over an even one.
 CASES = [

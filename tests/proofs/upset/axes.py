@@ -12,12 +12,13 @@ from tachometry.sim.signals.axes import AxesTrace
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run
 from tachometry.spec import AxesSpec, Encoder, STachometer, Timing
+from tachometry.spec.core.index import Index
 
 _CYCLES = 15  # of a motion
 _OF_POSITION = ("position", "index_position")  # and what is held of an axis
 
 SPEC = AxesSpec(
-    tachometer=STachometer(encoder=Encoder(500), timing=Timing(5_000_000, 120, 20), index=True),
+    tachometer=STachometer(encoder=Encoder(500), timing=Timing(5_000_000, 120, 20), index=Index()),
     axes=3,
 )
 

@@ -16,6 +16,8 @@ from tachometry.sim.signals.run import Run
 from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
 from tachometry.spec.control import AnySpec
 from tachometry.spec.core.compare import Compare
+from tachometry.spec.core.health import Health
+from tachometry.spec.core.index import Index
 
 TICK_CYCLES, MAX_TICKS = 100, 20
 _OPTIONS: dict[str, dict[str, Any]] = {"m": {"average": 10}}
@@ -25,8 +27,14 @@ UPSET = [method for method in METHODS if method != "track"]
 # What a core of M may have beside, which must not keep the velocity from recovering; proofs are about these outputs.
 OUTPUTS = "m, outputs"
 _OUTPUTS = {
-    **{"index": True, "index_once": True, "preset": 0, "position_modulo": "7", "probe": "both", "health": True},
-    **{"complements": 4, "over_speed": Speed.parse("1rad/s"), "compare": Compare(2, 3, 0, "7clk", "both")},
+    **{
+        "index": Index(once=True),
+        "preset": 0,
+        "position_modulo": "7",
+        "probe": "both",
+        "health": Health(complements=4),
+    },
+    **{"over_speed": Speed.parse("1rad/s"), "compare": Compare(2, 3, 0, "7clk", "both")},
 }
 
 

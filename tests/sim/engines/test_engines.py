@@ -21,6 +21,7 @@ from tachometry.sim.engines.pysim import PySim
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import compare
 from tachometry.spec import METHODS, Encoder, MTachometer, STachometer, Timing
+from tachometry.spec.core.index import Index
 
 COMPILED = [name for name in ENGINES if name != "pysim"]
 SPEC = STachometer(encoder=Encoder(100), timing=Timing(20_000, 20, 10))
@@ -109,7 +110,7 @@ def test_an_interrupt_brings_what_was_simulated(name: str, tmp_path: Path) -> No
 @pytest.mark.parametrize("name", ENGINES)
 def test_a_line_that_is_missing_is_told(name: str) -> None:
     with pytest.raises(ValueError, match="the trace must have the lines of the core, and lacks z"):
-        pick(name).run(replace(SPEC, index=True), turning(100))
+        pick(name).run(replace(SPEC, index=Index()), turning(100))
 
 
 def test_auto_with_and_without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,6 +7,7 @@ import pytest
 
 from tachometry.sim.signals.run import Mismatch, Run, Table, compare
 from tachometry.spec import METHODS, Encoder, TachometerSpec, Timing
+from tachometry.spec.core.index import Index
 
 TIMING = Timing(1_000_000, 1000, 64)
 N_ROWS = 4
@@ -15,7 +16,7 @@ N_ROWS = 4
 def spec_of(method: str) -> TachometerSpec:
     """Return a core with as many outputs as the method can have."""
     bounds = METHODS[method].facts.bounds
-    options: dict[str, object] = {"bounds": bounds, "age": True, "index": True, "filter_clocks": 2, "unit": "rpm"}
+    options: dict[str, object] = {"bounds": bounds, "age": True, "index": Index(), "filter_clocks": 2, "unit": "rpm"}
     own: dict[str, object] = (
         {"adaptive": Fraction(1, 10)} if method == "rairan" else {"external_tick": True, "max_tick_cycles": 2000}
     )

@@ -5,7 +5,7 @@ from itertools import combinations, product
 import pytest
 
 from tachometry.sim.studies.pairs import apart, configurations, factors, rows, spec_of
-from tachometry.spec import METHODS, TachometerSpec, common_options, own_options
+from tachometry.spec import METHODS, common_options, own_options
 
 # What cannot be together at all, of every method that has both.
 APART = {
@@ -80,10 +80,7 @@ def test_the_extremes_are_there() -> None:
     assert sum(map(len, cores.values())) >= 73
 
     def values(method: str, *names: str) -> set[tuple[object, ...]]:
-        def value(spec: TachometerSpec, name: str) -> object:
-            return getattr(spec.timing, name) if hasattr(spec.timing, name) else getattr(spec, name)
-
-        return {tuple(value(spec, name) for name in names) for spec in cores[method]}
+        return {tuple(spec.parameters[name] for name in names) for spec in cores[method]}
 
     assert values("s", "tick_cycles", "max_ticks") == set(product((1, 2, 3, 960), (2, 3, 500, 4096)))
     assert values("s", "index", "index_reset") == {(False, False), (True, False), (True, True)}

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from tachometry.spec import Encoder, MTachometer, Speed, STachometer, Timing
+from tachometry.spec.core.index import Index
 
 UNITS = {"rad/s": 2 * Fraction(math.pi), "rev/s": Fraction(1), "rpm": Fraction(60)}  # of a revolution per second
 
@@ -46,7 +47,7 @@ def test_range_of_the_lsb(unit: str) -> None:
 
 
 def test_ports_that_have_a_sign_and_those_of_16_bits() -> None:
-    spec = spec_of(index=True, filter_clocks=2, bounds=True, position_width=40)
+    spec = spec_of(index=Index(), filter_clocks=2, bounds=True, position_width=40)
     signed = [port.name for port in spec.ports if port.signed]
     assert signed == ["velocity", "pulse_count", "position", "velocity_lower", "velocity_upper", "index_position"]
     widths = {port.name: port.width for port in spec.ports}

@@ -28,6 +28,7 @@ from tachometry.spec import (
     own_options,
 )
 from tachometry.spec.control import AnySpec
+from tachometry.spec.core.index import Index
 from tachometry.spec.language.units import PI, Speed
 from tachometry.spec.methods.axes import AxesSpec
 from tachometry.spec.registers.buses import BUSES
@@ -89,9 +90,7 @@ def test_every_option_does_what_it_says() -> None:
         max_speed=Speed.parse("900rpm"),
         position_width=20,
         filter_clocks=3,
-        index=True,
-        index_reset=True,
-        index_at="A=1",
+        index=Index(reset=True, at="A=1"),
         age=True,
         bounds=True,
         edge_error=Fraction(1, 4),

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from tachometry.spec import AxesSpec, Encoder, ParameterError, Speed, STachometer, Timing, of_texts, with_axes
+from tachometry.spec.core.index import Index
 from tachometry.spec.registers.manifest import manifest
 
 ALONE = STachometer(
@@ -52,14 +53,14 @@ def test_it_is_the_same_in_another_process() -> None:
 
 def test_ports() -> None:
     assert not AxesSpec(tachometer=ALONE, axes=2).parallel
-    strobed = {port.name: port.width for port in spec_of(5, index=True).ports}
+    strobed = {port.name: port.width for port in spec_of(5, index=Index()).ports}
     assert {name: strobed[name] for name in ("a", "b", "z", "axis", "decode_error_axis", "index_axis")} == {
         **dict.fromkeys(("a", "b", "z"), 5),
         **dict.fromkeys(("axis", "decode_error_axis", "index_axis"), 3),
     }
     widths = [next(port.width for port in spec_of(axes).ports if port.name == "axis") for axes in (1, 2, 8, 9)]
     assert widths == [1, 1, 3, 4]  # no port has no bits
-    held = spec_of(5, index=True, parallel=True)
+    held = spec_of(5, index=Index(), parallel=True)
     values = {name for strobe in held.axis.ports.strobes.values() for name in strobe}
     assert {port.name for port in held.ports} == {
         *strobed.keys() - values,
@@ -142,7 +143,7 @@ def test_after_an_upset_an_axis_is_right_as_late_as_a_core_of_its_own() -> None:
     [
         (0, {}, "axes must be from 1 to 64, not 0"),
         (65, {}, "axes must be from 1 to 64, not 65"),
-        (8, {"unit": "rpm", "velocity_width": 22, "filter_clocks": 2, "index": True, "index_reset": True}, ""),
+        (8, {"unit": "rpm", "velocity_width": 22, "filter_clocks": 2, "index": Index(reset=True)}, ""),
         (8, {"external_tick": True}, ""),
         (8, {"age": True}, "age must not be given together with --axes: what counts the ticks is for one axis"),
         (8, {"bounds": True}, "bounds must not be given together with --axes: "),

@@ -17,6 +17,7 @@ from tachometry.hdl.export import export
 from tachometry.sim import build
 from tachometry.spec import AxesSpec, ParameterError, of_options, of_texts
 from tachometry.spec.control import AnySpec
+from tachometry.spec.core.index import Index
 from tachometry.spec.registers.buses import bus_of, registers_on
 from tachometry.spec.registers.map import RegisterMap
 
@@ -25,7 +26,7 @@ LOOP = {"method": "m", "tick": "200us", "max-time": "2ms", "loop": "yes", "gains
 CORES: dict[str, tuple[AnySpec, str, bool]] = {
     "irq": (of_texts("s", BASE | {"index": "yes", "position-width": "40"}), "axi-lite", True),
     "apb": (of_texts("mt", BASE), "apb", False),
-    "axes": (small(2, parallel=True, index=True), "axi-lite", True),
+    "axes": (small(2, parallel=True, index=Index()), "axi-lite", True),
     "loop": (of_options(BASE | LOOP), "axi-lite", False),
     "wishbone": (of_texts("track", BASE | {"tick": "1ms", "max-time": "10ms"}), "wishbone", False),
 }

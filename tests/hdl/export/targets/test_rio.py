@@ -23,6 +23,7 @@ from tachometry.hdl.export.targets.rio import hal_pins
 from tachometry.sim import build, golden
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import METHODS, ParameterError, TachometerSpec, of_texts
+from tachometry.spec.core.index import Index
 from tachometry.spec.language.port import INDEX, TICK, UPDATE
 
 PAGE = docs.page("guides/linuxcnc.md")
@@ -76,7 +77,7 @@ SEEDS = (141, 170)
 def case(seed: int) -> tuple[TachometerSpec, PinTrace]:
     spec, _, trace = random_case(seed, "s")
     # The position wraps often.
-    spec = replace(spec, index_reset=False, position_width=8, age=True)
+    spec = replace(spec, index=Index(), position_width=8, age=True)
     assert spec.index
     assert spec.filter_clocks
     return spec, trace
