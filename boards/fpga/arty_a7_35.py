@@ -1,21 +1,12 @@
 """The Arty A7-35 has an Artix-7, and is built with Vivado."""
 
-from typing import Any
-
-from tachometry.boards.fpga.board import Board, Header, pins
-
-
-def _platform() -> Any:
-    from amaranth_boards.arty_a7 import ArtyA7_35Platform
-
-    return ArtyA7_35Platform()
-
+from tachometry.boards.fpga.board import Board, Header, pins, platform
 
 ARTY_A7_35 = Board(
     name="arty-a7-35",
     title="Arty A7-35, Artix-7 XC7A35T",
     clock_hz=100_000_000,
-    platform=_platform,
+    platform=platform("arty_a7:ArtyA7_35Platform"),
     headers=(
         # Of JA and JD the lines have resistors of 200 Ω. The emulator is below the encoder: three jumpers join them.
         Header(

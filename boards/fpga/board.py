@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pkgutil import resolve_name
 from typing import Any
 
 from tachometry.boards.fpga.flow import Flow
@@ -10,6 +11,11 @@ from tachometry.boards.fpga.flow import Flow
 def pins(text: str) -> dict[str, str]:
     """Return pins by the ports that are on them, of words such as `a:25`."""
     return {port: pin for port, pin in (word.split(":") for word in text.split())}
+
+
+def platform(name: str, **options: str) -> Callable[[], Any]:
+    """Return what makes the platform `module:Class` of amaranth-boards, which is of the extra `boards`."""
+    return lambda: resolve_name(f"amaranth_boards.{name}")(**options)
 
 
 @dataclass(frozen=True)
@@ -29,8 +35,7 @@ class Board:
     name: str  # on the command line
     title: str  # the board and its FPGA, for people
     clock_hz: int  # frequency of its oscillator, at which the core runs: there is no PLL
-    # makes the platform of amaranth-boards, which is of the extra `boards`, and imported only here
-    platform: Callable[[], Any]
+    platform: Callable[[], Any]  # makes the platform of amaranth-boards, which is imported only then
     headers: tuple[Header, ...]
     attributes: Mapping[str, object]  # of every pin of a header: its voltage
     pull_up: Mapping[str, object]  # also of inputs

@@ -1,21 +1,12 @@
 """The DE10-Nano has a Cyclone V, and is built with Quartus."""
 
-from typing import Any
-
-from tachometry.boards.fpga.board import Board, Header, pins
-
-
-def _platform() -> Any:
-    from amaranth_boards.de10_nano import DE10NanoPlatform
-
-    return DE10NanoPlatform()
-
+from tachometry.boards.fpga.board import Board, Header, pins, platform
 
 DE10_NANO = Board(
     name="de10-nano",
     title="DE10-Nano, Cyclone V 5CSEBA6",
     clock_hz=50_000_000,
-    platform=_platform,
+    platform=platform("de10_nano:DE10NanoPlatform"),
     headers=(
         # The emulator is beside the encoder: three jumpers join them.
         Header(

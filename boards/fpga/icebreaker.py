@@ -1,22 +1,13 @@
 """The iCEBreaker has an iCE40UP5K and three PMODs."""
 
-from typing import Any
-
-from tachometry.boards.fpga.board import Board, Header, pins
+from tachometry.boards.fpga.board import Board, Header, pins, platform
 from tachometry.boards.fpga.flow import ice40
-
-
-def _platform() -> Any:
-    from amaranth_boards.icebreaker import ICEBreakerPlatform
-
-    return ICEBreakerPlatform()
-
 
 ICEBREAKER = Board(
     name="icebreaker",
     title="iCEBreaker, iCE40UP5K",
     clock_hz=12_000_000,
-    platform=_platform,
+    platform=platform("icebreaker:ICEBreakerPlatform"),
     headers=(
         # The emulator is below the encoder: three jumpers join them.
         Header(

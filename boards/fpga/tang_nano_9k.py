@@ -1,24 +1,16 @@
 """The Tang Nano 9K has a Gowin GW1NR-9C."""
 
-from typing import Any
-
-from tachometry.boards.fpga.board import Board, Header, pins
+from tachometry.boards.fpga.board import Board, Header, pins, platform
 from tachometry.boards.fpga.flow import gowin
 
 _PART = "GW1NR-LV9QN88PC6/I5"
-
-
-def _platform() -> Any:
-    from amaranth_boards.tang_nano_9k import TangNano9kPlatform
-
-    return TangNano9kPlatform(toolchain="Apicula")
 
 
 TANG_NANO_9K = Board(
     name="tang-nano-9k",
     title="Tang Nano 9K, GW1NR-9C",
     clock_hz=27_000_000,
-    platform=_platform,
+    platform=platform("tang_nano_9k:TangNano9kPlatform", toolchain="Apicula"),
     headers=(
         # Pins with 3.3 V: those from 79 on have 1.8 V.
         Header(

@@ -1,22 +1,15 @@
 """The ULX3S comes with ECP5 of four sizes."""
 
-from typing import Any
-
-from tachometry.boards.fpga.board import Board, Header, pins
+from tachometry.boards.fpga.board import Board, Header, pins, platform
 from tachometry.boards.fpga.flow import ecp5
 
 
 def _board(size: int, die: int) -> Board:
-    def platform() -> Any:
-        import amaranth_boards.ulx3s
-
-        return getattr(amaranth_boards.ulx3s, f"ULX3S_{size}F_Platform")()
-
     return Board(
         name=f"ulx3s-{size}f",
         title=f"ULX3S, ECP5 LFE5U-{size}F",
         clock_hz=25_000_000,
-        platform=platform,
+        platform=platform(f"ulx3s:ULX3S_{size}F_Platform"),
         headers=(
             # The emulator is beside the encoder: three jumpers join them.
             Header(
