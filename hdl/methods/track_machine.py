@@ -5,7 +5,8 @@ from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.methods.track_unit import QuickUnit, SmallUnit
+from tachometry.hdl.methods.small_unit import SmallUnit
+from tachometry.hdl.methods.track_unit import QuickUnit
 from tachometry.spec.formats.tracking import PLACE_BITS, WIDTH
 from tachometry.spec.formats.tracking_code import (
     ADDRESS_BITS,

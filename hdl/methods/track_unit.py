@@ -8,7 +8,6 @@ from collections.abc import Sequence
 
 from amaranth import Array, C, Cat, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
-from amaranth.lib.enum import Enum
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
@@ -26,7 +25,7 @@ from tachometry.spec.formats.tracking import (
     WIDTH,
 )
 from tachometry.spec.formats.tracking_code import BY_FACTOR, HOW_BITS, Program
-from tachometry.spec.formats.tracking_units import Small, Start
+from tachometry.spec.formats.tracking_units import Start
 
 TABLE_BITS = 18
 _LOW = CHANCE_BITS - DROPPED  # zeros below a product
@@ -240,161 +239,3 @@ class QuickUnit(Unit):
             m.d.comb += following.eq(Mux(places[place], value >> (1 << place), value))
             value = following
         return value
-
-
-class State(Enum):
-    """Lists what the small unit does."""
-
-    RESTS = 0
-    READS = 1  # the table
-    ADDS = 2
-    SHIFTS = 3
-
-
-class SmallUnit(Unit):
-    """One register that takes what is added at its top, and goes to the right by 2 or by 8 places; see `Small`.
-
-    A product takes two bits of the factor a clock, as a digit 0, 1, 2 or −1. All else is added once: as it is; twice if
-    it goes to the right by an odd number of places; its bits inverted if its logarithm is meant and it is negative.
-    """
-
-    @property
-    def factor_bits(self) -> int:
-        return 2 * Small(self._program.form).digits
-
-    def _work(self, m: Module) -> None:
-        bits, doing, table = self._bits, self.doing, self.table.data
-        small = Small(self._program.form)
-        low, width = small.low, small.low + WIDTH
-        state = Signal(State)
-        work = Signal(signed(width), reset_less=True)
-        operand = Signal(signed(WIDTH), reset_less=True)
-        steps = Signal(range(small.digits + 1), reset_less=True)
-        pairs = Signal(signed(6), reset_less=True)  # of places that it went; below 0 those that it is still to go
-        names = ("log", "factor", "product", "read", "doubled", "nothing")
-        flags = (Signal(name=f"is_{name}", reset_less=True) for name in names)
-        is_log, is_factor, is_product, is_read, doubled, nothing = flags
-        seeks = is_log | is_factor
-        begins = (doing != Start.NONE) & (doing != Start.CHANCE)
-        reads, adds, shifts = (state == item for item in (State.READS, State.ADDS, State.SHIFTS))
-        # What is added next: a digit of the factor, which turns meanwhile, or all at once.
-        before = Signal()
-        owed = Signal()
-        minus = Signal()
-        multiplies = Signal()
-        code = Signal(2)
-        how = self.how_done
-        named_odd = Array(C(shift % 2, 1) for _, shift in self.shifts)[how]
-        finds = (doing == Start.LOG) | (doing == Start.BY)
-        by_factor = how == BY_FACTOR
-        whole = self.whole
-        too_small = whole[-1] & ~whole[4:-1].all()
-        too_large = ~whole[-1] & (whole[6:-1].any() | (whole[5] & whole[2:5].any()))  # at least 2^36
-        odd = Mux(doing == Start.EXP, ~whole[0] & ~too_large, Mux(by_factor, self.places[0], named_odd)) & ~finds
-        now_doubled = Mux(begins, odd, doubled)
-        digits = Mux(now_doubled, Cat(before, self.factor[0]), self.factor[:2])
-        digit = Signal(3)  # 4 is a digit 0 that owes
-        m.d.comb += [
-            multiplies.eq(Mux(begins, doing == Start.TIMES, adds & is_product & (steps != small.digits))),
-            digit.eq(Cat(digits[0] ^ owed, digits[1] ^ (digits[0] & owed), digits.all() & owed)),
-        ]
-        once = Mux(begins, Mux(finds & self.sum[-1], 3, 1 + odd), Mux(nothing, 0, 1 + doubled))
-        m.d.sync += [
-            code.eq(Mux(multiplies, digit[:2], once) & (begins | reads | multiplies).replicate(2)),
-            owed.eq(multiplies & (digit[2] | digit[:2].all())),
-            minus.eq(multiplies & digit[:2].all()),
-            before.eq(multiplies & self.factor[1]),
-            steps.eq(Mux(multiplies, steps + 1, 0)),
-        ]
-        addend = Signal(signed(WIDTH + 2))
-        with m.Switch(code):
-            with m.Case(0):
-                pass
-            with m.Case(1):
-                m.d.comb += addend.eq(operand)
-            with m.Case(2):
-                m.d.comb += addend.eq(operand << 1)
-            with m.Case(3):
-                m.d.comb += addend.eq(~operand)
-        total = Signal(signed(WIDTH + 2))
-        m.d.comb += total.eq((Cat(C(1, 1), work[low:]).as_signed() + Cat(minus, addend).as_signed()) >> 1)
-        # Where it goes.
-        by_8, by_2, ends, large = (Signal(name=name) for name in ("by_8", "by_2", "ends", "large"))
-        far = work[bits + 7 :].any()
-        beyond_8 = (seeks & far) | (is_log & work[CHANCE_BITS + 8 : bits + 7].any())
-        beyond_2 = (seeks & (far | work[bits + 1 : bits + 7].any())) | (is_log & work[CHANCE_BITS + 2 : bits + 1].any())
-        m.d.comb += [
-            by_8.eq(shifts & ((pairs[-1] & ~(pairs[2:].all() & pairs[:2].any())) | beyond_8)),
-            by_2.eq(shifts & ~by_8 & (pairs[-1] | beyond_2)),
-            ends.eq(shifts & ~by_8 & ~by_2),
-            large.eq(ends & is_product & self.too_large(work)),
-        ]
-        with m.If(adds | by_8 | by_2):
-            m.d.sync += work.eq(Mux(by_8, work >> 8, Cat(work[2:low], total)))
-        with m.If(begins):
-            m.d.sync += work.eq(0)
-        with m.If(large):
-            m.d.sync += work[CHANCE_BITS : CHANCE_BITS + RESULT_BITS].eq(0)
-            m.d.sync += work[CHANCE_BITS + RESULT_BITS].eq(1)
-            m.d.sync += work[CHANCE_BITS + RESULT_BITS + 1 : CHANCE_BITS + WIDTH].eq(work[-1].replicate(WIDTH))
-        # How many pairs of places it is to go: those of what is done, and those that the operand or the factor says.
-        named = Array(C(-small.pairs(*kind), 6) for kind in self.shifts)[how]
-        more = Signal(6)
-        up = Signal()
-        with m.If(~begins):
-            m.d.comb += more.eq(Mux(by_8, 4, 1))
-        with m.Elif(doing == Start.EXP):
-            m.d.comb += [more.eq(Mux(too_small | whole[6:].any() & ~whole[-1], 31, whole[1:7])), up.eq(whole[0])]
-        with m.Elif(doing == Start.TIMES):
-            m.d.comb += more.eq(self.places[1:])
-        with m.Elif((doing == Start.OVER) & by_factor):
-            m.d.comb += [more.eq(Cat(~self.places[1:], C(1, 1))), up.eq(~self.places[0])]
-        with m.If(begins | by_8 | by_2):
-            m.d.sync += pairs.eq((Cat(C(1, 1), Mux(begins, named, pairs)) + Cat(up, more)) >> 1)
-        with m.If(begins):
-            m.d.sync += [
-                is_log.eq(doing == Start.LOG),
-                is_factor.eq(doing == Start.BY),
-                is_product.eq(doing == Start.TIMES),
-                is_read.eq((doing == Start.LOG) | (doing == Start.GAIN)),
-                nothing.eq(too_small),
-                doubled.eq(odd),
-                self.up.eq(0),
-            ]
-        with m.If(reads):
-            m.d.sync += operand.eq(Cat(C(0, small.table_place), table[:POWER_BITS], C(1, 1)))
-        with m.Elif(begins):
-            m.d.sync += operand.eq(self.sum)
-        with m.If(ends & ~is_log):
-            m.d.sync += self.up.eq((work[:CHANCE_BITS] + self.chance)[-1] & ~large)
-        with m.If(ends & is_factor):
-            m.d.sync += [
-                self.factor.eq(Cat(work[0] & ~work[bits], work[1 : bits + 1])),
-                self.places.eq(Cat(work[bits], pairs[:5])),
-            ]
-        with m.Elif(multiplies):
-            m.d.sync += self.factor.eq(self.factor.rotate_right(2))
-        leading = work[CHANCE_BITS + 1]  # the leading one is there, or one below
-        looked_up = Signal(TABLE_BITS, reset_less=True)  # block RAM is slow
-        m.d.sync += looked_up.eq(Cat(table[:LOG_BITS], Mux(is_log, Cat(leading, pairs[:5]), table[LOG_BITS:])))
-        kept = work[CHANCE_BITS:]
-        m.d.comb += [
-            self.busy.eq(begins | (state != State.RESTS)),
-            self.result.eq(Cat(Mux(is_read, looked_up, kept[:TABLE_BITS]), kept[TABLE_BITS:WIDTH]).as_signed()),
-            self.table.en.eq(begins | ends),
-            self.table.addr.eq(
-                Mux(
-                    doing == Start.EXP,
-                    self.power_address,
-                    Mux(doing == Start.GAIN, self.gain_address, self.log_address(Mux(leading, work >> 1, work))),
-                )
-            ),
-        ]
-        with m.If(begins):
-            m.d.sync += state.eq(Mux((doing == Start.EXP) | (doing == Start.GAIN), State.READS, State.ADDS))
-        with m.Elif(reads):
-            m.d.sync += state.eq(Mux(is_read, State.RESTS, State.ADDS))
-        with m.Elif(adds & ~multiplies):
-            m.d.sync += state.eq(State.SHIFTS)
-        with m.Elif(ends):
-            m.d.sync += state.eq(Mux(is_log, State.READS, State.RESTS))

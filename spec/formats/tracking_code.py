@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cache, cached_property
 
-from tachometry.spec.formats.tracking import GAINS_FROM, LOGS, POWER_BITS, POWERS, Tracking
+from tachometry.spec.formats.tracking import GAINS_FROM, LOGS, POWERS, Tracking
 from tachometry.spec.formats.tracking_listing import LISTING
 from tachometry.spec.formats.tracking_units import Start, Times
 
@@ -359,12 +359,11 @@ class Program:
 
     @cached_property
     def tables(self) -> tuple[int, ...]:
-        """The tables of the unit: powers less their leading bit, logarithms, gains."""
-        powers = [power - (1 << POWER_BITS) for power in POWERS]
+        """The tables of the unit: powers, logarithms, gains."""
         turned = (
             gains[-GAINS_FROM:] + gains[:-GAINS_FROM] for gains in self.form.gains
         )  # so their index is one of log2
-        return (*powers, *LOGS, *(gain for gains in turned for gain in gains))
+        return (*POWERS, *LOGS, *(gain for gains in turned for gain in gains))
 
 
 HOW_BITS = 4

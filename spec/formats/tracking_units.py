@@ -75,8 +75,18 @@ class Small:
         return (self.low - 2 - CHANCE_BITS) // 2
 
     @property
+    def log_end(self) -> int:
+        """Place where the leading one of a number ends whose logarithm is meant, or one above."""
+        return self.form.factor_bits + self.form.factor_bits % 2
+
+    @property
+    def read_pairs(self) -> int:
+        """Pairs of places that what was read goes, a logarithm or that of a gain."""
+        return self.least_pairs + self.table_place // 2
+
+    @property
     def table_place(self) -> int:
-        """Place of the last bit of a power among those that are added."""
+        """Place of the last bit of what was read among those that are added; it is even."""
         return max(0, self._power_place - self.low + 1)
 
     @property
@@ -92,6 +102,9 @@ class Small:
         """Return the pairs of places that an operation goes at least, of 2^0 or by a factor without places."""
         if start == Start.EXP:
             return (self.power_places + 1) // 2
+        if start == Start.LOG:
+            # What it goes to be read; what was read is less.
+            return (self.low - 2 - self.log_end) // 2 - self.read_pairs
         return (shift + 1) // 2 + (self.extra // 2 if start == Start.TIMES else self.least_pairs)
 
     @property
@@ -102,19 +115,25 @@ class Small:
         over = max(self._steps(self.least_pairs + (places + 1) // 2) for places in range(CHANCE_BITS + 2))
         product = max(map(self._steps, range((named + 1) // 2 + 1)))
         log, factor = (
-            max(self._seeks(leading, end) for leading in range(WIDTH - 1))
-            for end in (CHANCE_BITS, self.form.factor_bits - 1)
+            max(self._seeks(leading, pairs, end) for leading in range(WIDTH - 1))
+            for pairs, end in (
+                ((self.low - 2 - self.log_end) // 2, self.log_end),
+                (self.least_pairs, self.form.factor_bits - 1),
+            )
         )
+        read = self._steps(self.read_pairs)
         times = 3 + self.digits + product
-        return Times(log=5 + log, exp=5 + power, over=4 + over, gain=3, by=4 + factor, times=times, stages=3)
+        return Times(
+            log=7 + log + read, exp=5 + power, over=4 + over, gain=5 + read, by=4 + factor, times=times, stages=3
+        )
 
     @staticmethod
     def _steps(pairs: int) -> int:
         return pairs // 4 + pairs % 4
 
-    def _seeks(self, leading: int, end: int) -> int:
-        """Return the steps until a leading one is at a place, or one above."""
-        place, pairs, steps = self.low - 2 + leading, -self.least_pairs, 0
+    def _seeks(self, leading: int, least: int, end: int) -> int:
+        """Return the steps until a leading one is at a place, or one above, some pairs of places further at least."""
+        place, pairs, steps = self.low - 2 + leading, -least, 0
         while pairs < 0 or place >= end + 2:
             far = pairs <= -4 or place >= end + 8
             place, pairs, steps = place - (8 if far else 2), pairs + (4 if far else 1), steps + 1

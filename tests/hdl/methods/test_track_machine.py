@@ -64,7 +64,7 @@ def test_gains_end_with_their_table(name: str) -> None:
     program = CORES[name].program
     unit = track_machine.TrackMachine(program).unit
     rows: list[dict[str, int]] = []
-    right, clocks = [], 8
+    right, clocks = [], 12
     for log_x in range(-2 * 4096 - 1, -13 * 4096, -1777):
         for number in range(3):
             how = program.number(Instruction(start=Start.GAIN, how=str(number)))

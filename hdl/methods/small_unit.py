@@ -1,0 +1,177 @@
+"""The small unit of the tracking machine: one register that is added to, and goes to the right."""
+
+from functools import reduce
+from operator import or_
+
+from amaranth import Array, C, Cat, Module, Mux, Signal, signed
+from amaranth.lib.enum import Enum
+
+from tachometry.hdl.methods.track_unit import Unit
+from tachometry.spec.formats.tracking import CHANCE_BITS, LOG_BITS, RESULT_BITS, WIDTH
+from tachometry.spec.formats.tracking_code import BY_FACTOR
+from tachometry.spec.formats.tracking_units import Small, Start
+
+
+class State(Enum):
+    """Lists what the small unit does."""
+
+    RESTS = 0
+    READS = 1  # the table
+    ADDS = 2
+    SHIFTS = 3
+
+
+class SmallUnit(Unit):
+    """One register that takes what is added at its top, and goes to the right by 2 or by 8 places; see `Small`.
+
+    A product takes two bits of the factor a clock, as a digit 0, 1, 2 or −1. All else is added once: as it is; twice if
+    it goes to the right by an odd number of places; its bits inverted if its logarithm is meant and it is negative.
+    """
+
+    @property
+    def factor_bits(self) -> int:
+        return 2 * Small(self._program.form).digits
+
+    def _work(self, m: Module) -> None:
+        bits, doing, table = self._bits, self.doing, self.table.data
+        small = Small(self._program.form)
+        low, width, end = small.low, small.low + WIDTH, small.log_end
+        state = Signal(State)
+        work = Signal(signed(width), reset_less=True)
+        operand = Signal(signed(WIDTH), reset_less=True)
+        steps = Signal(range(small.digits + 1), reset_less=True)
+        pairs = Signal(signed(6), reset_less=True)  # of places that it went; below 0 those that it is still to go
+        names = ("log", "factor", "product", "read", "over_by", "doubled", "extreme")
+        flags = (Signal(name=f"is_{name}", reset_less=True) for name in names)
+        is_log, is_factor, is_product, is_read, is_over_by, doubled, extreme = flags
+        seeks = is_log | is_factor
+        begins = (doing != Start.NONE) & (doing != Start.CHANCE)
+        rests, reads, adds, shifts = (state == State(number) for number in range(4))
+        # What is added next: a digit of the factor, which turns meanwhile, or all at once.
+        before = Signal()
+        owed = Signal()
+        minus = Signal()
+        multiplies = Signal()
+        code = Signal(2)
+        how = self.how_done
+        named_odd = Array(C(shift % 2, 1) for _, shift in self.shifts)[how]
+        finds = (doing == Start.LOG) | (doing == Start.BY)
+        by_factor = how == BY_FACTOR
+        whole = self.whole
+        too_small = whole[-1] & ~whole[4:-1].all()
+        too_large = ~whole[-1] & (whole[6:-1].any() | (whole[5] & whole[2:5].any()))  # at least 2^36
+        odd = Mux(doing == Start.EXP, ~whole[0] & ~too_large, Mux(by_factor, self.places[0], named_odd))
+        odd &= ~finds & (doing != Start.GAIN)
+        now_doubled = Mux(begins, odd, doubled)
+        digits = Mux(now_doubled, Cat(before, self.factor[0]), self.factor[:2])
+        digit = Signal(3)  # 4 is a digit 0 that owes
+        m.d.comb += [
+            multiplies.eq(Mux(begins, doing == Start.TIMES, adds & is_product & (steps != small.digits))),
+            digit.eq(Cat(digits[0] ^ owed, digits[1] ^ (digits[0] & owed), digits.all() & owed)),
+        ]
+        nothing = extreme & operand[LOG_BITS + 8]
+        once = Mux(begins, Mux(finds & self.sum[-1], 3, 1 + odd), Mux(nothing, 0, 1 + doubled))
+        m.d.sync += [
+            code.eq(Mux(multiplies, digit[:2], once) & (begins | reads | multiplies).replicate(2)),
+            owed.eq(multiplies & (digit[2] | digit[:2].all())),
+            minus.eq(multiplies & digit[:2].all()),
+            before.eq(multiplies & self.factor[1]),
+            steps.eq(Mux(multiplies, steps + 1, 0)),
+        ]
+        addend = Signal(signed(WIDTH + 2))
+        with m.Switch(code):
+            with m.Case(0):
+                pass
+            with m.Case(1):
+                m.d.comb += addend.eq(operand)
+            with m.Case(2):
+                m.d.comb += addend.eq(operand << 1)
+            with m.Case(3):
+                m.d.comb += addend.eq(~operand)
+        total = Signal(signed(WIDTH + 2))
+        m.d.comb += total.eq((Cat(C(1, 1), work[low:]).as_signed() + Cat(minus, addend).as_signed()) >> 1)
+        # Where it goes.
+        by_8, by_2, ends, large, far, to_go = (
+            Signal(name=name) for name in ("by_8", "by_2", "ends", "large", "far", "to_go")
+        )
+        beyond_8 = (seeks & far) | (is_factor & work[bits + 7 : end + 8].any())
+        beyond_2 = (seeks & (far | work[end + 2 : end + 8].any())) | (is_factor & work[bits + 1 : end + 2].any())
+        m.d.comb += [
+            far.eq(work[end + 8 :].any()),
+            to_go.eq(pairs[-1] & ~extreme),
+            by_8.eq(shifts & ((to_go & ~(pairs[2:].all() & pairs[:2].any())) | beyond_8)),
+            by_2.eq(shifts & ~by_8 & (to_go | beyond_2)),
+            ends.eq(shifts & ~by_8 & ~by_2),
+            large.eq(ends & is_product & self.too_large(work)),
+        ]
+        with m.If(adds | by_8 | by_2):
+            m.d.sync += work.eq(Mux(by_8, work >> 8, Cat(work[2:low], total)))
+        with m.If(begins | reads):
+            m.d.sync += work.eq(0)
+        with m.If(large):
+            m.d.sync += work[CHANCE_BITS : CHANCE_BITS + RESULT_BITS].eq(0)
+            m.d.sync += work[CHANCE_BITS + RESULT_BITS].eq(1)
+            m.d.sync += work[CHANCE_BITS + RESULT_BITS + 1 : CHANCE_BITS + WIDTH].eq(work[-1].replicate(WIDTH))
+        # How many pairs of places it is to go: first those of what is done, known before it begins, then those that the
+        # operand or the factor says, or of what was read.
+        named = Signal(signed(6), reset_less=True)
+        starts = (self.start != Start.NONE) & (self.start != Start.CHANCE)
+        m.d.sync += named.eq(Mux(starts, Array(C(-small.pairs(*kind), 6) for kind in self.shifts)[self.how], 0))
+        by_power = reads & ~is_read
+        by_places = adds & ~multiplies & (is_product | is_over_by)
+        by_read = adds & is_read
+        more = [
+            named,
+            (self.places[1:] ^ is_over_by.replicate(6))[:6] & by_places.replicate(6),
+            operand[LOG_BITS + 1 : LOG_BITS + 7] & by_power.replicate(6),
+            C(-small.read_pairs, 6) & by_read.replicate(6),
+            Cat(by_2, C(0, 1), by_8),
+        ]
+        up = (operand[LOG_BITS] & by_power) | (is_over_by & by_places & ~self.places[0])
+        m.d.sync += pairs.eq((Cat(C(1, 1), pairs) + Cat(up, reduce(or_, more)[:6])) >> 1)
+        with m.If((rests & ~begins) | (reads & is_read)):
+            m.d.sync += pairs.eq(0)
+        with m.If(begins):
+            m.d.sync += [
+                is_log.eq(doing == Start.LOG),
+                is_factor.eq(doing == Start.BY),
+                is_product.eq(doing == Start.TIMES),
+                is_read.eq((doing == Start.LOG) | (doing == Start.GAIN)),
+                is_over_by.eq((doing == Start.OVER) & by_factor),
+                extreme.eq((doing == Start.EXP) & (too_small | (~whole[-1] & whole[6:-1].any()))),
+                doubled.eq(odd),
+                operand.eq(self.sum),
+            ]
+        with m.If(reads):
+            read = Mux(is_log, Cat(table[:LOG_BITS], work[end + 1], pairs[:5]), table)
+            m.d.sync += [operand.eq(read << small.table_place), is_log.eq(0)]
+        with m.If(ends):
+            m.d.sync += self.up.eq((work[:CHANCE_BITS] + self.chance)[-1] & ~large)
+        with m.If(ends & is_factor):
+            m.d.sync += [
+                self.factor.eq(Cat(work[0] & ~work[bits], work[1 : bits + 1])),
+                self.places.eq(Cat(work[bits], pairs[:5])),
+            ]
+        with m.Elif(multiplies):
+            m.d.sync += self.factor.eq(self.factor.rotate_right(2))
+        behind = Mux(work[end + 1], work[end - CHANCE_BITS + 1 :], work[end - CHANCE_BITS :])
+        m.d.comb += [
+            self.busy.eq(begins | ~rests),
+            self.result.eq(work[CHANCE_BITS : CHANCE_BITS + WIDTH].as_signed()),
+            self.table.en.eq(begins | ends),
+            self.table.addr.eq(
+                Mux(
+                    doing == Start.EXP,
+                    self.power_address,
+                    Mux(doing == Start.GAIN, self.gain_address, self.log_address(behind)),
+                )
+            ),
+        ]
+        with m.If(begins):
+            m.d.sync += state.eq(Mux((doing == Start.EXP) | (doing == Start.GAIN), State.READS, State.ADDS))
+        with m.Elif(reads):
+            m.d.sync += state.eq(State.ADDS)
+        with m.Elif(adds & ~multiplies):
+            m.d.sync += state.eq(State.SHIFTS)
+        with m.Elif(ends):
+            m.d.sync += state.eq(Mux(is_log, State.READS, State.RESTS))
