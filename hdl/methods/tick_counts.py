@@ -1,11 +1,24 @@
 """The counts of a tick: their number, their times, their places."""
 
-from amaranth import Cat, Const, Module, Mux, Signal, signed
+from itertools import accumulate
+
+from amaranth import C, Cat, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleSum
 from tachometry.spec.formats.tracking import Tracking
+
+
+def added(*pairs: tuple[Value, Value]) -> list[Value]:
+    """Return the sums of some pairs, each modulo the width of its first term, out of one adder.
+
+    Both ends of a carry chain take cells. A bit between two sums keeps the carry of one from the next.
+    """
+    rights = ((C(0, signed(len(left))) | right)[: len(left)] for left, right in pairs)
+    total = Cat(Cat(left, C(0, 1)) for left, _ in pairs) + Cat(Cat(right, C(0, 1)) for right in rights)
+    ends = list(accumulate(len(left) + 1 for left, _ in pairs))
+    return [total[end - 1 - len(left) : end - 1] for end, (left, _) in zip(ends, pairs, strict=True)]
 
 
 class TickCounts(wiring.Component):
@@ -76,23 +89,29 @@ class TickCounts(wiring.Component):
         counts, backward = self.step.any(), self.step[-1]
         before = Mux(fresh, 0, number)
         way = Mux(fresh, 0, moved)
+        takes = Signal()
+        m.d.comb += takes.eq(counts & (before != form.most_number))
+        # A count backward has its place one below that of a count forward.
+        lower = Cat(bit ^ (backward & ~way[:number].any()) for number, bit in enumerate(way[: form.number_bits + 1]))
+        place = (Cat(C(1, 1), lower) & takes.replicate(form.number_bits + 2)).as_signed()
+        next_last, next_times, next_moved, next_places, waited = added(
+            (last, C(1, 1)),
+            (times, number),
+            (way, self.step),
+            (Mux(fresh, 0, places), place),
+            (self.elapsed, self.elapsed != self._max_ticks),
+        )
         m.d.sync += [
             fresh.eq(self.tick),
             position.eq(position + self.step),
-            last.eq(Mux(counts, 0, last + 1)),
-            moved.eq(way + self.step),
-            times.eq(Mux(fresh, 0, times + number)),
-            number.eq(before),
+            last.eq(Mux(counts, 0, next_last)),
+            moved.eq(next_moved),
+            times.eq(Mux(fresh, 0, next_times)),
+            number.eq(before + takes),
+            places.eq(next_places),
         ]
-        with m.If(fresh):
-            m.d.sync += places.eq(0)
-        with m.If(counts & (before != form.most_number)):
-            m.d.sync += [
-                number.eq(before + 1),
-                places.eq(Mux(fresh, 0, places) + (Cat(Const(0, 1), way).as_signed() + self.step)),
-                kind.eq((position - backward)[:2]),
-                down.eq(backward),
-            ]
+        with m.If(takes):
+            m.d.sync += [kind.eq((position - backward)[:2]), down.eq(backward)]
         counted = Signal()
         m.d.comb += counted.eq(self.number.any())
         with m.If(fresh):
@@ -100,7 +119,7 @@ class TickCounts(wiring.Component):
             m.d.sync += [getattr(self, name).eq(value) for name, value in zip(of_tick, values, strict=True)]
             m.d.sync += [
                 self.end.eq(position),
-                self.elapsed.eq(Mux(counted, 1, self.elapsed + (self.elapsed != self._max_ticks))),
+                self.elapsed.eq(Mux(counted, 1, waited)),
             ]
         if form.external:
             length = Signal.like(self.length, name="open_length", init=1)
