@@ -27,12 +27,12 @@ def test_gates_and_golden_model_agree() -> None:
     """Of three axes on two machines, one of which has two in turn; a unit, an index that resets, a filter."""
     spec = spec_of(3, 960, unit="rpm", index=Index(reset=True), filter_clocks=3)
     assert spec.plan.machines == 2
-    trace = motions(spec, 16 * 960)
+    trace = motions(spec, 12 * 960)
     found = lockstep(spec, trace, PySim())
     assert found.n_mismatches == 0, found.first
     updates = found.expected.updates
-    assert len(updates) > 40
-    assert len(set(updates.velocity.tolist())) > 15
+    assert len(updates) > 30
+    assert len(set(updates.velocity.tolist())) > 5
     assert len(found.expected.tables["index_valid"]) > 0
 
 

@@ -73,12 +73,12 @@ def test_ten_thousand_reversals_find_one_place(width: int, decoding: str) -> Non
 @pytest.mark.parametrize("width", [1, 4])
 def test_hardware_finds_it_too(width: int, state: str) -> None:
     levels = int(state[2]), int(state[6])
-    trace = over_the_index(7, 150, width, levels)
+    trace = over_the_index(7, 90, width, levels)
     spec = spec_of(index_at=state, index_reset="yes", filter=("0", "2")[width == 1])
     found = lockstep(spec, trace, PySim())
     assert found.n_mismatches == 0, found.first
     index = found.actual.index.index_position
-    assert len(index) > 20
+    assert len(index) > 12
     assert places(index[1:]) == {0}  # where it was set to 0
     assert index[0] == SENSORS["quadrature"].cycle.index(levels)
 
@@ -221,7 +221,7 @@ def test_the_index_of_the_virtual_encoder_is_about_its_state(texts: dict[str, st
 def test_of_many_axes_each_finds_its_own() -> None:
     alone = of_texts("s", BASE | {"index-at": "A=0,B=1"})
     spec = with_axes(alone, 2, parallel=False)
-    found = lockstep(spec, stress_of(spec, 2, 25), PySim())
+    found = lockstep(spec, stress_of(spec, 2, 12), PySim())
     assert found.n_mismatches == 0, found.first
     assert len(found.expected.tables["index_valid"]) > 2
 

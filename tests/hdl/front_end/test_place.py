@@ -65,7 +65,7 @@ def test_no_count_is_lost_by_a_load_and_a_modulus_is_right_both_ways() -> None:
 
 def check_lockstep(texts: dict[str, str], seed: int = 5) -> None:
     spec = spec_of(texts)
-    found = lockstep(spec, stress(spec, seed, 25), PySim())
+    found = lockstep(spec, stress(spec, seed, 15), PySim())
     assert found.n_mismatches == 0, found.first
 
 

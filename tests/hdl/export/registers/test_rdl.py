@@ -24,7 +24,7 @@ from tachometry.spec.registers.map import RegisterMap
 CASES = [("rairan", 6), ("m", 21), ("s", 1), ("rairan", 9), ("m", 1), ("s", 5), ("t", 5)]
 WIDE = ("m", 1)  # its velocity takes two registers, and its index is anywhere
 BACKWARD = ("s", 5)  # its positions take two registers, and a turn is wrong by less than 0
-CLOCKS, ROUND = 2400, 160
+CLOCKS, ROUND = 2000, 160
 ONES = (1 << 32) - 1
 
 
