@@ -86,7 +86,7 @@ def test_demo_without_a_compiler(tmp_path: Path) -> None:
     (tmp_path / "sitecustomize.py").write_text("import sys\nsys.modules['ziglang'] = None\n")
     environment = {name: value for name, value in os.environ.items() if name != "CXX"}
     environment |= {"BIN": str(Path(sys.executable).parent), "PATH": str(tools), "PYTHONPATH": str(tmp_path)}
-    environment |= {"MOTION": "ramp:200rad/s:300rad/s:200us", "METHODS": "s"}
+    environment |= {"MOTION": "ramp:200rad/s:300rad/s:400us", "METHODS": "s"}
     done = subprocess.run(["sh", "docs/demo.sh"], cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "pysim" in done.stdout + done.stderr

@@ -1,4 +1,4 @@
-"""Arguments of proofs/mutation/argued.py that can be computed, for all numbers of the core."""
+"""Arguments of proofs/mutation/argued.json that can be computed, for all numbers of the core."""
 
 from collections.abc import Callable
 

@@ -9,9 +9,8 @@ from pathlib import Path
 import pytest
 from proofs.python_mutation.__main__ import report
 from proofs.python_mutation.covered import chosen_for, with_imports
-from proofs.python_mutation.equivalent import ARGUED
 from proofs.python_mutation.judge import Verdict
-from proofs.python_mutation.mutants import ROOMS, Mutant, files, mutants_of, mutated, sample
+from proofs.python_mutation.mutants import ARGUED, ROOMS, Mutant, files, mutants_of, mutated, sample
 from support.nightly import nightly
 
 ROOT = Path(__file__).parents[2]

@@ -8,9 +8,8 @@ from importlib import import_module
 from pathlib import Path
 
 from proofs.python_mutation.covered import chosen_for, covered, with_imports
-from proofs.python_mutation.equivalent import ARGUED
 from proofs.python_mutation.judge import Verdict, judge_all
-from proofs.python_mutation.mutants import ROOMS, files, sample
+from proofs.python_mutation.mutants import ARGUED, ROOMS, files, sample
 from support.report import Table
 
 ROOT = Path(__file__).parents[3]

@@ -3,11 +3,18 @@
 import ast
 import copy
 import hashlib
+import json
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+# Mutants that change nothing that could be seen, by their names, each with the argument.
+ARGUED: dict[str, str] = {
+    f"{where}: {change}": argument
+    for where, argument, *changes in json.loads(Path(__file__).with_name("equivalent.json").read_text(encoding="utf-8"))
+    for change in changes
+}
 # What is mutated, by room: what describes cores, the golden models, and the comparison.
 ROOMS = {
     "spec": ("spec", "hdl/export"),  # and the files that are written of them
