@@ -91,57 +91,32 @@ _LONGEST = Fraction(177)  # e^−177 > 2^−256, which is far below what a coeff
 
 @dataclass(frozen=True)
 class Coefficients:
-    """Holds the coefficients of a term, in 2^(shift − p) of a unit of its result: one for each n from 1 on, or one.
-
-    Parameters
-    ----------
-    values : tuple of int
-    shift : int
-        The word is shifted left by so many bits.
-    """
+    """Holds the coefficients of a term, in 2^(shift − p) of a unit of its result: one for each n from 1 on, or one."""
 
     values: tuple[int, ...]
-    shift: int
+    shift: int  # the word is shifted left by so many bits
 
 
 @dataclass(frozen=True)
 class ControlForm:
-    """Holds the numbers that hardware and golden model share.
+    """Holds the numbers that hardware and golden model share."""
 
-    Parameters
-    ----------
-    velocity_width, velocity_limit : int
-        Bits of the velocity, and V: its greatest magnitude, LSB.
-    extra_bits : int
-        f.
-    factor_bits : int
-        p.
-    terms : dict
-        The coefficients of each term; without `Term.FILTER` y is the velocity.
-    current_limit : int
-        In LSB of the current.
-    position_width, command_bits, acceleration_width : int
-        Bits of the position, fraction bits of the commanded velocity, bits of the commanded acceleration.
-    synchronised : bool
-        Whether filter and observer work at updates of the velocity, not at control ticks.
-    position_bits : int
-        Fraction bits of the commanded position.
-    gain_bits : int
-        Bits of each of `GAINS`, which are inputs, as is the limit of the current, up to `current_limit`; 0: they are
-        fixed.
-    """
-
+    # velocity_width and velocity_limit: bits of the velocity, and V: its greatest magnitude, LSB
     velocity_width: int
     velocity_limit: int
-    extra_bits: int
-    factor_bits: int
-    terms: dict[Term, Coefficients]
-    current_limit: int
+    extra_bits: int  # f
+    factor_bits: int  # p
+    terms: dict[Term, Coefficients]  # the coefficients of each term; without `Term.FILTER` y is the velocity
+    current_limit: int  # in LSB of the current
+    # position_width, command_bits and acceleration_width: bits of the position, fraction bits of the commanded
+    # velocity, bits of the commanded acceleration
     position_width: int
     command_bits: int
     acceleration_width: int
-    synchronised: bool
-    position_bits: int = POSITION_FRAC_BITS
+    synchronised: bool  # whether filter and observer work at updates of the velocity, not at control ticks
+    position_bits: int = POSITION_FRAC_BITS  # fraction bits of the commanded position
+    # bits of each of `GAINS`, which are inputs, as is the limit of the current, up to `current_limit`; 0: they are
+    # fixed
     gain_bits: int = 0
 
     @property

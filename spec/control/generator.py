@@ -43,18 +43,10 @@ _SERIAL, _PARALLEL = 3 * (FACTOR_BITS + 1) + 5, 3 * 3 + 5
 
 @dataclass(frozen=True)
 class Scale:
-    """Converts the generator's unit to that of a port: round((word·2^−shift)·factor/2^32), where a shift rounds down.
+    """Converts the generator's unit to that of a port: round((word·2^−shift)·factor/2^32); a shift rounds down."""
 
-    Parameters
-    ----------
-    factor : int
-        Of 28 bits, so the word keeps four more than the port shows.
-    shift : int
-        Less than 0: to the left.
-    """
-
-    factor: int
-    shift: int
+    factor: int  # of 28 bits, so the word keeps four more than the port shows
+    shift: int  # less than 0: to the left
 
     @classmethod
     def of(cls, ratio: Fraction) -> Scale:
@@ -65,29 +57,15 @@ class Scale:
 
 @dataclass(frozen=True)
 class GeneratorForm:
-    """Holds the numbers that hardware and golden model share.
+    """Holds the numbers that hardware and golden model share."""
 
-    Parameters
-    ----------
-    fraction : int
-        F.
-    position_width : int
-        Bits of the position, in counts.
-    velocity_bits : int
-        |ω| is less than 2^this.
-    velocity_shift : int
-        The wanted velocity is in 2^(this − F) counts per control tick.
-    velocity, acceleration : Scale
-    command_width, acceleration_width : int
-        Bits of the commanded velocity and acceleration.
-    """
-
-    fraction: int
-    position_width: int
-    velocity_bits: int
-    velocity_shift: int
+    fraction: int  # F
+    position_width: int  # bits of the position, in counts
+    velocity_bits: int  # |ω| is less than 2^this
+    velocity_shift: int  # the wanted velocity is in 2^(this − F) counts per control tick
     velocity: Scale
     acceleration: Scale
+    # command_width and acceleration_width: bits of the commanded velocity and acceleration
     command_width: int
     acceleration_width: int
 

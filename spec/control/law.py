@@ -41,14 +41,9 @@ class Law(Motor):
     """Says how position and velocity are controlled, and how disturbances are observed.
 
     A value out of range raises ParameterError.
-
-    Parameters
-    ----------
-    tachometer : TachometerSpec
-        Of any method.
     """
 
-    tachometer: TachometerSpec
+    tachometer: TachometerSpec  # of any method
     position_gain: Fraction = option(  # noqa: RUF009
         None,
         "Gain k_p of the position error, in 1/s²; 0: the velocity alone is controlled.",

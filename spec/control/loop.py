@@ -38,12 +38,7 @@ _LIMIT = 2  # to hold the sum within few bits, and within the limit
 
 
 class LoopLatency:
-    """Counts the clocks of the ticks of a control loop, and of its computation.
-
-    Parameters
-    ----------
-    spec : LoopSpec
-    """
+    """Counts the clocks of the ticks of a control loop, and of its computation."""
 
     def __init__(self, spec: LoopSpec) -> None:
         self.spec = spec

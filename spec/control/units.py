@@ -21,20 +21,11 @@ def longest_interval(spec: TachometerSpec, period: int) -> int:
 
 @dataclass(frozen=True)
 class Units:
-    """Says how much an LSB of each number of a loop is; much of it follows from the control period.
-
-    Parameters
-    ----------
-    law : Law
-    current_width : int
-        Bits of `current`.
-    period : int
-        Clocks between two control ticks.
-    """
+    """Says how much an LSB of each number of a loop is; much of it follows from the control period."""
 
     law: Law
-    current_width: int
-    period: int
+    current_width: int  # bits of `current`
+    period: int  # clocks between two control ticks
 
     @property
     def seconds(self) -> Fraction:

@@ -21,32 +21,15 @@ _FORM = re.compile(rf"(?:{_PLACES}|list:(\d{{1,15}})):([^:]+)(?::({'|'.join(DIRE
 
 @dataclass(frozen=True)
 class Compare:
-    """Says at which positions there are pulses, and how long they are.
+    """Says at which positions there are pulses, and how long they are."""
 
-    Parameters
-    ----------
-    start : int
-        The first position, in counts; with `fine` in 2^-16 of them, as `step` is.
-    step : int
-        Counts from a position to the next, in the direction of the pulses; with both directions, forward.
-    count : int
-        Number of positions; 0: no end.
-    width : str
-        Length of a pulse, as a time or as clocks.
-    direction : str
-        The pulses come while the shaft turns `forward`, `backward`, or whichever way (`both`).
-    depth : int
-        Positions of a list that a program writes, which stands for the first three; 0: there is none.
-    fine : bool
-        Positions lie between the counts as well: `position_fine` is carried on to the clock of the pulse.
-    """
-
-    start: int
-    step: int
-    count: int
-    width: str
-    direction: str = FORWARD
-    depth: int = 0
+    start: int  # the first position, in counts; with `fine` in 2^-16 of them, as `step` is
+    step: int  # counts from a position to the next, in the direction of the pulses; with both directions, forward
+    count: int  # number of positions; 0: no end
+    width: str  # length of a pulse, as a time or as clocks
+    direction: str = FORWARD  # the pulses come while the shaft turns `forward`, `backward`, or whichever way (`both`)
+    depth: int = 0  # positions of a list that a program writes, which stands for the first three; 0: there is none
+    # positions lie between the counts as well: `position_fine` is carried on to the clock of the pulse
     fine: bool = False
 
     @classmethod

@@ -11,12 +11,7 @@ S = TypeVar("S", bound="TachometerSpec", covariant=True)
 
 
 class Follows(Generic[S]):
-    """Answers one question about a core, from what was asked for and from the answers to other questions.
-
-    Parameters
-    ----------
-    spec : TachometerSpec
-    """
+    """Answers one question about a core, from what was asked for and from the answers to other questions."""
 
     def __init__(self, spec: S) -> None:
         self.spec = spec

@@ -40,12 +40,6 @@ OPEN = {"a": Fault.A_OPEN, "b": Fault.B_OPEN, "z": Fault.Z_OPEN}  # of lines tha
 class Health:
     """Says when a core that watches its encoder finds a fault of it.
 
-    Parameters
-    ----------
-    edges, errors : int
-    complements : int or None
-        Clocks for which a line may equal its complement; None: there are no complements.
-
     Raises
     ------
     ParameterError

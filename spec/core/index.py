@@ -8,15 +8,7 @@ from tachometry.spec.language.option import option
 
 @dataclass(frozen=True)
 class Index:
-    """Says what a core does with the index line of its encoder, besides capturing the position.
-
-    Parameters
-    ----------
-    reset : bool
-    at : str or None
-        `edge`, or levels of the lines, `A=1,B=1`; None: as is usual for the sensor.
-    once : bool
-    """
+    """Says what a core does with the index line of its encoder, besides capturing the position."""
 
     reset: bool = option(False, "The index also sets the position to 0 (with --index).", name="index-reset")
     at: str | None = option(

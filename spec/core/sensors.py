@@ -18,29 +18,15 @@ def packed_levels(levels: Levels) -> int:
 
 @dataclass(frozen=True)
 class Sensor:
-    """Describes a kind of sensor.
-
-    Parameters
-    ----------
-    name : str
-    lines : tuple of str
-        Its lines, beside the index.
-    decodings : tuple of int
-        Counts per pulse that it can have, the usual one first.
-    cycle : tuple of tuple of int
-        Levels of the lines in a period, in forward order; empty where levels do not tell a place in a period.
-    pins : tuple of str
-        What each line is.
-    wrong : str
-        In which clocks `decode_error` is high, and what is counted then; empty: never.
-    """
+    """Describes a kind of sensor."""
 
     name: str
-    lines: tuple[str, ...]
-    decodings: tuple[int, ...]
+    lines: tuple[str, ...]  # its lines, beside the index
+    decodings: tuple[int, ...]  # counts per pulse that it can have, the usual one first
+    # levels of the lines in a period, in forward order; empty where levels do not tell a place in a period
     cycle: tuple[Levels, ...]
-    pins: tuple[str, ...]
-    wrong: str
+    pins: tuple[str, ...]  # what each line is
+    wrong: str  # in which clocks `decode_error` is high, and what is counted then; empty: never
 
     def after(self, levels: Levels) -> Levels:
         """Return the levels that follow these forward."""

@@ -26,18 +26,10 @@ _FINE = ("position_fine", "acceleration")  # of the ports that only a method has
 
 @dataclass(frozen=True)
 class Stream:
-    """Says when there are records.
+    """Says when there are records."""
 
-    Parameters
-    ----------
-    when : str
-        A record comes with every `update` of the velocity, `tick`, or `edge` that counts.
-    packet : int
-        Records from one `tlast` to the next.
-    """
-
-    when: str = "update"
-    packet: int = 256
+    when: str = "update"  # a record comes with every `update` of the velocity, `tick`, or `edge` that counts
+    packet: int = 256  # records from one `tlast` to the next
 
     @classmethod
     def parse(cls, what: str, text: str) -> Self:
@@ -54,21 +46,11 @@ class Stream:
 
 @dataclass(frozen=True)
 class Part:
-    """A number of a record, little-endian.
+    """A number of a record, little-endian."""
 
-    Parameters
-    ----------
-    name : str
-        That of its port, but of `time` and `flags`.
-    width : int
-        Bits that it has; it is extended to whole words by its sign or by zeros.
-    offset : int
-        Bytes; a multiple of `size`.
-    """
-
-    name: str
-    width: int
-    offset: int
+    name: str  # that of its port, but of `time` and `flags`
+    width: int  # bits that it has; it is extended to whole words by its sign or by zeros
+    offset: int  # bytes; a multiple of `size`
     signed: bool = True
 
     @property

@@ -38,11 +38,6 @@ class TachometerSpec:
     Its fields are what is asked for, None where nothing is. What follows from them is in small objects:
     `front_end`, `times`, `widths`, `scale`, `bound`, `latency`, `recovery` and `words`, and `form` has the numbers of
     the method alone. A value out of range raises ParameterError.
-
-    Parameters
-    ----------
-    chosen : str
-        Why this method was taken, where none was named; empty: it was named.
     """
 
     encoder: Encoder
@@ -204,6 +199,7 @@ class TachometerSpec:
         tests=("", "axi:update:3", "axi:edge:2", "axi:tick:1"),
         tacit=True,
     )
+    # why this method was taken, where none was named; empty: it was named
     chosen: str = field(default="", compare=False, repr=False)
 
     # Name of the method, and what sets it apart.

@@ -11,19 +11,11 @@ class ToothWheel:
     `fewest_halves` half periods, at most `most_halves`, is the first one after it. From then on teeth are counted.
     Where the gap must be, the missing teeth come a period apart, and the next tooth must be as late as that again,
     else the gap is looked for anew. So all missing teeth have come before the next one does.
-
-    Parameters
-    ----------
-    teeth : int
-        That are there.
-    missing : int
-    longest : int
-        Clocks of the greatest distance of teeth that is measured, of the form 2^n − 1.
     """
 
-    teeth: int
+    teeth: int  # that are there
     missing: int
-    longest: int
+    longest: int  # clocks of the greatest distance of teeth that is measured, of the form 2^n − 1
 
     @property
     def width(self) -> int:

@@ -15,24 +15,16 @@ FASTER_BITS = 3  # it catches up 2^3 times as fast as the shaft
 
 @dataclass(frozen=True)
 class Carrying:
-    """Says how a place is carried on.
+    """Says how a place is carried on."""
 
-    Parameters
-    ----------
-    per_clock : VelocityOutput
-        How the velocity in counts per clock is computed, whose LSB is 2^-(fine_bits + more_bits) counts.
-    shift : int
-        Of the velocity that it takes, to the left.
-    fine_bits, more_bits : int
-        Fraction bits of the place that is given, and further ones of the place that is carried on.
-    late : int
-        Clocks from the end of a tick at the pins to the velocity per clock of its update, and three to use the place.
-    """
-
+    # how the velocity in counts per clock is computed, whose LSB is 2^-(fine_bits + more_bits) counts
     per_clock: VelocityOutput
-    shift: int
+    shift: int  # of the velocity that it takes, to the left
+    # fine_bits and more_bits: fraction bits of the place that is given, and further ones of the place that is carried
+    # on
     fine_bits: int
     more_bits: int
+    # clocks from the end of a tick at the pins to the velocity per clock of its update, and three to use the place
     late: int
 
     @property

@@ -70,72 +70,35 @@ def parse_text(what: str, text: str) -> str:
 
 @dataclass(frozen=True)
 class Option:
-    """An option of the command line, of sweeps and of files: how a field of a spec is given as a text.
+    """An option of the command line, of sweeps and of files: how a field of a spec is given as a text."""
 
-    Parameters
-    ----------
-    help : str
-        A sentence for `--help`.
-    name : str
-        Without dashes; empty: that of the field. Fields of several methods that have one name are one option.
-    unit : str
-        What the field's number counts: `clocks`, `ticks` or `rad/s`.
-    group : str
-        Heading in `--help`.
-    choices : tuple of str
-        All texts that it takes; empty: others.
-    shown : str or None
-        The default, as `--help` shows it.
-    parse : callable
-        Makes the value from the name of the option in messages, and from the text.
-    parse_at : callable or None
-        Makes it instead, of a text that says nothing without other options: its third argument is what is known of the
-        fields of the same class and of `Timing`.
-    text : str or None
-        The default, if it is read as it would be if it were given.
-    flag : bool
-        Whether it stands alone, for yes.
-    needs : str
-        Name of the flag that must be given with it.
-    fits : callable or None
-        Whether the spec of a method has the option; None: always.
-    tests : tuple of str or None
-        Values that pairwise tests use, the empty text for leaving it out; see `sim.studies.pairs` for those in words.
-        None: both values of a flag, all choices, else no values.
-    few : int
-        For a method that hardly depends on the option, the first so many of these values are enough.
-    tacit : bool
-        Whether manifests say nothing of it where it has its default.
-    part : type or None
-        For a flag whose field is None or an object of this class: the fields of that are options that need the flag.
-    field : str
-        Name of the field; set by `options_of`.
-    default : object
-        Default of the field; set by `options_of`.
-    within : tuple of str
-        The field of a part, and the one of its own in that; set by `options_of`.
-    """
-
-    help: str
+    help: str  # a sentence for `--help`
+    # without dashes; empty: that of the field. Fields of several methods that have one name are one option.
     name: str = ""
     metavar: str | None = None
-    unit: str = ""
-    group: str = "Core"
-    choices: tuple[str, ...] = ()
-    shown: str | None = None
+    unit: str = ""  # what the field's number counts: `clocks`, `ticks` or `rad/s`
+    group: str = "Core"  # heading in `--help`
+    choices: tuple[str, ...] = ()  # all texts that it takes; empty: others
+    shown: str | None = None  # the default, as `--help` shows it
+    # makes the value from the name of the option in messages, and from the text
     parse: Callable[[str, str], Any] = parse_text
+    # makes it instead, of a text that says nothing without other options: its third argument is what is known of the
+    # fields of the same class and of `Timing`
     parse_at: Callable[[str, str, Mapping[str, Any]], Any] | None = None
-    text: str | None = None
-    flag: bool = False
-    needs: str = ""
-    fits: Callable[[type[Any]], bool] | None = None
+    text: str | None = None  # the default, if it is read as it would be if it were given
+    flag: bool = False  # whether it stands alone, for yes
+    needs: str = ""  # name of the flag that must be given with it
+    fits: Callable[[type[Any]], bool] | None = None  # whether the spec of a method has the option; None: always
+    # values that pairwise tests use, the empty text for leaving it out; see `sim.studies.pairs` for those in words.
+    # None: both values of a flag, all choices, else no values.
     tests: tuple[str, ...] | None = None
-    few: int = 2
-    tacit: bool = False
+    few: int = 2  # for a method that hardly depends on the option, the first so many of these values are enough
+    tacit: bool = False  # whether manifests say nothing of it where it has its default
+    # for a flag whose field is None or an object of this class: the fields of that are options that need the flag
     part: type[Any] | None = None
-    field: str = ""
-    default: Any = None
-    within: tuple[str, ...] = ()
+    field: str = ""  # name of the field; set by `options_of`
+    default: Any = None  # default of the field; set by `options_of`
+    within: tuple[str, ...] = ()  # the field of a part, and the one of its own in that; set by `options_of`
 
     @property
     def parameter(self) -> str:

@@ -24,18 +24,10 @@ _LEAST, _GREATEST = Fraction(1, 10**30), Fraction(10**30)
 
 
 class Unit(NamedTuple):
-    """A unit: how many of the first unit of its table it is.
+    """A unit: how many of the first unit of its table it is."""
 
-    Parameters
-    ----------
-    size : Fraction
-        The rational factor.
-    pi : Fraction or None
-        A factor of so many π, in units that have one.
-    """
-
-    size: Fraction = Fraction(1)
-    pi: Fraction | None = None
+    size: Fraction = Fraction(1)  # the rational factor
+    pi: Fraction | None = None  # a factor of so many π, in units that have one
 
     @property
     def exact(self) -> Fraction:
@@ -143,12 +135,7 @@ def read_nearest(what: str, text: str, units: Units, default: str = "") -> float
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
-    """Reads and writes quantities of some units, exactly, for an option.
-
-    Parameters
-    ----------
-    units : mapping of str to Unit
-    """
+    """Reads and writes quantities of some units, exactly, for an option."""
 
     units: Units
 
@@ -267,15 +254,9 @@ def signed_width(limit: int) -> int:
 
 
 class SpeedUnit(NamedTuple):
-    """The unit in which commands show speeds; everything else has them in rad/s.
+    """The unit in which commands show speeds; everything else has them in rad/s."""
 
-    Parameters
-    ----------
-    name : str
-        `rad/s`, `rev/s` or `rpm`.
-    """
-
-    name: str
+    name: str  # `rad/s`, `rev/s` or `rpm`
 
     @property
     def rad_per_s(self) -> float:
@@ -294,16 +275,10 @@ class SpeedUnit(NamedTuple):
 
 @dataclass(frozen=True)
 class Speed:
-    """An angular speed with its unit, kept exactly as it was given.
-
-    Parameters
-    ----------
-    unit : str
-        `rad/s`, `rev/s` or `rpm`.
-    """
+    """An angular speed with its unit, kept exactly as it was given."""
 
     value: Fraction
-    unit: str = "rad/s"
+    unit: str = "rad/s"  # `rad/s`, `rev/s` or `rpm`
 
     def __post_init__(self) -> None:
         if self.unit not in SPEED:

@@ -18,18 +18,10 @@ def parse_target(what: str, text: str) -> Fraction:
 
 @dataclass(frozen=True)
 class AdaptiveDt:
-    """Says how a window takes its k from what the one before it measured, see docs/concepts/rairan.md.
+    """Says how a window takes its k from what the one before it measured, see docs/concepts/rairan.md."""
 
-    Parameters
-    ----------
-    target : Fraction
-        Greatest relative error, eq. (13): less than 1/3, which any estimate has.
-    max_shift : int
-        K, the greatest k.
-    """
-
-    target: Fraction
-    max_shift: int
+    target: Fraction  # greatest relative error, eq. (13): less than 1/3, which any estimate has
+    max_shift: int  # K, the greatest k
 
     @property
     def fewest(self) -> int:

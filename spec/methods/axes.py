@@ -77,12 +77,7 @@ def nearest_ticks(spec: STachometer | TrackTachometer, axes: int) -> list[int]:
 
 
 class _OfAxes:
-    """Answers one question about a core of many axes, as `Follows` does of one axis.
-
-    Parameters
-    ----------
-    spec : AxesSpec
-    """
+    """Answers one question about a core of many axes, as `Follows` does of one axis."""
 
     def __init__(self, spec: AxesSpec) -> None:
         self.spec = spec

@@ -53,23 +53,12 @@ def output_cycles(axis: TachometerSpec) -> int:
 
 @dataclass(frozen=True)
 class Plan:
-    """Says when each axis has its turn.
-
-    Parameters
-    ----------
-    axes : int
-    cycles : int
-        Clocks of a turn.
-    latency : int
-        Clocks from the beginning of a turn to what is shown of it.
-    machines : int
-        Datapaths that work side by side: axis k has number k modulo this.
-    """
+    """Says when each axis has its turn."""
 
     axes: int
-    cycles: int
-    latency: int
-    machines: int = 1
+    cycles: int  # clocks of a turn
+    latency: int  # clocks from the beginning of a turn to what is shown of it
+    machines: int = 1  # datapaths that work side by side: axis k has number k modulo this
 
     @property
     def apart(self) -> int:
@@ -97,18 +86,10 @@ class AxisTimes(Times["OneAxis"]):
 
 @dataclass(frozen=True, kw_only=True)
 class OneAxis(TachometerSpec):
-    """Core of one axis that an axis of many is, to the bit; its clock is a round.
+    """Core of one axis that an axis of many is, to the bit; its clock is a round."""
 
-    Parameters
-    ----------
-    axes_of_tick : int
-        How many have their turn in a tick.
-    slots : int
-        Clocks of a round.
-    """
-
-    axes_of_tick: int
-    slots: int
+    axes_of_tick: int  # how many have their turn in a tick
+    slots: int  # clocks of a round
 
     @cached_property
     def ports(self) -> Ports:

@@ -123,17 +123,7 @@ class MTachometer(TachometerSpec):
     average: int = option(1, "Ticks that are averaged, 1 to 256.", metavar="N", unit="ticks", tests=("", "2", "3", "8"))
 
     method = "m"
-    facts = Facts(
-        title="M",
-        summary="counts the pulses of one tick, or of several",
-        update_by="tick",
-        own_ticks=False,
-        bounds=True,
-        last_at_rest=False,
-        rest_tenths=17,
-        awaits_count=False,
-        pairs_all=False,
-    )
+    facts = Facts(title="M", summary="counts the pulses of one tick, or of several", update_by="tick")
     form = cached_property(MForm)
     times = cached_property(MTimes)
     widths = cached_property(MWidths)

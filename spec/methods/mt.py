@@ -97,17 +97,7 @@ class MTTachometer(TimedTachometer):
     )
 
     method = "mt"
-    facts = Facts(
-        title="M/T",
-        summary="takes the time of many counts",
-        update_by="count",
-        own_ticks=False,
-        bounds=True,
-        last_at_rest=False,
-        rest_tenths=22,
-        awaits_count=False,
-        pairs_all=False,
-    )
+    facts = Facts(title="M/T", summary="takes the time of many counts", update_by="count", rest_tenths=22)
     form = cached_property(MTForm)
     times = cached_property(MTTimes)
     words = cached_property(MTWords)

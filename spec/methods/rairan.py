@@ -255,11 +255,7 @@ class RairanTachometer(TachometerSpec):
         summary="begins its ticks with a count (Rairán 2013)",
         update_by="count",
         own_ticks=True,
-        bounds=True,
         last_at_rest=True,
-        rest_tenths=17,
-        awaits_count=False,
-        pairs_all=False,
     )
     form = cached_property(RairanForm)
     times = cached_property(RairanTimes)

@@ -229,11 +229,6 @@ class STachometer(TachometerSpec):
         title="S",
         summary="averages in step with the alterations of the pulse number",
         update_by="alteration",
-        own_ticks=False,
-        bounds=True,
-        last_at_rest=False,
-        rest_tenths=17,
-        awaits_count=False,
         pairs_all=True,
     )
     form = cached_property(SForm)

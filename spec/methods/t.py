@@ -48,16 +48,6 @@ class TTachometer(TimedTachometer):
     """
 
     method = "t"
-    facts = Facts(
-        title="T",
-        summary="takes the time between two counts",
-        update_by="count",
-        own_ticks=False,
-        bounds=True,
-        last_at_rest=False,
-        rest_tenths=22,
-        awaits_count=False,
-        pairs_all=False,
-    )
+    facts = Facts(title="T", summary="takes the time between two counts", update_by="count", rest_tenths=22)
     form = cached_property(TForm)
     widths = cached_property(TWidths)

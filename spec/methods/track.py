@@ -190,16 +190,6 @@ class TrackTachometer(TachometerSpec):
     The memory over which it fits a parabola through the counts grows while they come where they are expected, and falls
     when they do not. The velocity is new in every tick; docs/concepts/track.md has the rules.
 
-    Parameters
-    ----------
-    max_memory : int or None
-        Clocks that the memory does not grow beyond; None: 4 s.
-    multiplier : str
-        `serial`: one bit a clock, few cells; `block`: a multiplier of the FPGA, few clocks; `auto`: serial where it
-        fits the tick.
-    fine_bits : int
-        Fraction bits of `position_fine`.
-
     Raises
     ------
     ParameterError
@@ -231,12 +221,8 @@ class TrackTachometer(TachometerSpec):
         title="Tracking",
         summary="tracks position, velocity and acceleration",
         update_by="tick",
-        own_ticks=False,
         bounds=False,
-        last_at_rest=False,
-        rest_tenths=17,
         awaits_count=True,
-        pairs_all=False,
         usual={"max-time": _MAX_TIME},
     )
     latency = cached_property(TrackLatency)

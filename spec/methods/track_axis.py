@@ -13,18 +13,10 @@ from tachometry.spec.methods.track import TrackTachometer
 
 @dataclass(frozen=True, kw_only=True)
 class TrackAxis(OneAxis, TrackTachometer):
-    """Describes one of many axes with the tracking method.
+    """Describes one of many axes with the tracking method."""
 
-    Parameters
-    ----------
-    tick_clocks : int
-        Clocks of the shortest tick in which all turns must end.
-    ahead : int
-        Rounds from an edge to what is shown: the velocity is that of the clock in which it is shown.
-    """
-
-    tick_clocks: int
-    ahead: int = 0
+    tick_clocks: int  # clocks of the shortest tick in which all turns must end
+    ahead: int = 0  # rounds from an edge to what is shown: the velocity is that of the clock in which it is shown
 
     times = cached_property(AxisTimes)
 

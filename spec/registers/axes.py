@@ -17,11 +17,6 @@ _WHOSE = ("axis", "index_axis")  # what is held says it by its name
 class AxesMap(RegisterMap):
     """Holds all registers of a core of many axes: those of axis 0, of axis 1 …, in windows of one size.
 
-    Parameters
-    ----------
-    spec : TachometerSpec
-        Of one axis.
-
     Raises
     ------
     ParameterError

@@ -43,10 +43,6 @@ class DemoMap(RegisterMap):
 
     A write takes effect in the next clock, and CHANGED keeps the instant of the write. So whoever knows all writes
     since a restart knows every edge that the emulator has made.
-
-    Parameters
-    ----------
-    spec : TachometerSpec
     """
 
     def __post_init__(self) -> None:
@@ -120,11 +116,6 @@ class DemoMap(RegisterMap):
 @dataclass(frozen=True)
 class DemoLoopMap(LoopMap, DemoMap):
     """Holds all registers of a demo of a core with a control loop: first those of the loop, then those of the demo.
-
-    Parameters
-    ----------
-    spec : TachometerSpec
-    loop : LoopSpec
 
     Raises
     ------

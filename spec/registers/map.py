@@ -42,15 +42,10 @@ _DESCRIBED = ("name", "low", "width", "access", "reset", "signed", "unit", "port
 
 @dataclass(frozen=True)
 class RegisterMap:
-    """Holds all registers of a core.
-
-    Parameters
-    ----------
-    irq : bool
-        There is an output `irq`, with registers of its own, which follow all others.
-    """
+    """Holds all registers of a core."""
 
     spec: TachometerSpec
+    # there is an output `irq`, with registers of its own, which follow all others
     irq: bool = field(default=False, kw_only=True)
 
     @cached_property

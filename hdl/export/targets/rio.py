@@ -29,19 +29,11 @@ _EVENTS = {"decode_errors": "decode_error", "overflows": "tick & overflow", "tic
 
 @dataclass(frozen=True)
 class HalPin:
-    """Describes a pin of HAL.
+    """Describes a pin of HAL."""
 
-    Parameters
-    ----------
-    kind : str
-        `float`, `s32`, `u32` or `bit`.
-    source : str
-        What of the frame it is made of; empty: the host makes it.
-    """
-
-    kind: str
+    kind: str  # `float`, `s32`, `u32` or `bit`
     help: str
-    source: str = ""
+    source: str = ""  # what of the frame it is made of; empty: the host makes it
 
 
 def rio(spec: TachometerSpec, name: str, bus: Bus | None, made: Mapping[str, str]) -> dict[str, str]:
