@@ -41,34 +41,3 @@ def test_mismatches_of_all_seeds_are_added(monkeypatch: pytest.MonkeyPatch) -> N
     assert len(rows) == 4
     for line in rows:
         assert line.split(" | ")[1:] == ["6000", "15", "0.1234", "0.1234", "0.3", "0.3 |"]
-
-
-def test_an_observer_of_the_acceleration_has_the_same_gains(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = []
-
-    def outcome(one: Any, seeds: Any, jobs: Any) -> Outcome:
-        asked.append((one.spec.method, one.gains.way.name, one.gains.velocity, one.gains.observer))
-        return FINE
-
-    monkeypatch.setattr(bench, "outcome_of", outcome)
-    rows = bench.accelerations(range(6), 1).splitlines()[2:]
-    assert rows[1] == "| 40 | 80 | acceleration | 0.123, 0.2, 0.4, 0.3 |"
-    assert len(rows) == len(asked) == 10
-    for velocity, acceleration in zip(asked[::2], asked[1::2], strict=True):
-        assert velocity == ("track", "SYNCHRONISED", *acceleration[2:])
-        assert acceleration[:2] == ("track", "ACCELERATION")
-
-
-def test_slow_shafts_are_those_of_three_methods(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = []
-
-    def outcome(one: Any, seeds: Any, jobs: Any) -> Outcome:
-        asked.append((one.task.motion.speed(one.task.motion.duration), one.spec.method, one.gains.filter))
-        return FINE
-
-    monkeypatch.setattr(bench, "outcome_of", outcome)
-    rows = bench.slow_shafts(range(6), 1).splitlines()[2:]
-    assert [row.split(" | ")[0] for row in rows] == ["| 0", "| 2 rad/s", "| 10 rad/s"]
-    assert [float(speed) for speed, *_ in asked[::4]] == [0, 2, 10]
-    assert [method for _, method, _ in asked[:4]] == ["s", "mt", "track", "track"]
-    assert [rate for *_, rate in asked[2:4]] == [float("inf"), 226.2]

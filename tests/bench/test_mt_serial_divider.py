@@ -78,14 +78,6 @@ def expected(edges: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
     return [one for one in given if one[0] < now - COUNTED]
 
 
-@pytest.mark.parametrize("way", [1, -1])
-@pytest.mark.parametrize("period", [1, 7, 150, 960, 1000, 5003])
-def test_a_constant_speed_is_exact_to_the_last_bit(period: int, way: int, tmp_path: Path) -> None:
-    found = simulated(tmp_path, [(period, way)] * (10 * max(WINDOW, period) // period))
-    assert len(found) >= 7
-    assert {velocity for _, velocity in found} == {way * (WINDOW * ONE // period)}
-
-
 # The circuit is for comparison only; a tenth of the motion has each scale both ways.
 @pytest.mark.parametrize("parts", only([15], [15, 150]))
 def test_random_motion_as_the_method_says(parts: int, tmp_path: Path) -> None:

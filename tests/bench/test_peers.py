@@ -67,18 +67,6 @@ def test_verilog_with_a_parameter(counter: str, measured: list[Any], capsys: pyt
         assert port in between
 
 
-def test_the_largest_ecp5_is_measured_if_it_is_asked_for(
-    counter: str, measured: list[Any], capsys: pytest.CaptureFixture[str]
-) -> None:
-    words = [counter, "--top", "counter", "--clock", "clock"]
-    assert peers.main([*words, "--targets", "ECP5-85F"]) == 0
-    assert "## ECP5-85F\n" in capsys.readouterr().out
-    assert "--85k" in measured[0][-1].route
-    assert measured[0][-1].cells == peers.TARGETS["ECP5"].cells
-    assert peers.main([*words, "--jobs", "1"]) == 0
-    assert [one[-1] for one in measured[1:]] == list(peers.TARGETS.values())
-
-
 def test_vhdl_has_no_latches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, measured: list[Any]) -> None:
     assert peers.main([ghdl(tmp_path, monkeypatch), "--top", "chosen", "--targets", "ECP5"]) == 0
     made = "always @* case (at) 2'b10: q <= clk; 2'b01: q <= 1'b0; default: q <= 'bx; endcase endmodule"

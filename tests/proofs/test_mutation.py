@@ -10,31 +10,21 @@ import proofs.mutation.__main__ as command
 import proofs.mutation.equivalent
 import proofs.mutation.score
 import pytest
-from proofs.mutation.boxes import BOXES
-from proofs.mutation.cases import CASES, Case
+from proofs.mutation.cases import CASES
 from proofs.mutation.equivalent import equivalent
 from proofs.mutation.loops import LOOPS, Commanded
 from proofs.mutation.netlist import GROUP, exported, mutants
 from proofs.mutation.score import hold
 from proofs.mutation.simulate import library, run
-from proofs.mutation.stimulus import Stimulus, bursts, ending, steps, stimulus
+from proofs.mutation.stimulus import steps, stimulus
 from support.nightly import nightly
 
 from tachometry.sim import golden
 from tachometry.sim.golden.control import Command
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.spec import TachometerSpec
 
 CASE = replace(next(case for case in CASES if case.name == "mt, in clocks"), mutants=40)
 CLOCKS = 200_000
-
-
-def standstill(spec: TachometerSpec, n_clocks: int) -> Stimulus:
-    """Return a reset, and then nothing."""
-    pins = np.zeros((n_clocks, 1), dtype=np.uint64)
-    pins[0] = 1
-    low = {name: np.zeros(1, dtype=np.uint8) for name in ("a", "b")}
-    return Stimulus(pins, [PinTrace.of_lines(np.zeros(1, dtype=np.int64), n_clocks - 1, low)], [1])
 
 
 @pytest.fixture
@@ -50,12 +40,6 @@ def test_mutants_are_killed_or_equivalent(small: pytest.MonkeyPatch, capsys: pyt
     assert command.main(["mt"])
     assert "| mt, all | 40 |" in (total := capsys.readouterr().out.splitlines()[-1])
     assert "| 100.0 % |" in total
-
-
-def test_a_motion_that_ends_about_the_first_update_has_a_clock() -> None:
-    """Where ticks are short, some of them would end before they begin."""
-    box = next(box for box in BOXES if box.name == "registers, native")
-    assert min(trace.n_clocks for trace in ending(box.spec, np.random.default_rng(1))) == 1
 
 
 @nightly
@@ -77,19 +61,6 @@ def test_mutants_of_a_control_loop_are_killed(monkeypatch: pytest.MonkeyPatch) -
         ]
         with pytest.raises(AssertionError, match="loop, conventional, from clock"):
             proofs.mutation.score.judge(replace(case, mutants=12), pool, replace(played, traces=parts))
-
-
-@nightly
-def test_standstill_kills_too_few(small: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    small.setattr(Case, "play", lambda case, n_clocks: standstill(case.spec, n_clocks))
-    small.setattr(proofs.mutation.score, "equivalent", lambda case, flat, group, *more: [False] * len(group))
-    assert not command.main([])
-    survivors = capsys.readouterr().out.partition("survivors of mt, in clocks:\n")[2].splitlines()
-    assert len(survivors) > 10
-    # Some multiplexers that Yosys makes have no line.
-    known = ("  hdl/", "  amaranth/lib/cdc.py", "  : ")
-    assert all(line.startswith(known) for line in survivors), survivors
-    assert sum(line.startswith("  hdl/") for line in survivors) > 10
 
 
 @nightly
@@ -117,13 +88,6 @@ def test_registers_power_up_as_in_the_core(tmp_path: Path) -> None:
         found = [mutant for mutant in found if mutant.option("port") == "Q"][:GROUP]
         _, rows = run(library(case.pins, flat, found), len(found), len(case.pins.outputs), played.pins, 3000)
         hold(case, played, rows)
-
-
-def test_an_external_tick_comes_at_regular_times() -> None:
-    trace = bursts(next(case for case in CASES if case.spec.external_tick).spec, np.random.default_rng(1))
-    assert trace.tick_in is not None
-    rises = trace.clock[1:][trace.tick_in[1:] > trace.tick_in[:-1]]
-    assert len({*np.diff(rises).tolist()}) == 1
 
 
 def test_steps_have_windows_of_all_lengths_and_all_counts() -> None:

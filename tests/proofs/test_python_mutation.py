@@ -6,11 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-from proofs.python_mutation.__main__ import report
-from proofs.python_mutation.covered import chosen_for, with_imports
-from proofs.python_mutation.judge import Verdict
-from proofs.python_mutation.mutants import ARGUED, ROOMS, Mutant, files, mutants_of, mutated, sample
+from proofs.python_mutation.mutants import ARGUED, ROOMS, files, mutants_of, mutated, sample
 from support.nightly import nightly
 
 ROOT = Path(__file__).parents[2]
@@ -51,49 +47,6 @@ def test_every_argument_is_of_a_mutant() -> None:
     assert ARGUED.keys() <= {mutant.name for file in files(ROOT) for mutant in mutants_of(ROOT, file)}
 
 
-def test_the_fastest_tests_of_a_line_are_taken() -> None:
-    found = {
-        "": {"seconds": 0.0, "lines": {"x.py": [1]}},
-        "slow": {"seconds": 9.0, "lines": {"x.py": [2, 3]}},
-        "fast": {"seconds": 1.0, "lines": {"x.py": [2]}},
-        "other": {"seconds": 0.1, "lines": {"y.py": [2]}},
-    }
-    assert chosen_for(found, "x.py", 2, 20) == ["fast", "slow"]
-    assert chosen_for(found, "x.py", 2, 5) == ["fast"]
-    assert chosen_for(found, "x.py", 3, 5) == ["slow"]
-    assert chosen_for(found, "x.py", 3, 20) == ["slow", "fast"]
-    assert chosen_for(found, "x.py", 1, 20) == ["fast", "slow"]
-    assert chosen_for(found, "z.py", 1, 20) == []
-
-
-def test_tests_that_take_next_to_no_time_come_first() -> None:
-    """Then one of each function, and the next of each."""
-    seconds = {"f[1]": 0.01, "f[2]": 0.02, "f[3]": 1.0, "f[4]": 2.0, "g": 3.0}
-    found = {test: {"seconds": took, "lines": {"x.py": [2]}} for test, took in seconds.items()}
-    assert chosen_for(found, "x.py", 2, 20) == ["f[1]", "f[2]", "f[3]", "g", "f[4]"]
-
-
-def test_a_test_may_use_what_is_computed_in_an_import(tmp_path: Path) -> None:
-    (tmp_path / "test_x.py").write_text(
-        "from tachometry.spec.language.units import PI\nfrom tachometry.spec.core import widths\n"
-    )
-    (tmp_path / "test_y.py").write_text("import tachometry.spec\n")
-    entry, all_files = (
-        {"seconds": 1.0, "lines": {"spec/language/units.py": [3]}},
-        ("spec/language/units.py", "spec/core/widths.py", "x.py"),
-    )
-    before = {
-        "": {"seconds": 0.0, "lines": {file: [1] for file in all_files}},
-        "test_x.py::test_pi": entry,
-        "test_y.py::test_all": {"seconds": 2.0, "lines": {}},
-    }
-    found = with_imports(tmp_path, before)
-    lines = found["test_x.py::test_pi"]["lines"]
-    assert (lines["spec/language/units.py"], lines["spec/core/widths.py"]) == ([3], [])
-    assert found["test_y.py::test_all"]["lines"].keys() == {"spec/language/units.py", "spec/core/widths.py"}
-    assert chosen_for(found, "spec/core/widths.py", 5, 20) == ["test_x.py::test_pi", "test_y.py::test_all"]
-
-
 SCRIPT = """
 import sys
 from pathlib import Path
@@ -120,13 +73,3 @@ def test_a_wrong_line_is_noticed_by_its_tests_alone(tmp_path: Path) -> None:
     env = {**os.environ, "PYTHONPATH": str(ROOT / "tests")}
     done = subprocess.run(command, cwd=ROOT, env=env, check=True, capture_output=True, text=True)
     assert done.stdout.split() == ["survived", "timeout", "killed", "untested"]
-
-
-@pytest.mark.parametrize(("killed", "fine"), [(96, True), (94, False)])
-def test_the_score_of_every_room_must_be_high(killed: int, fine: bool, capsys: pytest.CaptureFixture[str]) -> None:
-    mutants = [Mutant("spec/language/units.py", nth, 0, nth, "here", f"{nth} → 0") for nth in range(100)]
-    verdicts = [Verdict(m, "killed" if nth < killed else "survived", 3, 1.0) for nth, m in enumerate(mutants)]
-    assert report(verdicts) == fine
-    out = capsys.readouterr().out
-    assert f"| spec | 100 | {killed} | 0 | 0 | {100 - killed} | {killed}.0 % |" in out
-    assert "spec/language/units.py: here: 99 → 0" in out

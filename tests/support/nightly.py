@@ -3,6 +3,12 @@
 `make test` keeps every kind of check on the smallest case that shows it, as it must end in five minutes. A comment at
 the mark says why the rest is enough. What breaks something on purpose is `nightly`, too: it asks what the tests notice,
 not whether the product is right.
+
+What only nightly cases notice, so that whoever changes these runs them:
+
+- clocks that CXXRTL skips in a tracking core, or about a change of a loop's commands: tests/sim/engines/test_idle.py;
+- the tracking datapath alone with external ticks as close as they may be: tests/hdl/methods/test_track.py;
+- a wheel of which one tooth is missing, or a pair of twelve, in every bit: tests/hdl/front_end/test_tooth_wheel.py.
 """
 
 from collections.abc import Iterable
