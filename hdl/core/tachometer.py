@@ -19,6 +19,7 @@ from tachometry.hdl.front_end.position_counter import PositionCounter
 from tachometry.hdl.front_end.probe_latch import ProbeLatch
 from tachometry.hdl.front_end.pulse_counter import PulseCounter
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
+from tachometry.hdl.front_end.standstill import Standstill
 from tachometry.hdl.methods import DATAPATHS
 from tachometry.hdl.methods.datapath import LongTicks, OwnStandstill, OwnTicks, TickSource
 from tachometry.hdl.output.compare_output import CompareOutput
@@ -26,7 +27,6 @@ from tachometry.hdl.output.fine_compare_output import FineCompareOutput
 from tachometry.hdl.output.low_pass import LowPass
 from tachometry.hdl.output.over_speed import OverSpeed
 from tachometry.hdl.output.record_stream import RecordStream
-from tachometry.hdl.output.standstill import Standstill
 from tachometry.hdl.output.update import update_layout
 from tachometry.hdl.output.update_age import UpdateAge
 from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput, SerialVelocityOutput

@@ -1,6 +1,6 @@
 """A timer measures the time since the last count."""
 
-from amaranth import Module, Signal
+from amaranth import Cat, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -63,10 +63,16 @@ class GapTimer(wiring.Component):
         m.d.comb += self.silent.eq(self.tick & ~self.count & ~earlier)
         if not self._on_lattice:
             m.d.sync += earlier.eq(~self.tick & (self.count | earlier))
+        more = (self.age + 1)[: len(self.age)]
         with m.If(self.period):
-            m.d.sync += [self.age.eq(self.age + 1), longest.eq(self.age == self._max_periods - 1)]
+            m.d.sync += [self.age.eq(more), longest.eq(has_reached(more, self._max_periods))]
             with m.If(longest | self.count):
                 m.d.sync += [self.age.eq(1), longest.eq(0), self.opened.eq(self.count)]
             with m.If(self.count):
                 m.d.sync += self.was_negative.eq(self.negative)
         return m
+
+
+def has_reached(counter: Value, number: int) -> Value:
+    """Tell whether a counter that goes up from below is at this number for the first time: all its ones are there."""
+    return Cat(counter[bit] for bit in range(number.bit_length()) if number >> bit & 1).all()

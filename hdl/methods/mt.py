@@ -3,6 +3,7 @@
 from amaranth import Module, Mux, Signal, Value, ValueLike, signed
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
+from tachometry.hdl.methods.gap_timer import has_reached
 from tachometry.hdl.methods.timed import TimedDatapath
 from tachometry.spec import MTTachometer
 from tachometry.spec.language.units import signed_width
@@ -51,7 +52,7 @@ class MTMethod(TimedDatapath):
         ]
         with m.If(timer.period):
             m.d.sync += length.eq(length + 1)
-            with m.If(length == self._min_periods):
+            with m.If(has_reached(length, self._min_periods)):
                 m.d.sync += late.eq(1)
             with m.If(opens):
                 m.d.sync += [length.eq(1), late.eq(0)]
@@ -67,7 +68,7 @@ class MTMethod(TimedDatapath):
         cycled = Signal()
         waived = Signal()
         m.d.comb += number.eq(counted + 1)
-        with m.If(length == self._patient_periods):
+        with m.If(has_reached(length, self._patient_periods)):
             m.d.sync += waived.eq(1)
         with m.If(self.gap_timer.count):
             m.d.sync += [counted.eq(number), cycled.eq(cycled | (number == 0))]

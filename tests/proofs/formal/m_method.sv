@@ -67,7 +67,7 @@ module m_method #(
     lemma_bounded: assert (bounded && ticks <= N);
     lemma_rests: assert (quiet <= MAX_TICKS + 1 && rested == (quiet > MAX_TICKS) && core_rests == rested
         && core_silent == (quiet != 0)
-        && (quiet == 0 || (rested ? core_empty < 0 : core_empty == MAX_TICKS - 1 - $signed({1'b0, quiet}))));
+        && (quiet == 0 || rested || core_empty == MAX_TICKS - 1 - $signed({1'b0, quiet})));
     pm_update: assert (velocity_valid == tick_ && interval == N && !forced);
     pm_velocity: assert (!velocity_valid || (2 * shown <= 2 * scaled + N && 2 * scaled + N < 2 * shown + 2 * N));
     pm_stalled: assert (stalled == rests);

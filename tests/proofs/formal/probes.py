@@ -6,7 +6,7 @@ from tachometry.spec import Encoder, Speed, Timing
 
 STANDSTILL_PROBES = {
     "core_rests": "standstill.shown",
-    "core_empty": "standstill.left",
+    "core_empty": "standstill.ticks.left",
     "core_silent": "standstill.was_silent",
 }
 

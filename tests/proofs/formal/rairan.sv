@@ -132,7 +132,7 @@ module rairan #(
     lemma_rest: assert (core_forced == was_alone && core_at_rest == was_rest && (!was_rest || n_ep == 0));
     lemma_rests: assert (quiet <= MAX_TICKS + 1 && rested == (quiet > MAX_TICKS) && core_rests == rested
         && core_silent == (quiet != 0)
-        && (quiet == 0 || (rested ? core_empty < 0 : core_empty == MAX_TICKS - 1 - $signed({1'b0, quiet}))));
+        && (quiet == 0 || rested || core_empty == MAX_TICKS - 1 - $signed({1'b0, quiet})));
     lemma_size: assert (pulse_count <= MAX_COUNT && -pulse_count <= MAX_COUNT);
     lemma_sum: assert (core_sum <= MAX_COUNT + 1 && -core_sum <= MAX_COUNT + 1
         && core_outside == (core_sum > MAX_COUNT || -core_sum > MAX_COUNT));

@@ -263,7 +263,7 @@ module timed #(
     lemma_rested: assert (opened || since == 0 || !measuring || (distance == 0 && silent));
     lemma_rests: assert (quiet <= MAX_TICKS + 1 && rested == (quiet > MAX_TICKS) && core_rests == rested
         && core_silent == (quiet != 0)
-        && (quiet == 0 || (rested ? core_empty < 0 : core_empty == MAX_TICKS - 1 - $signed({1'b0, quiet}))));
+        && (quiet == 0 || rested || core_empty == MAX_TICKS - 1 - $signed({1'b0, quiet})));
     lemma_size: assert (pulse_count <= MAX_COUNT && -pulse_count <= MAX_COUNT);
     lemma_fresh: assert (fresh && fresh_past);
     lemma_began: assert (!fresh_division || fresh || (since != 0 && measuring));

@@ -1,8 +1,10 @@
 """Tell whether the shaft rests."""
 
-from amaranth import Module, Mux, Signal, signed
+from amaranth import EnableInserter, Module, Mux, ResetInserter, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.front_end.sampling_clock import SamplingClock
 
 
 class Standstill(wiring.Component):
@@ -44,10 +46,9 @@ class Standstill(wiring.Component):
         differs = "shift" in self.signature.members
         shown = Signal()
         silent = ~self.m_e[:-1].any()  # only the least number has nothing but its sign
-        # Nominal ticks that may still be empty; negative, if none may. So a sign is the flag, and nothing has to be
-        # compared.
         if differs:
-            # The length of a tick comes with it, so its own ticks are among them.
+            # Nominal ticks that may still be empty, those of this tick among them; negative, if none may. So a sign is
+            # the flag, and nothing has to be compared.
             most = self._max_ticks
             left = Signal(signed(most.bit_length() + 1), init=most - 1)
             less = Signal.like(left)
@@ -56,17 +57,13 @@ class Standstill(wiring.Component):
             with m.If(self.tick):
                 m.d.sync += left.eq(Mux(silent, Mux(less[-1], left, less), most))
         else:
-            # They follow m_e a tick later, so that a count loads what reset loads: no bit needs a gate for it.
-            most = self._max_ticks - 2
-            left = Signal(signed(most.bit_length() + 1), init=most)
+            # Ticks are counted one later than m_e, so that a count does what reset does.
             was_silent = Signal(init=1)
-            none = silent & was_silent & left[-1]
+            ticks = SamplingClock(self._max_ticks)
+            m.submodules.ticks = ResetInserter(self.tick & ~was_silent)(EnableInserter(self.tick)(ticks))
+            none = silent & was_silent & (shown | ticks.last)
             with m.If(self.tick):
                 m.d.sync += was_silent.eq(silent)
-            with m.If(self.tick & ~left[-1]):
-                m.d.sync += left.eq(left - 1)
-            with m.If(self.tick & ~was_silent):
-                m.d.sync += left.eq(most)
         m.d.comb += self.stalled.eq(Mux(self.tick, none, shown))
         m.d.sync += shown.eq(self.stalled)
         return m

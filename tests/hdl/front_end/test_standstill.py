@@ -7,8 +7,8 @@ from support.nightly import only
 from support.options import had_by
 from support.simulate import clock_by_clock, ticks
 
+from tachometry.hdl.front_end.standstill import Standstill
 from tachometry.hdl.methods.s import SMethod
-from tachometry.hdl.output.standstill import Standstill
 from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress
 from tachometry.spec import METHODS, Encoder, STachometer, Timing, of_texts
