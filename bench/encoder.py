@@ -50,21 +50,13 @@ GREY, BLACK, BLUE, RED = "#bbb", "#222", "#2a78c8", "#b3261e"
 
 @dataclass(frozen=True)
 class Example:
-    """An imperfection as the table has it, and in a magnitude that can be seen.
+    """An imperfection as the table has it, and in a magnitude that can be seen."""
 
-    Parameters
-    ----------
-    option : str
-        What the command line calls it.
-    measured, drawn : dict
-        Parameters of the encoder for the table and for the picture; without the latter it is not drawn.
-    decoding, filter_clocks : int
-        Of the core.
-    """
-
-    option: str
+    option: str  # what the command line calls it
+    # parameters of the encoder for the table and for the picture; without the latter it is not drawn
     measured: dict[str, Any] = field(default_factory=dict)
     drawn: dict[str, Any] = field(default_factory=dict)
+    # decoding and filter_clocks: of the core
     decoding: int = 4
     filter_clocks: int = 0
 

@@ -32,17 +32,11 @@ class Shaft(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Disc:
-    """The edges of a disc: edge k lies at the angle (k + offset[k mod len(offset)]) pitches and begins quarter k.
+    """The edges of a disc: edge k lies at the angle (k + offset[k mod len(offset)]) pitches and begins quarter k."""
 
-    Parameters
-    ----------
-    pitch_rad : float
-        Mean distance of edges: 2 pi / (4 pulses_per_rev).
-    offset : float64 array, each more than -1 and less than 1
-        Displacement of edges, in pitches; edges must stay in order. One entry 0 makes an ideal disc.
-    """
-
-    pitch_rad: float
+    pitch_rad: float  # mean distance of edges: 2 pi / (4 pulses_per_rev)
+    # displacement of edges, in pitches, each more than -1 and less than 1; edges must stay in order, and one entry 0
+    # makes an ideal disc
     offset: FloatArray
 
     def threshold(self, k: IntArray) -> FloatArray:

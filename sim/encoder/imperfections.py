@@ -34,16 +34,10 @@ _CLIP = 0.49  # of the gap to a neighbour: two edges that move towards each othe
 
 @dataclass(frozen=True)
 class Bounce:
-    """Chatter of a contact: how often it falls back after an edge, and within what time.
+    """Chatter of a contact: how often it falls back after an edge, and within what time."""
 
-    Parameters
-    ----------
-    count : int, from 1 to `MAX_BOUNCES`
-    time_s : float, seconds, more than 0
-    """
-
-    count: int
-    time_s: float
+    count: int  # from 1 to `MAX_BOUNCES`
+    time_s: float  # seconds, more than 0
 
     def __post_init__(self) -> None:
         if not 1 <= self.count <= MAX_BOUNCES:
@@ -62,17 +56,10 @@ class Bounce:
 
 @dataclass(frozen=True)
 class LineFault:
-    """A line is at fault from some time on.
+    """A line is at fault from some time on."""
 
-    Parameters
-    ----------
-    line : str
-        `a`, `b`, `c` of halls, `z`, or a complement: `a_n`, `b_n` or `z_n`.
-    time_s : float, seconds
-    """
-
-    line: str
-    time_s: float
+    line: str  # `a`, `b`, `c` of halls, `z`, or a complement: `a_n`, `b_n` or `z_n`
+    time_s: float  # seconds
 
     def __post_init__(self) -> None:
         if self.line not in _FAULTY:

@@ -89,29 +89,20 @@ class Motion:
     In segment j, with u = t - breakpoints[j], the speed is
     start_speed[j] + constant_acceleration[j] u + sine_speed[j] sin(2 pi sine_frequency[j] u).
 
-    Parameters
-    ----------
-    breakpoints : float64 array, shape (n + 1,), seconds, strictly increasing, first entry 0
-        Where segments begin, and where the last one ends: speed and acceleration are smooth in between.
-    start_angle : float64 array, shape (n,), rad
-    start_speed : float64 array, shape (n,), rad/s
-    constant_acceleration : float64 array, shape (n,), rad/s^2
-    sine_speed : float64 array, shape (n,), rad/s
-    sine_frequency : float64 array, shape (n,), Hz
-        0 in segments without a sine.
-
     Raises
     ------
     ValueError
         If a segment is too short to be distinguished from a moment, or a number is 1e30 or more.
     """
 
+    # shape (n + 1,), seconds, strictly increasing, first entry 0: where segments begin, and where the last one ends;
+    # speed and acceleration are smooth in between
     breakpoints: FloatArray
-    start_angle: FloatArray
-    start_speed: FloatArray
-    constant_acceleration: FloatArray
-    sine_speed: FloatArray
-    sine_frequency: FloatArray
+    start_angle: FloatArray  # shape (n,), rad
+    start_speed: FloatArray  # shape (n,), rad/s
+    constant_acceleration: FloatArray  # shape (n,), rad/s^2
+    sine_speed: FloatArray  # shape (n,), rad/s
+    sine_frequency: FloatArray  # shape (n,), Hz: 0 in segments without a sine
 
     def __post_init__(self) -> None:
         if not all(np.all(np.abs(values) < _BELOW) for values in vars(self).values()):
@@ -195,16 +186,10 @@ def _sine_angle(speed: FloatArray, frequency: FloatArray, u: FloatArray) -> Floa
 
 @dataclass(frozen=True)
 class Vibration:
-    """A sinusoidal vibration of the shaft on top of its motion, beginning at its centre.
+    """A sinusoidal vibration of the shaft on top of its motion, beginning at its centre."""
 
-    Parameters
-    ----------
-    amplitude_rad : float, rad, more than 0
-    frequency_hz : float, Hz, more than 0
-    """
-
-    amplitude_rad: float
-    frequency_hz: float
+    amplitude_rad: float  # rad, more than 0
+    frequency_hz: float  # Hz, more than 0
 
     def __post_init__(self) -> None:
         for name, value in (("amplitude", self.amplitude_rad), ("frequency", self.frequency_hz)):

@@ -54,41 +54,28 @@ def _fault(help: str, metavar: str, parse: Callable[[str, str], float], name: st
 class EncoderOptions:
     """Says how a shaft vibrates beside its motion, and what is wrong with its encoder.
 
+    Phase error, duty error, nonuniformity and eccentricity (a pitch is 90 degrees, and both edges of a state may be
+    off) must add up to less than 90 electrical degrees: then no state vanishes. They are of the disc, hence part of the
+    truth. Each imperfection has a stream of random numbers of its own. The help of an option says what it is; beyond:
+
     Parameters
     ----------
-    vibration : Vibration or None
-        Of the shaft; it is part of the truth.
-    jitter : float, from 0 to less than 0.5
-        Standard deviation of the Gaussian shift in time of each edge, as a fraction of its gap to the nearer of its
-        neighbours (edges, start and end of the recording). Shifts are clipped at 0.49 gaps: edges keep their order.
-    nonuniformity : float, from 0 to less than 0.5
-        The disc's offsets are uniform between plus and minus this many pitches.
-    eccentricity : float, from 0 to less than 0.5
-        The disc sits off centre: its edges are displaced by a sine over a turn with this amplitude, in pitches.
-    phase_error_deg : float, electrical degrees, more than -90 and less than 90
-        The centre of B's pulse comes this much later, forwards, than a quarter period after the centre of A's.
-    duty_error_deg : float, electrical degrees, more than -90 and less than 90
-        The pulses of both lines are this much wider than 180, and the pauses narrower. Phase error, duty error,
-        nonuniformity and eccentricity (a pitch is 90 degrees, and both edges of a state may be off) must add up to
-        less than 90: then no state vanishes. They are of the disc, hence part of the truth.
+    jitter : float
+        Neighbours are edges, start and end of the recording. Shifts are clipped at 0.49 gaps: edges keep their order.
+    phase_error_deg : float, electrical degrees
+        Of the pulses' centres, forwards.
+    duty_error_deg : float, electrical degrees
+        The pauses are narrower by as much.
     bounce : Bounce or None
-        After an edge the line falls back and returns so many times, at random moments within the bounce time or half
-        the time to the next edge of either line, whichever is less. Edges that come together do not bounce.
-    lost : float, from 0 to 1
-        Probability that a line misses a pulse: it stays low, and two edges are lost. A pulse that begins before the
-        recording or ends after it is not missed.
-    illegal : float, from 0 to 1
-        Probability that an edge is late and comes at the instant of the next one, so that both lines change at once.
+        The line returns at random moments. Half the way is to the next edge of either line. Edges that come together do
+        not bounce.
+    lost : float
+        A pulse that begins before the recording or ends after it is not missed.
+    illegal : float
         An edge is not late if the one before it is, or if the next one is of the same line, as after a reversal.
-    broken, stuck : LineFault or None
-        A line that is high from some time on, as an open input is, and one that stays as it is then.
-    index_width : int, 1 to 16
-        Quarter periods for which Z is high. At 1 it is gated: high only while the lines are in its state. A wider one
-        is not, and is about that state: 2 quarters go on forward, 4 begin one before it.
-    index_skew_s : float, seconds
-        Z comes so much later than the lines, or earlier; then it is not gated.
-    seed : int, at least 0
-        Of all random numbers. Each imperfection has a stream of its own.
+    index_width : int
+        At 1 the index is high only while the lines are in its state. A wider one is about that state: 2 quarters go on
+        forward, 4 begin one before it.
 
     Raises
     ------

@@ -38,20 +38,13 @@ class _GateDesign(LoopDesign):
 
 @dataclass(frozen=True, eq=False)
 class Through:
-    """Holds all that went through a core with a loop.
+    """Holds all that went through a core with a loop."""
 
-    Parameters
-    ----------
-    trace : PinTrace
-        The lines of the encoder.
-    commands : int64 array, shape (n, 3)
-        In each control tick: position, velocity and acceleration, in LSB of the ports; the position does not wrap.
-    currents : int64 array, shape (m, 4)
-        With each `current_valid`: the clock, current, filtered velocity and disturbance.
-    """
-
-    trace: PinTrace
+    trace: PinTrace  # the lines of the encoder
+    # shape (n, 3): position, velocity and acceleration in each control tick, in LSB of the ports; the position does
+    # not wrap
     commands: NDArray[np.int64]
+    # shape (m, 4): with each `current_valid`: the clock, current, filtered velocity and disturbance
     currents: NDArray[np.int64]
 
 

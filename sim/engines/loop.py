@@ -107,17 +107,11 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """Says where a disc's edges are met.
+    """Says where a disc's edges are met."""
 
-    Parameters
-    ----------
-    offset : float64 array, shape (k,)
-        Of each edge, in pitches; the k-th after the last is the first again.
-    jitter : float64 array, shape (n,)
-        Of each passage, in gaps to the nearer neighbour, one after the other; after the last comes the first again.
-    """
-
-    offset: FloatArray
+    offset: FloatArray  # shape (k,): of each edge, in pitches; the k-th after the last is the first again
+    # shape (n,): of each passage, in gaps to the nearer neighbour, one after the other; after the last comes the first
+    # again
     jitter: FloatArray
 
 

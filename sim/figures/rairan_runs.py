@@ -163,20 +163,13 @@ def _core(ts: float, to_the_letter: bool) -> RairanTachometer:
 
 @dataclass(frozen=True, eq=False)
 class _Errors:
-    """Holds the relative errors at each speed.
+    """Holds the relative errors at each speed."""
 
-    Parameters
-    ----------
-    mean, greatest, of_bound : float64 arrays, shape (3, n)
-        Of the three estimates: mean and greatest, and the greatest share of its bound.
-    within_ts : bool array, shape (n,)
-        The speed is always between n2 and n1, but for one ts in dt.
-    """
-
+    # shape (3, n), of the three estimates: mean and greatest, and the greatest share of its bound
     mean: FloatArray
     greatest: FloatArray
     of_bound: FloatArray
-    within_ts: NDArray[np.bool_]
+    within_ts: NDArray[np.bool_]  # shape (n,): the speed is always between n2 and n1, but for one ts in dt
 
 
 def _errors(lab: Lab, spec: RairanTachometer, speeds: FloatArray, limit: float, seconds: float) -> _Errors:

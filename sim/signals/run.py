@@ -22,16 +22,10 @@ class Table:
     """Has one row for every clock in which a strobe is high.
 
     A column is found by its name, `table["velocity"]`, or as an attribute, `table.velocity`.
-
-    Parameters
-    ----------
-    clock : int64 array, shape (n,)
-        Clocks in which the strobe is high.
-    columns : mapping of str to array, shape (n,)
-        Values of ports in these clocks: bool for ports of one bit, else int64.
     """
 
-    clock: Ints
+    clock: Ints  # shape (n,): clocks in which the strobe is high
+    # shape (n,): values of ports in these clocks: bool for ports of one bit, else int64
     columns: Mapping[str, NDArray[Any]]
 
     def __len__(self) -> int:
@@ -61,16 +55,10 @@ class Table:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """Holds all that happened at the ports in clocks 0 … n_clocks − 1.
-
-    Parameters
-    ----------
-    tables : dict of str to Table
-        By the strobe, for each that the core has.
-    """
+    """Holds all that happened at the ports in clocks 0 … n_clocks − 1."""
 
     n_clocks: int
-    tables: dict[str, Table]
+    tables: dict[str, Table]  # by the strobe, for each that the core has
 
     @classmethod
     def of_ports(cls, spec: AnySpec, n_clocks: int, tables: Mapping[str, Table]) -> Run:

@@ -29,32 +29,18 @@ _STEADY, _MULTIPLES, _DISTANCES = 1000, 200, 8  # samples: speeds, multiples of 
 
 @dataclass(frozen=True)
 class Plan:
-    """Measurements to be expected at constant speeds of an ideal encoder, once the first two windows are over.
+    """Measurements to be expected at constant speeds of an ideal encoder, once the first two windows are over."""
 
-    Parameters
-    ----------
-    speed : float64 array, shape (n,), rad/s
-    counts_per_tick : float64 array, shape (n,)
-        ω/ω_u.
-    interval : float64 array, shape (n,), ticks
-        Mean m_s; the maximum where updates are forced.
-    measurement_time : float64 array, shape (n,), seconds
-        T_m.
-    resolution : float64 array, shape (n,), rad/s
-        Q_V. No error is greater, but for the rounding, once the method has settled (the S method: once two successive
-        ticks have counted alike). NaN, as the times, where the method cannot measure, or nothing is known of it.
-    forced : bool array, shape (n,)
-        The maximum time ends the measurement.
-    disc : float64 array, shape (n,), rad/s
-        What a real disc adds to the error, see `sim.theory.performance.disc_error`.
-    """
-
-    speed: NDArray[np.float64]
-    counts_per_tick: NDArray[np.float64]
-    interval: NDArray[np.float64]
-    measurement_time: NDArray[np.float64]
+    speed: NDArray[np.float64]  # shape (n,), rad/s
+    counts_per_tick: NDArray[np.float64]  # shape (n,): ω/ω_u
+    interval: NDArray[np.float64]  # shape (n,), ticks: mean m_s; the maximum where updates are forced
+    measurement_time: NDArray[np.float64]  # shape (n,), seconds: T_m
+    # shape (n,), rad/s: Q_V. No error is greater, but for the rounding, once the method has settled (the S method: once
+    # two successive ticks have counted alike). NaN, as the times, where the method cannot measure, or nothing is known
+    # of it.
     resolution: NDArray[np.float64]
-    forced: NDArray[np.bool_]
+    forced: NDArray[np.bool_]  # shape (n,): the maximum time ends the measurement
+    # shape (n,), rad/s: what a real disc adds to the error, see `sim.theory.performance.disc_error`
     disc: NDArray[np.float64]
 
     @property

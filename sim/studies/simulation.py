@@ -29,33 +29,18 @@ Pulses = Callable[[TachometerSpec], dict[str, Ints]]
 
 @dataclass(frozen=True)
 class Axis:
-    """Holds what an axis has made of its encoder.
+    """Holds what an axis has made of its encoder."""
 
-    Parameters
-    ----------
-    spec : TachometerSpec
-        Of a core of this axis alone.
-    run : Run
-        Its rows.
-    truth : Encoding or None
-        What the shaft truly did, if it is known; with it `counts_in` and `error`.
-    n_merged : int
-        Edges that came too soon after another to be told apart.
-    counts_in, counts_out : int
-        Of the shaft, up to the last tick, and of the core.
-    error : VelocityError or None
-        Of it; None also if there was no update.
-    """
-
-    spec: TachometerSpec
-    run: Run
+    spec: TachometerSpec  # of a core of this axis alone
+    run: Run  # its rows
     recording: Recording
-    truth: Encoding | None
-    n_merged: int
+    truth: Encoding | None  # what the shaft truly did, if it is known; with it `counts_in` and `error`
+    n_merged: int  # edges that came too soon after another to be told apart
+    # counts_in and counts_out: of the shaft, up to the last tick, and of the core
     counts_in: int | None
     counts_out: int
     held: HeldVelocity
-    error: VelocityError | None
+    error: VelocityError | None  # of it; None also if there was no update
 
     @property
     def difference(self) -> int:
@@ -85,19 +70,11 @@ class Axis:
 
 @dataclass(frozen=True)
 class Simulation:
-    """Holds a simulation, compared in every bit.
-
-    Parameters
-    ----------
-    engine : str
-        What has run the hardware.
-    wanted : int
-        Clocks that it was to run; after Ctrl-C it has run fewer.
-    """
+    """Holds a simulation, compared in every bit."""
 
     spec: CoreSpec
-    engine: str
-    wanted: int
+    engine: str  # what has run the hardware
+    wanted: int  # clocks that it was to run; after Ctrl-C it has run fewer
     lockstep: Lockstep
     axes: tuple[Axis, ...]
 

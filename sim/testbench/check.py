@@ -62,25 +62,15 @@ NO_COCOTB = "to simulate, cocotb must be there: pip install cocotb; or take --no
 
 @dataclass(frozen=True)
 class Make:
-    """Makes the files of a core as texts by file name.
+    """Makes the files of a core as texts by file name."""
 
-    Parameters
-    ----------
-    export : callable
-        Those of a core, its name, its bus and the bus's bits a second, a framework or "none", and whether there is an
-        interrupt.
-    targets : callable
-        Frameworks that a core of a name, on a bus, can go into, each with the names of its files.
-    jobs : callable
-        Those of continuous integration, for the name of a core.
-    names : callable
-        Names of all files that there can be, for the name of a core.
-    """
-
+    # those of a core, its name, its bus and the bus's bits a second, a framework or "none", and whether there is an
+    # interrupt
     export: Callable[[AnySpec, str, str, int | None, str, bool], Mapping[str, str]]
+    # frameworks that a core of a name, on a bus, can go into, each with the names of its files
     targets: Callable[[str, str], Mapping[str, Sequence[str]]]
-    jobs: Callable[[str], Mapping[str, str]]
-    names: Callable[[str], Sequence[str]]
+    jobs: Callable[[str], Mapping[str, str]]  # those of continuous integration, for the name of a core
+    names: Callable[[str], Sequence[str]]  # names of all files that there can be, for the name of a core
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,7 @@ class Carrying:
     # how the velocity in counts per clock is computed, whose LSB is 2^-(fine_bits + more_bits) counts
     per_clock: VelocityOutput
     shift: int  # of the velocity that it takes, to the left
-    # fine_bits and more_bits: fraction bits of the place that is given, and further ones of the place that is carried
-    # on
+    # fraction bits of the place that is given, and further ones of the place that is carried on
     fine_bits: int
     more_bits: int
     # clocks from the end of a tick at the pins to the velocity per clock of its update, and three to use the place

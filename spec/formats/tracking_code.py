@@ -58,35 +58,18 @@ _LEFTS = {"lo+": Left.LEAST, "hi+": Left.MOST}
 
 @dataclass(frozen=True)
 class Instruction:
-    """An instruction.
-
-    Parameters
-    ----------
-    left : Left
-    source : Source
-    word : str
-        Of the source.
-    subtract, by_sign, keep : bool
-        Whether the operand is subtracted, or added with the sign that was kept; whether the sign of the sum is kept.
-    store : str
-        Word that takes the sum; empty: none.
-    start : Start
-    how : str
-        Name of a shift, or number of a table of gains.
-    output : str
-    jump : Jump
-    target : str
-    """
+    """An instruction."""
 
     left: Left = Left.SUM
     source: Source = Source.NONE
-    word: str = ""
+    word: str = ""  # of the source
+    # whether the operand is subtracted, or added with the sign that was kept; whether the sign of the sum is kept
     subtract: bool = False
     by_sign: bool = False
     keep: bool = False
-    store: str = ""
+    store: str = ""  # word that takes the sum; empty: none
     start: Start = Start.NONE
-    how: str = ""
+    how: str = ""  # name of a shift, or number of a table of gains
     output: str = ""
     jump: Jump = Jump.NEVER
     target: str = ""

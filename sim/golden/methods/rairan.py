@@ -18,34 +18,17 @@ Bools = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Windows:
-    """Has one row per window: from the count that opens it, or from reset, to the next that opens one.
+    """Has one row per window: from the count that opens it, or from reset, to the next that opens one."""
 
-    Parameters
-    ----------
-    start, end : int64 arrays, shape (n,)
-        Clocks of both counts; reset is clock −1, and the end of the last window lies beyond all clocks.
-    sign : int64 array, shape (n,)
-        Direction in it; 0 as long as there was no count.
-    turns : bool array, shape (n,)
-        The count at its end is one against that direction.
-    c_ep : int64 array, shape (n,)
-        Counts in its first dt.
-    in_step : bool array, shape (n,)
-        Its first dt has no count but the one that opened it.
-    n_dt : int64 array, shape (n,)
-        dt that end in it.
-    shift : int64 array, shape (n,)
-        k, its dt being 2^k nominal ones.
-    """
-
+    # shape (n,): clocks of both counts; reset is clock −1, and the end of the last window lies beyond all clocks
     start: Ints
     end: Ints
-    sign: Ints
-    turns: Bools
-    c_ep: Ints
-    in_step: Bools
-    n_dt: Ints
-    shift: Ints
+    sign: Ints  # shape (n,): direction in it; 0 as long as there was no count
+    turns: Bools  # shape (n,): the count at its end is one against that direction
+    c_ep: Ints  # shape (n,): counts in its first dt
+    in_step: Bools  # shape (n,): its first dt has no count but the one that opened it
+    n_dt: Ints  # shape (n,): dt that end in it
+    shift: Ints  # shape (n,): k, its dt being 2^k nominal ones
 
 
 def orbit(following: Ints, first: int) -> Ints:

@@ -54,30 +54,19 @@ class Counts:
 
 @dataclass(frozen=True)
 class Measurements:
-    """Holds the operands of the divider, one row each, in order.
+    """Holds the operands of the divider, one row each, in order."""
 
-    Parameters
-    ----------
-    clock : int64 array, shape (n,)
-    distance : int64 array, shape (n,), half counts
-    time : int64 array, shape (n,), timer periods
-    forced, beyond : bool arrays, shape (n,)
-        `beyond`: out of range before any division.
-    least, most : int64 arrays, shape (n, 2), or None
-        Distance, in eighths of a count, and time for the least and for the greatest possible speed; time 0: that bound
-        is absent. None if the core shows no bounds.
-    known : bool array, shape (n,)
-        Whether `least` and `most` are valid.
-    """
-
-    clock: Ints
-    distance: Ints
-    time: Ints
+    clock: Ints  # shape (n,)
+    distance: Ints  # shape (n,), half counts
+    time: Ints  # shape (n,), timer periods
+    # shape (n,): the maximum time has ended it; out of range before any division
     forced: NDArray[np.bool_]
     beyond: NDArray[np.bool_]
+    # shape (n, 2): distance, in eighths of a count, and time for the least and for the greatest possible speed; time 0:
+    # that bound is absent. None if the core shows no bounds.
     least: Ints | None
     most: Ints | None
-    known: NDArray[np.bool_]
+    known: NDArray[np.bool_]  # shape (n,): whether `least` and `most` are valid
 
     def __getitem__(self, rows: Any) -> "Measurements":
         columns: dict[str, Any] = {

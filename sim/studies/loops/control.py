@@ -86,25 +86,15 @@ def edges_of(encoder: VirtualEncoder) -> Edges:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """Figures of a run: all but the dip from a time on until a load comes.
+    """Figures of a run: all but the dip from a time on until a load comes."""
 
-    Parameters
-    ----------
-    rms, largest : float, rad/s
-        Of the shaft's true speed less the commanded one.
-    sound : float, A rms
-        Of the commanded current, above 50 Hz: what is heard.
-    limited : float
-        Share of the time in which the commanded current is at its limit.
-    dip : float or None, rad/s
-        The largest deviation of the true speed while a load is there and for as long behind it, less the mean for as
-        long before it; None without a load.
-    """
-
+    # rms and largest, rad/s: of the shaft's true speed less the commanded one
     rms: float
     largest: float
-    sound: float
-    limited: float
+    sound: float  # A rms: of the commanded current, above 50 Hz: what is heard
+    limited: float  # share of the time in which the commanded current is at its limit
+    # rad/s: the largest deviation of the true speed while a load is there and for as long behind it, less the mean for
+    # as long before it; None without a load
     dip: float | None
 
 
