@@ -1,6 +1,6 @@
 """A counter divides the clock into sampling periods."""
 
-from amaranth import Cat, Const, Module, Signal, signed
+from amaranth import Cat, Const, Module, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
@@ -8,6 +8,25 @@ from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
 
 # Bits whose parity makes a shift register of so many bits go through all states but one (Alfke, XAPP 052).
 _TAPS = {5: (5, 3), 6: (6, 5), 7: (7, 6), 8: (8, 6, 5, 4), 9: (9, 5), 10: (10, 7), 11: (11, 9), 12: (12, 6, 4, 1)}
+
+
+def states_of(bits: int) -> tuple[int, ...]:
+    """Return all states of a shift register with feedback, in order; empty if its taps are not known."""
+    if bits not in _TAPS:
+        return ()
+    # That of ones alone does not change; of all others only the last has ones below its highest bit.
+    state = last = (1 << (bits - 1)) - 1
+    found: list[int] = []
+    while not found or state != last:
+        parity = sum(state >> (tap - 1) for tap in _TAPS[bits]) & 1
+        state = (state << 1 | parity ^ 1) & ((1 << bits) - 1)
+        found.append(state)
+    return tuple(found)
+
+
+def state_after(state: Value) -> Value:
+    """Return the state of a shift register that follows one."""
+    return Cat(~Cat(state[tap - 1] for tap in _TAPS[len(state)]).xor(), state[:-1])
 
 
 class SamplingClock(wiring.Component):
@@ -41,17 +60,7 @@ class SamplingClock(wiring.Component):
     @property
     def states(self) -> tuple[int, ...]:
         """States of the shift register, the last of a window at the end; empty: it is a counter."""
-        bits = self._tick_cycles.bit_length()
-        if bits not in _TAPS:
-            return ()
-        # That of ones alone does not change; of all others only the last has ones below its highest bit.
-        state = last = (1 << (bits - 1)) - 1
-        found: list[int] = []
-        while not found or state != last:
-            parity = sum(state >> (tap - 1) for tap in _TAPS[bits]) & 1
-            state = (state << 1 | parity ^ 1) & ((1 << bits) - 1)
-            found.append(state)
-        return tuple(found)
+        return states_of(self._tick_cycles.bit_length())
 
     @property
     def idle(self) -> tuple[Idle, ...]:
@@ -72,7 +81,7 @@ class SamplingClock(wiring.Component):
             state = Signal(bits, init=first)
             # Also of ones alone.
             m.d.comb += self.last.eq(state[:-1].all())
-            m.d.sync += state.eq(Cat(~Cat(state[tap - 1] for tap in _TAPS[bits]).xor(), state))
+            m.d.sync += state.eq(state_after(state))
             with m.If(self.last):
                 m.d.sync += state.eq(first)
             return m

@@ -1,10 +1,13 @@
 """The machine of the tracking method: one adder, one accumulator, a memory, a program, and a unit."""
 
+from collections.abc import Sequence
+
 from amaranth import Array, C, Cat, Module, Mux, Shape, Signal, Value, signed
 from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.front_end.sampling_clock import state_after, states_of
 from tachometry.hdl.methods.small_unit import SmallUnit
 from tachometry.hdl.methods.track_unit import QuickUnit
 from tachometry.spec.formats.tracking import PLACE_BITS, WIDTH
@@ -28,7 +31,7 @@ _PLACES_BITS = PLACE_BITS - 1 - 6  # twice the places, over 64
 
 def _layout(program: Program) -> data.StructLayout:
     """Return an instruction. A jump has its target where others have how, and where the sum goes."""
-    target = (len(program.code.instructions) - 1).bit_length()
+    target = len(program.code.instructions).bit_length()
     store = max(ADDRESS_BITS, target - HOW_BITS)
     return data.StructLayout(
         {
@@ -48,15 +51,15 @@ def _layout(program: Program) -> data.StructLayout:
     )
 
 
-def _encoded(program: Program, one: Instruction, layout: data.StructLayout) -> int:
-    """Return an instruction as the program memory holds it."""
+def _encoded(program: Program, one: Instruction, layout: data.StructLayout, at: Sequence[int]) -> int:
+    """Return an instruction as the program memory holds it; `at` is where each one stands."""
     where = program.addresses
     word = where[one.word] if one.source == Source.WORD else FIRST_INPUT
     if one.source == Source.INPUT:
         word += INPUTS.index(one.word)
     how, store = program.number(one), where[one.store]
     if one.target:
-        target = program.code.labels[one.target]
+        target = at[program.code.labels[one.target]]
         how, store = target & ((1 << HOW_BITS) - 1), target >> HOW_BITS
     values = {
         "left": one.left,
@@ -133,9 +136,12 @@ class TrackMachine(wiring.Component):
         program, code = self._program, self._program.code.instructions
         m.submodules.unit = unit = self.unit
         layout = _layout(program)
-        depth = 1 << (len(code) - 1).bit_length()
+        # Nothing needs them to be in order, so a shift register with feedback takes the place of a counter.
+        at = states_of(len(code).bit_length())
+        held_at = {place: _encoded(program, one, layout, at) for place, one in zip(at, code, strict=False)}
+        depth = len(at) + 1
         m.submodules.program = rom = Memory(
-            shape=layout.size, depth=depth, init=[_encoded(program, one, layout) for one in code]
+            shape=layout.size, depth=depth, init=[held_at.get(place, 0) for place in range(depth)]
         )
         m.submodules.words = words = Memory(
             shape=signed(WIDTH),
@@ -147,10 +153,9 @@ class TrackMachine(wiring.Component):
         read = words.read_port()
         write = words.write_port()
         # Fetch, read, execute.
-        labels = program.code.labels
+        reset, tick = (at[program.code.labels[name]] for name in ("reset", "tick"))
         first = Signal(init=1)  # the words are to be reset
-        begin = Mux(first, labels["reset"], labels["tick"])
-        pc = Signal(range(depth), init=labels["reset"])
+        pc = Signal(range(depth), init=reset)
         fetched = Signal()
         active = Signal()
         taken = Signal()
@@ -181,15 +186,15 @@ class TrackMachine(wiring.Component):
                 m.d.sync += [following.eq(coming), follows.eq(valid & ~taken & ~stop)]
             coming, valid = following, follows
         with m.If(~hold):
-            m.d.sync += [now.eq(coming), active.eq(valid & ~taken & ~stop), pc.eq(place + 1)]
+            m.d.sync += [now.eq(coming), active.eq(valid & ~taken & ~stop)]
+        with m.If((fetched & ~hold) | self.begin):
+            m.d.sync += pc.eq(state_after(place))
         with m.If(stop):
-            m.d.sync += [fetched.eq(0), pc.eq(labels["tick"])]
+            m.d.sync += [fetched.eq(0), pc.eq(Mux(first & ~self._is_last(), reset, tick))]
             with m.If(self._is_last()):
                 m.d.sync += first.eq(0)
         with m.If(self.begin):
             m.d.sync += fetched.eq(1)
-        with m.Elif(~fetched & ~active):
-            m.d.sync += pc.eq(begin)
         # The adder.
         sum_ = Signal(signed(WIDTH), reset_less=True)
         negative = sum_[-1]
