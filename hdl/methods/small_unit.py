@@ -1,9 +1,6 @@
 """The small unit of the tracking machine: one register that is added to, and goes to the right."""
 
-from functools import reduce
-from operator import or_
-
-from amaranth import Array, C, Cat, Module, Mux, Signal, signed
+from amaranth import Array, C, Cat, Module, Mux, Signal, Value, signed
 from amaranth.lib.enum import Enum
 
 from tachometry.hdl.methods.track_unit import Unit
@@ -41,9 +38,9 @@ class SmallUnit(Unit):
         operand = Signal(signed(WIDTH), reset_less=True)
         steps = Signal(range(small.digits + 1), reset_less=True)
         pairs = Signal(signed(6), reset_less=True)  # of places that it went; below 0 those that it is still to go
-        names = ("log", "factor", "product", "read", "over_by", "doubled", "extreme")
+        names = ("log", "factor", "product", "power", "read", "doubled", "extreme")
         flags = (Signal(name=f"is_{name}", reset_less=True) for name in names)
-        is_log, is_factor, is_product, is_read, is_over_by, doubled, extreme = flags
+        is_log, is_factor, is_product, is_power, is_read, doubled, extreme = flags
         seeks = is_log | is_factor
         begins = (doing != Start.NONE) & (doing != Start.CHANCE)
         rests, reads, adds, shifts = (state == State(number) for number in range(4))
@@ -62,17 +59,16 @@ class SmallUnit(Unit):
         too_large = ~whole[-1] & (whole[6:-1].any() | (whole[5] & whole[2:5].any()))  # at least 2^36
         odd = Mux(doing == Start.EXP, ~whole[0] & ~too_large, Mux(by_factor, self.places[0], named_odd))
         odd &= ~finds & (doing != Start.GAIN)
-        now_doubled = Mux(begins, odd, doubled)
-        digits = Mux(now_doubled, Cat(before, self.factor[0]), self.factor[:2])
+        digits = Mux(doubled, Cat(before, self.factor[0]), self.factor[:2])
         digit = Signal(3)  # 4 is a digit 0 that owes
         m.d.comb += [
-            multiplies.eq(Mux(begins, doing == Start.TIMES, adds & is_product & (steps != small.digits))),
+            multiplies.eq(is_product & (reads | (adds & (steps != small.digits)))),
             digit.eq(Cat(digits[0] ^ owed, digits[1] ^ (digits[0] & owed), digits.all() & owed)),
         ]
         nothing = extreme & operand[LOG_BITS + 8]
-        once = Mux(begins, Mux(finds & self.sum[-1], 3, 1 + odd), Mux(nothing, 0, 1 + doubled))
+        once = Mux(seeks & ~is_read & operand[-1], 3, Mux(nothing, 0, 1 + doubled))
         m.d.sync += [
-            code.eq(Mux(multiplies, digit[:2], once) & (begins | reads | multiplies).replicate(2)),
+            code.eq(Mux(multiplies, digit[:2], once) & (reads | multiplies).replicate(2)),
             owed.eq(multiplies & (digit[2] | digit[:2].all())),
             minus.eq(multiplies & digit[:2].all()),
             before.eq(multiplies & self.factor[1]),
@@ -91,18 +87,25 @@ class SmallUnit(Unit):
         total = Signal(signed(WIDTH + 2))
         m.d.comb += total.eq((Cat(C(1, 1), work[low:]).as_signed() + Cat(minus, addend).as_signed()) >> 1)
         # Where it goes.
-        by_8, by_2, ends, large, far, to_go = (
-            Signal(name=name) for name in ("by_8", "by_2", "ends", "large", "far", "to_go")
-        )
-        beyond_8 = (seeks & far) | (is_factor & work[bits + 7 : end + 8].any())
-        beyond_2 = (seeks & (far | work[end + 2 : end + 8].any())) | (is_factor & work[bits + 1 : end + 2].any())
+        by_8, by_2, there, ends, to_go = (Signal(name=name) for name in ("by_8", "by_2", "there", "ends", "to_go"))
+        # Whether the leading one is still so far up, known a clock before; of `far` only if the shift was by 8.
+        far = Signal()
+        near = Signal()
+
+        def beyond(place: int) -> Value:
+            return work[end + place :].any() | (is_factor & work[bits - 1 + place : end + place].any())
+
+        # A product is known to be too large a clock after it is there.
+        was_there = Signal()
+        large = Signal()
+        m.d.sync += [was_there.eq(there), large.eq(is_product & there & ~was_there & self.too_large(work))]
+        m.d.sync += [far.eq(seeks & beyond(16)), near.eq(seeks & Mux(by_8, beyond(10), beyond(4)))]
         m.d.comb += [
-            far.eq(work[end + 8 :].any()),
             to_go.eq(pairs[-1] & ~extreme),
-            by_8.eq(shifts & ((to_go & ~(pairs[2:].all() & pairs[:2].any())) | beyond_8)),
-            by_2.eq(shifts & ~by_8 & (to_go | beyond_2)),
-            ends.eq(shifts & ~by_8 & ~by_2),
-            large.eq(ends & is_product & self.too_large(work)),
+            by_8.eq(shifts & ((to_go & ~(pairs[2:].all() & pairs[:2].any())) | far)),
+            by_2.eq(shifts & ~by_8 & (to_go | near)),
+            there.eq(shifts & ~by_8 & ~by_2),
+            ends.eq(there & (was_there | ~is_product)),
         ]
         with m.If(adds | by_8 | by_2):
             m.d.sync += work.eq(Mux(by_8, work >> 8, Cat(work[2:low], total)))
@@ -114,37 +117,41 @@ class SmallUnit(Unit):
             m.d.sync += work[CHANCE_BITS + RESULT_BITS + 1 : CHANCE_BITS + WIDTH].eq(work[-1].replicate(WIDTH))
         # How many pairs of places it is to go: first those of what is done, known before it begins, then those that the
         # operand or the factor says, or of what was read.
-        named = Signal(signed(6), reset_less=True)
+        more = Signal(signed(6), reset_less=True)
+        up = Signal(reset_less=True)
         starts = (self.start != Start.NONE) & (self.start != Start.CHANCE)
-        m.d.sync += named.eq(Mux(starts, Array(C(-small.pairs(*kind), 6) for kind in self.shifts)[self.how], 0))
-        by_power = reads & ~is_read
-        by_places = adds & ~multiplies & (is_product | is_over_by)
-        by_read = adds & is_read
-        more = [
-            named,
-            (self.places[1:] ^ is_over_by.replicate(6))[:6] & by_places.replicate(6),
-            operand[LOG_BITS + 1 : LOG_BITS + 7] & by_power.replicate(6),
-            C(-small.read_pairs, 6) & by_read.replicate(6),
-            Cat(by_2, C(0, 1), by_8),
+        over_by = (doing == Start.OVER) & by_factor
+        by_places = (doing == Start.TIMES) | over_by
+        power = doing == Start.EXP
+        again = reads & is_read & ~is_power
+        m.d.sync += [
+            more.eq(
+                (Array(C(-small.pairs(*kind), 6) for kind in self.shifts)[self.how] & starts.replicate(6))
+                | (whole[1:7] & power.replicate(6))
+                | ((self.places[1:] ^ over_by.replicate(6))[:6] & by_places.replicate(6))
+                | (C(-small.read_pairs, 6) & again.replicate(6))
+            ),
+            up.eq((whole[0] & power) | (over_by & ~self.places[0])),
+            pairs.eq((Cat(C(1, 1), pairs) + Cat(up, more | Cat(by_2, C(0, 1), by_8, C(0, 3)))) >> 1),
         ]
-        up = (operand[LOG_BITS] & by_power) | (is_over_by & by_places & ~self.places[0])
-        m.d.sync += pairs.eq((Cat(C(1, 1), pairs) + Cat(up, reduce(or_, more)[:6])) >> 1)
-        with m.If((rests & ~begins) | (reads & is_read)):
+        with m.If((rests & ~begins) | again):
             m.d.sync += pairs.eq(0)
         with m.If(begins):
             m.d.sync += [
                 is_log.eq(doing == Start.LOG),
                 is_factor.eq(doing == Start.BY),
                 is_product.eq(doing == Start.TIMES),
-                is_read.eq((doing == Start.LOG) | (doing == Start.GAIN)),
-                is_over_by.eq((doing == Start.OVER) & by_factor),
+                is_power.eq(doing == Start.EXP),
+                is_read.eq((doing == Start.EXP) | (doing == Start.GAIN)),
                 extreme.eq((doing == Start.EXP) & (too_small | (~whole[-1] & whole[6:-1].any()))),
                 doubled.eq(odd),
                 operand.eq(self.sum),
             ]
-        with m.If(reads):
+        with m.If(reads & is_read):
             read = Mux(is_log, Cat(table[:LOG_BITS], work[end + 1], pairs[:5]), table)
             m.d.sync += [operand.eq(read << small.table_place), is_log.eq(0)]
+        with m.If(ends):
+            m.d.sync += is_read.eq(1)
         with m.If(ends):
             m.d.sync += self.up.eq((work[:CHANCE_BITS] + self.chance)[-1] & ~large)
         with m.If(ends & is_factor):
@@ -168,7 +175,7 @@ class SmallUnit(Unit):
             ),
         ]
         with m.If(begins):
-            m.d.sync += state.eq(Mux((doing == Start.EXP) | (doing == Start.GAIN), State.READS, State.ADDS))
+            m.d.sync += state.eq(State.READS)
         with m.Elif(reads):
             m.d.sync += state.eq(State.ADDS)
         with m.Elif(adds & ~multiplies):

@@ -103,8 +103,7 @@ class Small:
         if start == Start.EXP:
             return (self.power_places + 1) // 2
         if start == Start.LOG:
-            # What it goes to be read; what was read is less.
-            return (self.low - 2 - self.log_end) // 2 - self.read_pairs
+            return (self.low - 2 - self.log_end) // 2
         return (shift + 1) // 2 + (self.extra // 2 if start == Start.TIMES else self.least_pairs)
 
     @property
@@ -117,14 +116,14 @@ class Small:
         log, factor = (
             max(self._seeks(leading, pairs, end) for leading in range(WIDTH - 1))
             for pairs, end in (
-                ((self.low - 2 - self.log_end) // 2, self.log_end),
+                (self.pairs(Start.LOG, 0), self.log_end),
                 (self.least_pairs, self.form.factor_bits - 1),
             )
         )
         read = self._steps(self.read_pairs)
-        times = 3 + self.digits + product
+        times = 5 + self.digits + product
         return Times(
-            log=7 + log + read, exp=5 + power, over=4 + over, gain=5 + read, by=4 + factor, times=times, stages=3
+            log=8 + log + read, exp=5 + power, over=5 + over, gain=5 + read, by=5 + factor, times=times, stages=3
         )
 
     @staticmethod
@@ -133,8 +132,9 @@ class Small:
 
     def _seeks(self, leading: int, least: int, end: int) -> int:
         """Return the steps until a leading one is at a place, or one above, some pairs of places further at least."""
-        place, pairs, steps = self.low - 2 + leading, -least, 0
-        while pairs < 0 or place >= end + 2:
-            far = pairs <= -4 or place >= end + 8
-            place, pairs, steps = place - (8 if far else 2), pairs + (4 if far else 1), steps + 1
+        place, pairs, steps, far, near = self.low - 2 + leading, -least, 0, False, False
+        while pairs < 0 or near:
+            by_8, far = pairs <= -4 or far, place >= end + 16
+            place, pairs, steps = place - (8 if by_8 else 2), pairs + (4 if by_8 else 1), steps + 1
+            near = place >= end + 2
         return steps
