@@ -18,7 +18,6 @@ from enum import IntEnum
 
 SPI_ADDRESS_WIDTH = 7
 SPI_SCK_CYCLES = 8  # clocks of a period of sck, at least
-SPI_WRITE = 1 << SPI_ADDRESS_WIDTH
 MARK = 1 << 7  # tells status from lines that are stuck
 ERROR = 1 << 0
 
@@ -139,44 +138,6 @@ def decode_telemetry(frame: bytes) -> tuple[int, tuple[int, ...]]:
     if body[0] & ~(SEQUENCES - 1) != TELEMETRY_HEADER:
         raise FrameError(f"telemetry must begin with {TELEMETRY_HEADER:#04x} and its sequence, not {body[0]:#04x}")
     return body[0] % SEQUENCES, _words(body[1:-1])
-
-
-def encode_answer(request: Request, answer: Answer) -> bytes:
-    """Return the answer to a request, as the core sends it."""
-    header = 1 << FROM_CORE | request.type << TYPE_LOW | request.sequence
-    words = b"".join(word.to_bytes(_WORD_BYTES, "little") for word in answer.words)
-    return with_check(bytes([header]) + words + bytes([ERROR * answer.error]))
-
-
-def spi_read(address: int, n_words: int = 1) -> bytes:
-    """Return what to send over SPI to read words that follow each other; ValueError if a number is out of range."""
-    _check("address", address, 1 << SPI_ADDRESS_WIDTH)
-    return bytes([address]) + bytes((1 + _WORD_BYTES) * n_words)
-
-
-def spi_write(address: int, data: int) -> bytes:
-    """Return what to send over SPI to write a word and to learn its status; ValueError if a number is out of range."""
-    _check("address", address, 1 << SPI_ADDRESS_WIDTH)
-    _check("data", data, 1 << 8 * _WORD_BYTES)
-    return bytes([SPI_WRITE | address]) + data.to_bytes(_WORD_BYTES, "big") + bytes(1)
-
-
-def decode_spi(sent: bytes, received: bytes) -> Answer:
-    """Return what came back over SPI while whole words of a read or a write were sent.
-
-    It raises FrameError if a byte of status is none.
-    """
-    if len(received) != len(sent):
-        raise FrameError(f"as many bytes must be received as are sent, {len(sent)}, not {len(received)}")
-    size = 1 + _WORD_BYTES
-    groups = [received[start : start + size] for start in range(1, len(received), size)]
-    writes = sent[0] & SPI_WRITE
-    states = [group[-1] if writes else group[0] for group in groups]
-    for status in states:
-        if status & ~ERROR != MARK:
-            raise FrameError(f"the status must be {MARK:#04x} or {MARK | ERROR:#04x}, not {status:#04x}")
-    words = () if writes else tuple(int.from_bytes(group[1:], "big") for group in groups)
-    return Answer(words, any(status & ERROR for status in states))
 
 
 def _check(what: str, value: int, end: int) -> None:

@@ -4,6 +4,7 @@ from contextlib import AbstractContextManager
 from functools import cache
 from typing import Any
 
+from support.serial import encode_answer
 from tachometry.boards.host.registers import HostRegisters
 from tachometry.sim.engines.board import BoardSimulation
 from tachometry.spec import TachometerSpec, of_texts
@@ -82,7 +83,7 @@ class ToldBoard:
         while len(data) >= 5:
             size = 5 if data[0] >> frames.TYPE_LOW == frames.Type.READ else 8
             request, data = frames.decode_request(data[:size]), data[size:]
-            sent += frames.encode_answer(request, self._answer(request))
+            sent += encode_answer(request, self._answer(request))
         if period := self.word("TELEMETRY") * self._tick:
             self._next = min(self._next, self.n_clocks + period)
             while self._next <= self.n_clocks:

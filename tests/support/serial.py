@@ -21,6 +21,23 @@ Golden = Sequence[tuple[int | None, bool]]  # data and error of each access
 _MARGIN = 0.99  # clocks before sck rises in which miso is there: those of pads and board
 
 
+def encode_answer(request: Request, answer: Answer) -> bytes:
+    """Return the answer to a request over the UART, as the core sends it."""
+    header = 1 << frames.FROM_CORE | request.type << frames.TYPE_LOW | request.sequence
+    words = b"".join(word.to_bytes(4, "little") for word in answer.words)
+    return frames.with_check(bytes([header]) + words + bytes([answer.error]))
+
+
+def spi_read(address: int, n_words: int = 1) -> bytes:
+    """Return what to send over SPI to read words that follow each other."""
+    return bytes([address]) + bytes(5 * n_words)
+
+
+def spi_write(address: int, data: int) -> bytes:
+    """Return what to send over SPI to write a word and to learn its status."""
+    return bytes([1 << frames.SPI_ADDRESS_WIDTH | address]) + data.to_bytes(4, "big") + bytes(1)
+
+
 class Host(ABC):
     """Holds the levels of lines, and the accesses that are made over them.
 
@@ -121,7 +138,7 @@ class SpiHost(Host):
         self.time += float(rng.choice([0, 0.25, 0.5, 0.75, rng.random()]))
         if rng.random() < 0.2:
             address = control if rng.random() < 0.7 else int(rng.integers(128))
-            sent = frames.spi_write(address, int(rng.integers(1 << WORD)))
+            sent = spi_write(address, int(rng.integers(1 << WORD)))
             if rng.random() < 0.2:
                 sent += rng.bytes(5)
             whole = 8 * len(sent) - 8 * int(rng.integers(2))
@@ -129,7 +146,7 @@ class SpiHost(Host):
             address = velocity if rng.random() < 0.4 else int(rng.integers(n_words + 3))
             if rng.random() < 0.05:
                 address = int(rng.integers(128))
-            sent = frames.spi_read(address, int(rng.integers(1, longest + 1)))
+            sent = spi_read(address, int(rng.integers(1, longest + 1)))
             sent = sent[:1] + rng.bytes(len(sent) - 1)  # what is sent meanwhile has no meaning
             whole = 8 * len(sent)
         n_bits = int(rng.integers(whole)) if rng.random() < 0.15 else whole
@@ -271,7 +288,7 @@ class UartHost(Host):
         for clock, request, numbers in self._sent:
             words = tuple(answers[number][0] or 0 for number in numbers) if request.type is Type.READ else ()
             answer = Answer(words, any(answers[number][1] for number in numbers))
-            for place, byte in enumerate(frames.encode_answer(request, answer)):
+            for place, byte in enumerate(encode_answer(request, answer)):
                 at = clock + 10 * self.bit * place
                 levels = [0, *(byte >> bit & 1 for bit in range(8)), 1]
                 wanted[at : at + 10 * self.bit] = np.repeat(levels, self.bit)

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from support.exported_bus import SPEC, START, Simulate, check, in_icarus, in_verilator
 from support.nightly import nightly
-from support.serial import Host, SpiHost, UartHost
+from support.serial import Host, SpiHost, UartHost, spi_read
 
-from tachometry.spec.registers import frames
 from tachometry.spec.registers.map import RegisterMap
 
 REGISTERS = RegisterMap(SPEC)
@@ -58,6 +57,6 @@ def test_over_uart(simulate: Simulate, n_accesses: int, tmp_path: Path) -> None:
 
 def test_a_register_that_is_not_read_is_found() -> None:
     host = SpiHost(np.random.default_rng(0), START, WORDS)
-    host.frame(frames.spi_read(0, N_WORDS - 1), 8 + 40 * (N_WORDS - 1), 4, 4)
-    host.frame(frames.spi_read(N_WORDS - 1), 48, 4, 4)
+    host.frame(spi_read(0, N_WORDS - 1), 8 + 40 * (N_WORDS - 1), 4, 4)
+    host.frame(spi_read(N_WORDS - 1), 48, 4, 4)
     all_registers_are_read(host)

@@ -86,7 +86,6 @@ def test_exported_verilog_does_in_icarus(tmp_path: Path) -> None:
     ("box", "right", "wrong"),
     [
         (open_circuit.OpenCircuit, "since == self._clocks", "since == self._clocks - 1"),
-        (open_circuit.OpenCircuit, "~self.equal | self.clear", "~self.equal"),
         (open_circuit.OpenCircuit, "since <= self._clocks", "since < self._clocks"),
         (conditioner.InputConditioner, "clocks_since_reset[1] & (level == other)", "level == other"),
         (encoder_watch.EncoderWatch, "seen[OPEN[line]] = box.open", "seen[OPEN['a']] = box.open"),

@@ -87,13 +87,9 @@ def test_every_clock_is_as_the_rules_say(latency: int) -> None:
         ("~self.probed)", "self.probed)"),
         ("& ~self.arm", ""),
         ("self.probed | edge", "edge"),
-        ("~since.all()", "1"),
         ("level & ~past & rising", "level & ~past"),
         ("~level & past & falling", "~level & past & rising"),
-        ("Mux(step, 0,", "Mux(step, 1,"),
-        ("ready & (", "("),
         ("self._update_latency + 1 - self._latency", "self._update_latency + 2 - self._latency"),
-        ("age + ~age.all()", "age + 1"),
         ('"age": shown}', '"age": age}'),
     ],
 )

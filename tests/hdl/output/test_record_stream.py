@@ -91,20 +91,9 @@ def test_every_clock_is_as_the_rules_say(packet: int) -> None:
     check_box(packet)
 
 
-@nightly  # proofs have mutants as well
-@pytest.mark.parametrize(
-    ("right", "wrong"),
-    [
-        ("~self.m_axis_tvalid | self.m_axis_tready", "~self.m_axis_tvalid"),
-        ("self.event | ~free", "self.event"),
-        ("lost.eq(~free)", "lost.eq(0)"),
-        ("left.eq(self._packet - 1)", "left.eq(self._packet)"),
-        ("self.event & ~free & ~self", "self.event & ~self"),
-        ("with m.If(self.clear):", "with m.If(0):"),
-    ],
-)
-def test_mutants_are_noticed(right: str, wrong: str) -> None:
-    with mutant(RecordStream, right, wrong), pytest.raises(AssertionError):
+@nightly  # proofs have other mutants
+def test_a_mutant_is_noticed() -> None:
+    with mutant(RecordStream, "with m.If(self.clear):", "with m.If(0):"), pytest.raises(AssertionError):
         check_box(3)
 
 

@@ -4,6 +4,7 @@ import re
 
 import pytest
 from support import docs
+from support.serial import encode_answer, spi_write
 
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.registers import frames
@@ -30,10 +31,10 @@ def test_requests() -> None:
 
 def test_answers() -> None:
     answer = Answer((0x01020304, 0x05060708), error=True)
-    frame = frames.encode_answer(frames.decode_request(READ), answer)
+    frame = encode_answer(frames.decode_request(READ), answer)
     assert frame[:-2] == bytes([0x89, 4, 3, 2, 1, 8, 7, 6, 5, 1])
     assert frames.decode_answer(READ, frame) == answer
-    written = frames.encode_answer(frames.decode_request(WRITE), Answer((), error=False))
+    written = encode_answer(frames.decode_request(WRITE), Answer((), error=False))
     assert frames.decode_answer(WRITE, written) == Answer((), error=False)
 
 
@@ -49,8 +50,8 @@ def test_telemetry() -> None:
 def test_the_examples_of_the_page() -> None:
     page = docs.page("guides/serial.md")
     write = frames.write_request(2, 1, 3)
-    answer = frames.encode_answer(frames.decode_request(write), Answer((), error=False))
-    for frame in (frames.read_request(4, 5, 7), write, answer, frames.spi_write(2, 1)):
+    answer = encode_answer(frames.decode_request(write), Answer((), error=False))
+    for frame in (frames.read_request(4, 5, 7), write, answer, spi_write(2, 1)):
         assert f"`{frame.hex(' ')}`" in page
 
 
@@ -95,34 +96,12 @@ def test_what_is_no_answer(body: bytes, message: str) -> None:
         (lambda: frames.read_request(0, 256), "n_words must be from 0 to 255, not 256"),
         (lambda: frames.write_request(0, 1 << 32), "data must be from 0 to 4294967295, not 4294967296"),
         (lambda: frames.write_request(0, 0, -1), "sequence must be from 0 to 15, not -1"),
-        (lambda: frames.spi_read(128), "address must be from 0 to 127, not 128"),
-        (lambda: frames.spi_write(128, 0), "address must be from 0 to 127, not 128"),
-        (lambda: frames.spi_write(0, -1), "data must be from 0 to 4294967295, not -1"),
     ],
 )
 def test_numbers_out_of_range(make: object, message: str) -> None:
     assert callable(make)
     with pytest.raises(ValueError, match=f"^{message}$"):
         make()
-
-
-def test_spi() -> None:
-    read = frames.spi_read(4, 2)
-    assert read == bytes([4]) + bytes(10)
-    received = bytes([0, 0x80, 1, 2, 3, 4, 0x81, 0, 0, 0, 0])
-    assert frames.decode_spi(read, received) == Answer((0x01020304, 0), error=True)
-    write = frames.spi_write(2, 0x01020304)
-    assert write == bytes([0x82, 1, 2, 3, 4, 0])
-    assert frames.decode_spi(write, bytes([0, 0, 0, 0, 0, 0x80])) == Answer((), error=False)
-
-
-@pytest.mark.parametrize("stuck", [0x00, 0xFF])
-def test_a_line_that_is_stuck_is_no_answer_of_spi(stuck: int) -> None:
-    read = frames.spi_read(0)
-    with pytest.raises(FrameError, match=f"^the status must be 0x80 or 0x81, not 0x{stuck:02x}$"):
-        frames.decode_spi(read, bytes([stuck] * 6))
-    with pytest.raises(FrameError, match=r"^as many bytes must be received as are sent, 6, not 5$"):
-        frames.decode_spi(read, bytes(5))
 
 
 def test_a_baud_rate_that_the_clock_makes() -> None:

@@ -161,7 +161,7 @@ def test_a_demo_shows_of_its_core_the_drive_of_the_loop_alone() -> None:
 
 def test_numbers_of_the_serial_lines() -> None:
     """docs/guides/serial.md: seven bits of address and the write bit; marks; a quiet line."""
-    assert (frames.SPI_ADDRESS_WIDTH, frames.SPI_WRITE, frames.MARK, frames.ERROR) == (7, 0x80, 0x80, 1)
+    assert (frames.SPI_ADDRESS_WIDTH, frames.MARK, frames.ERROR) == (7, 0x80, 1)
     assert (frames.SPI_SCK_CYCLES, frames.QUIET_BITS) == (8, 32)
     assert (frames.SEQUENCES, frames.TYPE_LOW, frames.FROM_CORE) == (16, 4, 7)
     assert (frames.UART_ADDRESS_WIDTH, frames.COUNT_WIDTH) == (8, 8)
@@ -172,8 +172,6 @@ def test_numbers_of_the_serial_lines() -> None:
 def test_what_is_asked_for_by_default() -> None:
     assert frames.read_request(3) == frames.read_request(3, 1, 0) == frames.with_check(bytes([0x00, 3, 1]))
     assert frames.write_request(3, 5) == frames.with_check(bytes([0x10, 3, 5, 0, 0, 0]))
-    assert frames.spi_read(3) == bytes([3, 0, 0, 0, 0, 0])
     for n_words in (0, 1, 255):
         assert frames.decode_request(frames.read_request(255, n_words, 15)).value == n_words
     assert frames.decode_request(frames.write_request(0, (1 << 32) - 1, 15)).value == (1 << 32) - 1
-    assert frames.spi_write(127, (1 << 32) - 1) == bytes([0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0])
