@@ -215,12 +215,13 @@ learn:                                  # nothing below is in a hurry
     e over 1
     t = e + ~ keep
 short:
-    noises max noises_first min noises_offset by
+    noises = noises max noises_first    # an upset may have made it less
+    sum min noises_offset by
     w = D + D + D
     zero s+ t - D min w over by
     a keep
     t = zero s+ a min most
-    D = D + ~ max least_noise
+    D = D + ~ min most_noise max least_noise
     a = zero s+ t
     e - lag keep log
     log_X + log_3_2 + ~ exp
@@ -342,12 +343,12 @@ below:
     zero - P - o@down
 beyond:
     max zero
-    beyond = sum - half - D4 - Ds
+    t = sum - half - D4 - Ds
     if neg goto still
-    P = P s- beyond
+    P = P s- t
     quiet + lead log
     w = zero
-    beyond - half
+    t - half
     if neg goto whole
     w = log_5_8
 whole:

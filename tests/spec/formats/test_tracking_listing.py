@@ -8,6 +8,7 @@ from support.tracking import Interpreter, core, windows
 
 from tachometry.sim.golden.methods.track_recursion import Recursion, log2
 from tachometry.spec import TrackTachometer
+from tachometry.spec.formats.tracking import WIDTH
 from tachometry.spec.formats.tracking_code import FIRST_INPUT, Jump, assembled
 
 # Ticks of few clocks and of many, of one length and of several; words as wide as they come.
@@ -39,6 +40,20 @@ def test_listing() -> None:
     missed = [(labels.get(place), one) for place, one in enumerate(code.instructions) if not met[place]]
     assert not missed
     assert len(CORES[0].program.words) <= FIRST_INPUT
+
+
+@pytest.mark.parametrize(
+    ("word", "upset", "held"), [("noises", -1 << WIDTH - 2, "noises_first"), ("D", 1 << WIDTH - 4, "most_noise")]
+)
+def test_what_outlives_a_rest_is_held_if_it_was_upset(word: str, upset: int, held: str) -> None:
+    """Else the noise would be learned from few events for ever, or five times it would not fit a word."""
+    program, half = CORES[0].program, CORES[0].form.tick_cycles // 2
+    machine = Interpreter(program)
+    rows = [(1, half, 1, half, 1, nth % 4, 0, (nth + 1) % 4, 2 * half) for nth in range(4)]
+    for row in rows:
+        machine.words[word] = upset
+        machine.tick(*row)
+    assert machine.words[word] == program.form.constants[held]
 
 
 @pytest.mark.parametrize("grows", [1, -1])
