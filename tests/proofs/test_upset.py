@@ -3,7 +3,7 @@
 import pytest
 from proofs.formal.mutants import MUTANTS
 from proofs.source import mutant
-from proofs.upset import axes, loops
+from proofs.upset import axes, loops, tracking
 from proofs.upset.campaign import OUTPUTS, UPSET, upsets
 from support.nightly import nightly
 
@@ -35,6 +35,15 @@ def test_many_axes_are_right_again_in_time() -> None:
     assert campaign.fine
     assert (campaign.clocks > 0).sum() > 30
     assert campaign.clocks.max() > campaign.spec.timing.tick_cycles
+
+
+@nightly
+def test_the_velocity_of_tracking_is_right_again_in_time() -> None:
+    """Every fortieth bit of the flip-flops and words."""
+    campaign = tracking.upsets(90)
+    assert campaign.fine
+    assert len(campaign.bits) > campaign.bits.n_flip_flops + 2000
+    assert 0 < (campaign.clocks > 0).sum() < 30
 
 
 @nightly

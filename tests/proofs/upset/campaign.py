@@ -20,9 +20,12 @@ from tachometry.spec.core.health import Health
 from tachometry.spec.core.index import Index
 
 TICK_CYCLES, MAX_TICKS = 100, 20
-_OPTIONS: dict[str, dict[str, Any]] = {"m": {"average": 10}}
+_OPTIONS: dict[str, dict[str, Any]] = {
+    "m": {"average": 10},
+    "track": {"timing": Timing(5_000_000, 340, 20), "max_speed": Speed.parse("75rev/s"), "multiplier": "block"},
+}
 # Of `track` the rounding, and the noise and the offsets that it learns gradually, outlive every rest: after an upset it
-# is not equal in all bits again.
+# is not equal in all bits again, see tracking.py.
 UPSET = [method for method in METHODS if method != "track"]
 # What a core of M may have beside, which must not keep the velocity from recovering; proofs are about these outputs.
 OUTPUTS = "m, outputs"
@@ -139,17 +142,18 @@ class Campaign:
         return self.clocks[self.clocks > 0] / self.spec.timing.tick_cycles
 
 
-def _expected(spec: TachometerSpec, trace: PinTrace, phase: int) -> NDArray[np.int64]:
+def right_rows(spec: TachometerSpec, trace: PinTrace, phase: int) -> NDArray[np.int64]:
     """Return what the golden model shows whose windows end in clocks `phase`, `phase` + T …; outputs in order of the
     ports.
     """
     last = np.arange(phase, trace.n_clocks - spec.latency.tick, spec.timing.tick_cycles, dtype=np.int64)
     with patch.object(golden, "windows", lambda *_: (last, np.empty(0, dtype=np.int64))):
         found = dense(spec, golden.run(spec, trace))
-    return np.stack([found[name] for name in _compared(spec)], axis=1)
+    return np.stack([found[name] for name in compared_names(spec)], axis=1)
 
 
-def _compared(spec: TachometerSpec) -> list[str]:
+def compared_names(spec: TachometerSpec) -> list[str]:
+    """Return the outputs that are compared."""
     plain = spec_of(spec.method)
     return [port.name for port in plain.ports if port.direction == "output" and port.name != "position"]
 
@@ -181,8 +185,8 @@ def upsets(name: str, n: int, seed: int = 1) -> Campaign:
     core = Upsettable(spec, trace)
     end = allowed(spec, trace, np.arange(trace.n_clocks))
     outputs = [port.name for port in spec.ports if port.direction == "output"]
-    compared = [outputs.index(name) for name in _compared(spec)]
-    tick, age = (_compared(spec).index(name) for name in ("tick", "age"))
+    compared = [outputs.index(name) for name in compared_names(spec)]
+    tick, age = (compared_names(spec).index(name) for name in ("tick", "age"))
     expected: dict[int, NDArray[np.int64]] = {}
 
     def wrong(clock: int, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -193,7 +197,7 @@ def upsets(name: str, n: int, seed: int = 1) -> Campaign:
             own = clock + np.flatnonzero(shown[:, tick])[-1] - spec.latency.tick
             phase = int(own % spec.timing.tick_cycles)
         if phase not in expected:
-            expected[phase] = _expected(spec, trace, phase)
+            expected[phase] = right_rows(spec, trace, phase)
         right = expected[phase][clock : clock + len(shown)]
         return (shown != right).any(axis=1)
 
@@ -210,6 +214,7 @@ def play(
     seed: int,
     wrong: Callable[[int, NDArray[np.int64]], NDArray[np.bool_]],
     only: str = "",
+    first: int = 200 * TICK_CYCLES,
 ) -> Campaign:
     """Flip bits as in `upsets`.
 
@@ -221,11 +226,13 @@ def play(
         Of the clock of an upset, and what was shown from it on, in which clocks it is wrong.
     only : str
         Bits of this register alone, by the end of its name.
+    first : int
+        Clock of the earliest upset.
     """
     rng = np.random.default_rng(seed)
     places = [place for place, register in enumerate(core.bits.names) if register.endswith(only)]
     length = int(allowed[: trace.n_clocks // 2].max()) + 3 * spec.timing.tick_cycles
-    clock = np.sort(rng.integers(200 * TICK_CYCLES, trace.n_clocks - length, n))
+    clock = np.sort(rng.integers(first, trace.n_clocks - length, n))
     bit = rng.permutation(np.resize(rng.permutation(places), n))
     clocks = np.zeros(n, dtype=np.int64)
     for number, at, rows in core.runs(clock, bit, length):

@@ -99,7 +99,7 @@ class Upsettable:
             Clocks that are played.
         """
         columns = 2 + len(self._design.outputs)
-        rows = np.empty((max(_ROWS // columns, length), columns), dtype=np.int64)
+        rows = np.empty((max(_ROWS // columns, 2 * length), columns), dtype=np.int64)
         at = np.ascontiguousarray(self._trace.clock)
         level = self._design.levels(self._trace)
         done = 0
