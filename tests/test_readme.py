@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from matplotlib.image import imread
 from support.command import run
-from support.nightly import only
+from support.nightly import nightly, only
 
 from tachometry.spec import METHODS
 
@@ -76,6 +76,7 @@ def test_make_demo_is_what_the_test_runs() -> None:
     assert "BIN=$(BIN) sh docs/demo.sh" in (ROOT / "Makefile").read_text()
 
 
+@nightly  # tests/sim/engines/test_engines.py and tests/sim/golden/methods/test_track.py have no compiler either
 def test_demo_without_a_compiler(tmp_path: Path) -> None:
     """Neither that of the system nor ziglang's; a moment of the motion, as Amaranth's simulator is slow."""
     (tmp_path / "docs").symlink_to(ROOT / "docs")

@@ -7,6 +7,7 @@ exclude each other are found by trying.
 from fractions import Fraction
 from functools import cache
 from itertools import combinations, product
+from operator import itemgetter
 
 from tachometry.spec import (
     AxesSpec,
@@ -71,18 +72,20 @@ def rows(method: str) -> tuple[Texts, ...]:
     """Return values of all factors of a method, one row for each configuration."""
     from covertable import make
 
-    never = [
+    never: dict[tuple[str, str], set[tuple[str, str]]] = {}
+    for pair in apart(method):
+        (one, its), (other, others) = sorted(pair)
+        never.setdefault((one, other), set()).add((its, others))
+    constraints = [
         {
-            "operator": "not",
-            "condition": {
-                "operator": "and",
-                "conditions": [{"operator": "eq", "left": name, "value": value} for name, value in sorted(pair)],
-            },
+            "operator": "fn",
+            "requires": names,
+            "evaluate": lambda row, names=names: itemgetter(*names)(row) not in never[names],
         }
-        for pair in sorted(apart(method), key=sorted)
+        for names in never
     ]
     every = {name: list(values) for name, values in factors(method).items()}
-    return tuple(dict(row) for row in make(every, constraints=never))
+    return tuple(dict(row) for row in make(every, constraints=constraints))
 
 
 @cache
