@@ -236,7 +236,7 @@ def with_loop(spec: CoreSpec, texts: Mapping[str, str]) -> LoopSpec:
 
 def _looped(spec: CoreSpec, texts: Mapping[str, str]) -> LoopSpec:
     if spec.axes is not None:
-        raise ParameterError("axes", "must not be given together with --loop: it is of one axis")
+        raise ParameterError("axes", "must be left out with --loop, which is of one axis")
     return LoopSpec(tachometer=spec.tachometer, **read_options(LoopSpec, texts, vars(spec.timing)))
 
 

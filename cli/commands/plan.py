@@ -7,12 +7,13 @@ from pathlib import Path
 import click
 
 from tachometry.cli.files import Outputs
-from tachometry.cli.options.core import CORE_AND_MAKE_OPTIONS, Make
+from tachometry.cli.options.axes import AXES
+from tachometry.cli.options.core import Make, core_and_make_options
 from tachometry.cli.options.methods import Methods, named_methods
 from tachometry.cli.options.option import GroupedCommand, option, output
 from tachometry.cli.reports.plan import print_plan, print_plans
 from tachometry.sim.studies.plan import Plans, default_range
-from tachometry.spec import Speed, TachometerSpec
+from tachometry.spec import AxesSpec, CoreSpec, Speed, TachometerSpec
 from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.language.units import SpeedUnit
 
@@ -28,7 +29,7 @@ Examples:
   tachometry plan --ppr 2048 --clock 100MHz --tick 50us --max-time 20ms \\
       --speeds 1:6000rpm --plot plan.pdf --csv plan.csv""",
 )
-@CORE_AND_MAKE_OPTIONS
+@core_and_make_options(AXES)
 @option(
     "Range",
     "--speeds LO:HI",
@@ -44,21 +45,24 @@ Examples:
 @output("--plot", suffixes=(".png", ".pdf", ".svg"), help="Figure of resolution and measurement time.")
 @output("--csv", help="CSV with a row per speed, densely sampled: what the figure is drawn from.")
 def plan(
-    spec: TachometerSpec, make: Make, speeds: str | None, methods: str | None, plot: Path | None, csv: Path | None
+    spec: CoreSpec, make: Make, speeds: str | None, methods: str | None, plot: Path | None, csv: Path | None
 ) -> int:
     """Tell what a core can measure, before it is generated.
 
     Prints what the configuration makes of the core, and what it measures at constant speeds of an ideal encoder: mean
     interval m_s, measurement time T_m and resolution Q_V of its method (Tsuji 2009, eqs. 4 to 20; Rairán 2013). With
-    --methods, the same of several methods beside each other, and Q_V/V and Q_V T_m. It is computed, nothing is
-    simulated.
+    --methods, the same of several methods beside each other, and Q_V/V and Q_V T_m. With --axes it is that of each
+    axis. It is computed, nothing is simulated.
 
     Equal options give equal files.
     """
     outputs = Outputs({"--plot": plot, "--csv": csv})
-    low, high, unit = _range(spec, speeds)
+    core = spec.axis if isinstance(spec, AxesSpec) else spec
+    if spec is not core and methods is not None:
+        raise ValueError("--methods must be left out with --axes: a plan of axes is of one method")
+    low, high, unit = _range(core, speeds)
     named = Methods({}) if methods is None else named_methods(methods, make)
-    plans = Plans(spec, {name: one for name, one in named.specs.items() if one is not None}, low, high)
+    plans = Plans(core, {name: one for name, one in named.specs.items() if one is not None}, low, high)
     with outputs:
         if path := outputs.get("--csv"):
             plans.write(path)
@@ -66,9 +70,9 @@ def plan(
             from tachometry.sim.plots.plan import save_plan_plot, save_plans_plot  # Matplotlib is slow to import
 
             if methods is None:
-                save_plan_plot(path, spec, plans.line, unit)
+                save_plan_plot(path, core, plans.line, unit)
             else:
-                save_plans_plot(path, spec, plans.lines, unit)
+                save_plans_plot(path, core, plans.lines, unit)
     print_plan(spec, plans, unit)
     if methods is not None:
         print_plans(plans.tables, named.left_out, unit)

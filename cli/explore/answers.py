@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from tachometry.cli.commands import Refused, refusals
 from tachometry.cli.commands.generate import ASKED, Asked
 from tachometry.cli.options.capture import CAPTURE_OPTIONS
-from tachometry.cli.options.core import CORE_AND_MAKE_OPTIONS, Make
+from tachometry.cli.options.core import Make, core_and_make_options
 from tachometry.cli.options.help import needed
 from tachometry.cli.options.methods import Methods, named_methods
 from tachometry.cli.options.motion import OPTIONAL_MOTION_OPTIONS
@@ -73,7 +73,7 @@ def _generate(asked: Asked) -> Asked:
 
 
 @click.command("compare", cls=GroupedCommand)
-@CORE_AND_MAKE_OPTIONS
+@core_and_make_options()
 @OPTIONAL_MOTION_OPTIONS
 def _compare(
     spec: TachometerSpec, make: Make, record: Callable[..., Encoding] | None, tables: list[Path]
@@ -83,7 +83,7 @@ def _compare(
 
 @click.command("replay", cls=GroupedCommand)
 @click.argument("capture", type=Path)
-@CORE_AND_MAKE_OPTIONS
+@core_and_make_options()
 @CAPTURE_OPTIONS
 def _replay(
     spec: TachometerSpec, make: Make, capture: Path, read: Callable[..., Recording]

@@ -142,11 +142,12 @@ def _read_make(**given: Any) -> dict[str, Any]:
     return dict(make=lambda method, own: of_texts(method, texts | own), **given)
 
 
-def _read_spec_and_make(*, method: str, **given: Any) -> dict[str, Any]:
+def _read_spec_and_make(parts: Sequence[Part], *, method: str, **given: Any) -> dict[str, Any]:
     texts = _taken(given)
-    spec = of_texts(method, texts)
-    common = _with_tick({name: text for name, text in texts.items() if not methods_with(name)}, spec.options["tick"])
-    return dict(spec=spec, make=lambda other, own: of_texts(other, common | own), **given)
+    read = _reader(parts)(method=method, **{f"{_PREFIX}{name}": text for name, text in texts.items()}, **given)
+    common = {name: text for name, text in texts.items() if not methods_with(name)}
+    common = _with_tick(common, read["spec"].options["tick"])
+    return dict(make=lambda other, own: of_texts(other, common | own), **read)
 
 
 def _with_tick(texts: Texts, tick: str = "20us") -> Texts:
@@ -204,11 +205,17 @@ def _of_core(clock: str | None = None) -> list[Callable[[Any], Any]]:
 
 def core_options(*parts: Part, clock: str | None = None) -> Group:
     """Return options of the core, and of what it may be made into, handed to the command as one argument `spec`."""
-    return Group([*_of_core(clock), *(one for part in parts for one in part.options)], _reader(parts))
+    return Group(_with_parts(parts, clock), _reader(parts))
 
 
-CORE_AND_MAKE_OPTIONS = Group(_of_core(), _read_spec_and_make)
-"""As `core_options`, with what makes a spec of another method as `make`, see `COMMON_CORE_OPTIONS`."""
+def _with_parts(parts: Sequence[Part], clock: str | None = None) -> list[Callable[[Any], Any]]:
+    return [*_of_core(clock), *(one for part in parts for one in part.options)]
+
+
+def core_and_make_options(*parts: Part) -> Group:
+    """As `core_options`, with what makes a spec of another method as `make`, see `COMMON_CORE_OPTIONS`."""
+    return Group(_with_parts(parts), partial(_read_spec_and_make, parts))
+
 
 COMMON_CORE_OPTIONS = Group([later("core-options", _common)], _read_make)
 """What all methods share, handed over as `make`: of a method's name and texts of its own options it makes a spec."""

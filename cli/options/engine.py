@@ -67,7 +67,8 @@ def _pulses(spec: TachometerSpec, texts: tuple[str, ...]) -> dict[str, Ints]:
         if not (pulsed := spec.front_end.pulsed):
             raise ParameterError("pulse", "must be given together with --preset, --index-once or --probe")
         if name not in pulsed or not colon:
-            raise ParameterError("pulse", f"must be INPUT:TIME,TIME… of {' or '.join(pulsed)}, not {text!r}")
+            form = f"must be INPUT:TIME,TIME… of {' or '.join(pulsed)}, such as {pulsed[0]}:{times or '20ms'}"
+            raise ParameterError("pulse", f"{form}, not {text!r}")
         if name in found:
             whole = ",".join(each.partition(":")[2] for each in texts if each.startswith(f"{name}:"))
             raise ParameterError("pulse", f"must be given once for {name}: type --pulse {name}:{whole}")

@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from tachometry.spec.core.front_end import OF_CONTROLS
+from tachometry.spec.core.health import COMPLEMENTS
 from tachometry.spec.core.probe import edges_of
 from tachometry.spec.core.timing import MAX_TICK_CYCLES
 from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS
@@ -45,6 +46,10 @@ def check(spec: TachometerSpec) -> None:
         raise ParameterError(
             "health", f"must be left out for {spec.encoder.sensor}: it watches two lines in quadrature"
         )
+    clocks = spec.health and spec.health.complements
+    if clocks and not COMPLEMENTS[0] <= clocks <= COMPLEMENTS[1]:
+        times = (format_time(Fraction(one) / spec.timing.clock_hz) for one in (*COMPLEMENTS, clocks))
+        raise ParameterError("complements", "must be from {} to {} at this clock, not {}".format(*times))
     edges_of(spec.probe)
     if spec.compare is not None:
         fastest = Fraction(0)

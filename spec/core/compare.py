@@ -14,7 +14,7 @@ MAX_CLOCKS = 1 << 24
 MAX_DEPTH = 1 << 12
 FORWARD, BACKWARD, BOTH = DIRECTIONS = "forward", "backward", "both"
 LIST_PINS = ("compare_next", "compare_append", "compare_clear")  # inputs of a list, which registers have on a bus
-FINEST_BITS = 16  # fraction bits of places between counts, as they are asked for
+FINEST_BITS = 17  # fraction bits of places between counts, as they are asked for: one more than any core has
 _PLACES = r"(-?\d{1,15}(?:\.\d{1,16})?):(\d{1,15}(?:\.\d{1,16})?):(\d{1,15})"
 _FORM = re.compile(rf"(?:{_PLACES}|list:(\d{{1,15}})):([^:]+)(?::({'|'.join(DIRECTIONS)}))?(?::(fine))?", re.ASCII)
 
@@ -23,7 +23,7 @@ _FORM = re.compile(rf"(?:{_PLACES}|list:(\d{{1,15}})):([^:]+)(?::({'|'.join(DIRE
 class Compare:
     """Says at which positions there are pulses, and how long they are."""
 
-    start: int  # the first position, in counts; with `fine` in 2^-16 of them, as `step` is
+    start: int  # the first position, in counts; with `fine` in 2^-17 of them, as `step` is
     step: int  # counts from a position to the next, in the direction of the pulses; with both directions, forward
     count: int  # number of positions; 0: no end
     width: str  # length of a pulse, as a time or as clocks
@@ -51,12 +51,15 @@ class Compare:
             typed = re.sub(r"(:[\d.]+)(?=$|:[a-z])", r"\1us", text.strip().lower())
             raise ParameterError(what, f"must have a WIDTH with a unit: type {typed}, or clk for clocks, not {text!r}")
         if depth is not None:
+            if not 2 <= int(depth) <= MAX_DEPTH:
+                raise ParameterError(what, f"must have a DEPTH from 2 to {MAX_DEPTH}, not {depth}")
             return cls(0, 0, 0, width, direction or BOTH, int(depth), fine is not None)
         places = [Fraction(place) * (1 << FINEST_BITS * (fine is not None)) for place in (start, step)]
-        if any(place.denominator > 1 for place in places):
-            kind = f"multiples of 2^-{FINEST_BITS} count" if fine else "whole counts, but with :fine at the end"
+        if not fine and any(place.denominator > 1 for place in places):
+            kind = "whole counts, but with :fine at the end"
             raise ParameterError(what, f"must have START and STEP in {kind}, not {text!r}")
-        first, apart = map(int, places)
+        # What lies between is odd, so that the core refuses it.
+        first, apart = (math.floor(place) | (place.denominator > 1) for place in places)
         return cls(first, apart, int(count), width, direction or FORWARD, fine=fine is not None)
 
     def __str__(self) -> str:
@@ -115,7 +118,7 @@ class Compare:
             if fine_bits is None:
                 raise ParameterError("compare", "must not be fine with this method: position_fine is of --method track")
             if (self.start | self.step) % (1 << FINEST_BITS - fine_bits):
-                grid = f"multiples of 2^-{fine_bits}, see --fine-bits"
+                grid = f"multiples of 2^-{fine_bits} count, see --fine-bits"
                 raise ParameterError("compare", f"must have START and STEP in {grid}")
         ranges = (
             ("start", self.start, -half, half - 1),
@@ -123,7 +126,7 @@ class Compare:
             ("count", self.count, 0, (1 << COUNT_WIDTH) - 1),
         )
         for name, value, least, most in (
-            *((("depth", self.depth, 2, MAX_DEPTH),) if self.depth else ranges),
+            *(() if self.depth else ranges),
             ("width in clocks", clocks, 1, MAX_CLOCKS),
         ):
             if not least <= value <= most:

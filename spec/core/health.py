@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from tachometry.spec.core.timing import parse_filter
-from tachometry.spec.language.option import ParameterError, option, options_of
+from tachometry.spec.language.option import ParameterError, option
 
 
 class Fault(IntEnum):
@@ -32,7 +32,7 @@ FAULT_TEXTS = {
     Fault.Z_OPEN: "line z equals its complement z_n: an open circuit",
     Fault.INDEX_MISSED: "z comes and goes without the state of --index-at",
 }
-_RANGES = {"health_edges": (2, 1 << 16), "health_errors": (0, (1 << 16) - 1), "complements": (2, 1 << 20)}
+COMPLEMENTS = (2, 1 << 20)  # the least and the most clocks
 OPEN = {"a": Fault.A_OPEN, "b": Fault.B_OPEN, "z": Fault.Z_OPEN}  # of lines that have a complement
 
 
@@ -76,7 +76,6 @@ class Health:
     )
 
     def __post_init__(self) -> None:
-        for about in options_of(Health):
-            (least, most), value = _RANGES[about.parameter], about.value_in(self)
-            if value is not None and not least <= value <= most:
-                raise ParameterError(about.parameter, f"must be from {least} to {most}, not {value}")
+        for name, value, least, most in (("edges", self.edges, 2, 1 << 16), ("errors", self.errors, 0, (1 << 16) - 1)):
+            if not least <= value <= most:
+                raise ParameterError(f"health_{name}", f"must be from {least} to {most}, not {value}")

@@ -81,7 +81,7 @@ class TachometerSpec:
         "external tick: in the longest) the velocity saturates and raises overflow; the position stays exact.",
         shown="one count per clock",
         metavar="SPEED",
-        parse=lambda what, text: Speed.parse(text),
+        parse=parse_speed,
         tests=("", "some counts per tick"),
     )
     position_width: int = option(

@@ -312,7 +312,7 @@ class Speed:
 
 def parse_speed(what: str, text: str) -> Speed:
     """Read a speed with its unit, for an option."""
-    value, unit = read_quantity(what, text, SPEED)
+    value, unit = (Fraction(0), "") if re.fullmatch(r"0+(\.0*)?", text.strip()) else read_quantity(what, text, SPEED)
     if value <= 0:
-        raise ParameterError(what, f"must be greater than 0, not {text}")
+        raise ParameterError(what, f"must be greater than 0, not {text}: leave it out for none")
     return Speed(value, unit)

@@ -206,14 +206,12 @@ class AxesSpec:
         spec = self.tachometer
         for name, value, why in _LEFT_OUT:
             if getattr(spec, name) != value:
-                raise ParameterError(name, f"must not be given together with --axes: {why}")
+                raise ParameterError(name, f"must be left out with --axes: {why}")
         if spec.front_end.index_once:
-            raise ParameterError(
-                "index_once", f"must not be given together with --axes: what waits for home {_FOR_ONE}"
-            )
+            raise ParameterError("index_once", f"must be left out with --axes: what waits for home {_FOR_ONE}")
         if spec.encoder.sensor != "quadrature":
             why = f"the decoder of {spec.encoder.sensor} {_FOR_ONE}"
-            raise ParameterError("sensor", f"must not be given together with --axes: {why}")
+            raise ParameterError("sensor", f"must be left out with --axes: {why}")
         self._check_tick()
 
     def _check_tick(self) -> None:

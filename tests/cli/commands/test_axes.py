@@ -105,6 +105,19 @@ def test_verilog_without_warnings(words: tuple[str, ...], tmp_path: Path) -> Non
     lint(["axes.v"], "axes", tmp_path)
 
 
+def test_plan_of_each_axis(capsys: pytest.CaptureFixture[str]) -> None:
+    """Its counts have times in rounds, here of 4 clocks, so what is known of a slow speed is a quarter as good."""
+    core = "--method track --ppr 25 --clock 1MHz --tick 4ms --max-time 400ms --max-speed 100rad/s".split()
+    resolution = []
+    for axes in ([], ["--axes", "4"]):
+        assert run("plan", *core, *axes) == 0
+        told = rows(capsys)
+        assert any(line.startswith("axes 4, each looked at every 4 clocks") for line in told) == bool(axes)
+        first = next(k for k, line in enumerate(told) if line.startswith("speed (rad/s)")) + 1
+        resolution.append(float(told[first].split()[4]))
+    assert resolution[1] == pytest.approx(4 * resolution[0], rel=0.01)
+
+
 def test_an_axis_has_one_motion_at_most(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("simulate", *CORE, "--axes", "2", "--motion", "stop:1ms,stop:1ms,stop:1ms") == 2
     assert "must have at most one motion for each of the --axes 2, not 3" in capsys.readouterr().err

@@ -99,7 +99,7 @@ def test_mutants_are_noticed(box: type, right: str, wrong: str) -> None:
 @pytest.mark.parametrize(
     ("texts", "message"),
     [
-        ({"complements": "0"}, "complements must be from 2 to 1048576, not 0"),
+        ({"complements": "1"}, "complements must be from 2us to 1.048576s at this clock, not 1us"),
         ({"complements": "soon"}, "complements must be"),
     ],
 )

@@ -200,7 +200,7 @@ def test_other_texts_are_refused(text: str) -> None:
 def test_cores_that_send_none_refuse_it() -> None:
     spec = of_texts("s", BASE | {"stream": "axi"})
     assert isinstance(spec, STachometer)
-    with pytest.raises(ParameterError, match="stream must not be given together with --axes"):
+    with pytest.raises(ParameterError, match="stream must be left out with --axes"):
         AxesSpec(tachometer=spec, axes=4)
     with pytest.raises(ParameterError, match="stream must be left out of a demo"):
         DemoMap(spec)

@@ -128,7 +128,7 @@ def test_two_pulses_at_one_time(rows: str, options: str, tmp_path: Path, capsys:
         ("--sensor pulses --a C", "must be one of A (0), B (1), not 'C'"),
         ("--sensor hall", "channel c of"),
         ("--c A", "--c must not be given together with --sensor quadrature"),
-        ("--sensor hall --axes 2 --method s", "--sensor must not be given together with --axes"),
+        ("--sensor hall --axes 2 --method s", "--sensor must be left out with --axes"),
     ],
 )
 def test_what_cannot_be(options: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
