@@ -98,7 +98,7 @@ for bit, and float models of what other projects use and of estimators in the li
 
 - *Tracking* (`--method track`): use it where its tick and its area are to be had. It has no settings, and the least
   error of the cores in all situations but few where lines are at fault. It says the acceleration and the position
-  between counts. It needs a timer, block RAMs, and ticks of about 730 clocks, or of 330 with a multiplier of the FPGA.
+  between counts. It needs a timer, block RAMs, and ticks of about 830 clocks, or of 250 with a multiplier of the FPGA.
 - *S*: use it if there is no timer faster than the tick, or if ticks are shorter than 18 µs, down to a clock; it is the
   smallest but for M, it has no divider, and its steady error is least around multiples of the unit velocity. After
   a step to just such a speed it shows the speed before for the maximum time, though

@@ -1,6 +1,8 @@
 """The machine of the tracking method: one adder, one accumulator, a memory, a program, and a unit."""
 
 from collections.abc import Sequence
+from functools import reduce
+from operator import and_, or_
 
 from amaranth import Array, C, Cat, Module, Mux, Shape, Signal, Value, signed
 from amaranth.lib import data, wiring
@@ -22,7 +24,6 @@ from tachometry.spec.formats.tracking_code import (
     Jump,
     Left,
     Program,
-    Source,
 )
 from tachometry.spec.formats.tracking_units import QUICK, Start
 
@@ -36,8 +37,9 @@ def _layout(program: Program) -> data.StructLayout:
     return data.StructLayout(
         {
             "left": Left,
-            "source": Source,
+            "from_unit": 1,
             "word": ADDRESS_BITS,
+            **({"first": ADDRESS_BITS} if program.times.ports > 1 else {}),
             "subtract": 1,
             "by_sign": 1,
             "keep": 1,
@@ -53,18 +55,20 @@ def _layout(program: Program) -> data.StructLayout:
 
 def _encoded(program: Program, one: Instruction, layout: data.StructLayout, at: Sequence[int]) -> int:
     """Return an instruction as the program memory holds it; `at` is where each one stands."""
-    where = program.addresses
-    word = where[one.word] if one.source == Source.WORD else FIRST_INPUT
-    if one.source == Source.INPUT:
-        word += INPUTS.index(one.word)
+    where, nothing = program.addresses, FIRST_INPUT + len(INPUTS)
+    inputs = {f"${name}": FIRST_INPUT + number for number, name in enumerate(INPUTS)}
+    first, word = ({**where, **inputs, "": nothing, "~": nothing}[name] for name in (one.first, one.word))
+    if one.first and program.times.ports == 1:
+        word = first
     how, store = program.number(one), where[one.store]
     if one.target:
         target = at[program.code.labels[one.target]]
         how, store = target & ((1 << HOW_BITS) - 1), target >> HOW_BITS
     values = {
         "left": one.left,
-        "source": one.source,
+        "from_unit": one.word == "~",
         "word": word,
+        "first": first,
         "subtract": one.subtract,
         "by_sign": one.by_sign,
         "keep": one.keep,
@@ -151,6 +155,7 @@ class TrackMachine(wiring.Component):
         )
         fetch = rom.read_port()
         read = words.read_port()
+        others = [words.read_port() for _ in range(program.times.ports - 1)]
         write = words.write_port()
         # Fetch, read, execute.
         reset, tick = (at[program.code.labels[name]] for name in ("reset", "tick"))
@@ -179,6 +184,8 @@ class TrackMachine(wiring.Component):
             read.en.eq(~hold),
             go.eq(active & ~hold),
         ]
+        for other in others:
+            m.d.comb += [other.addr.eq(self._at(coming.first)), other.en.eq(~hold)]
         for _ in range(program.times.stages - 1):
             following = Signal(layout, reset_less=True)
             follows = Signal()
@@ -205,17 +212,19 @@ class TrackMachine(wiring.Component):
         minus = Signal()
         carry = Signal()
         least_or_sum, most_or_sum = Value.cast(now.left)
-        used = Mux(negative, least_or_sum, most_or_sum)
+        used = Signal(attrs={"keep": "true"})
+        m.d.comb += used.eq(Mux(negative, least_or_sum, most_or_sum))
         # Where no word is meant one is read that is 0, and so is an input where none is; it is a first term.
         from_unit = Signal()
         given = Signal(signed(WIDTH), reset_less=True)
         with m.If(~hold):
-            m.d.sync += [from_unit.eq(coming.source == Source.UNIT), given.eq(0)]
-            with m.If(coming.source == Source.INPUT):
-                m.d.sync += given.eq(self._inputs()[coming.word[:3]])
+            m.d.sync += [from_unit.eq(coming.from_unit), given.eq(0)]
+            term = coming.first if others else coming.word
+            with m.If(term[3:] == FIRST_INPUT >> 3):
+                m.d.sync += given.eq(self._inputs()[term[:3]])
         flipped = (right ^ minus.replicate(WIDTH))[:WIDTH]
         m.d.comb += [
-            left.eq(Mux(used, sum_, 0) | given),
+            left.eq(reduce(or_, [Mux(used, sum_, 0), given, *(other.data for other in others)])),
             right.eq(word | Mux(from_unit, unit.result, 0)),
             minus.eq(now.subtract ^ (now.by_sign & sign)),
             carry.eq(minus ^ (from_unit & unit.up)),
@@ -237,7 +246,7 @@ class TrackMachine(wiring.Component):
                 with m.If(shows == number):
                     m.d.sync += getattr(self, name).eq(sum_)
         # The unit.
-        uses = from_unit | ((now.start != Start.NONE) & (now.start != Start.CHANCE))
+        uses = from_unit | reduce(and_, (now.start != start for start in Start if not program.times.of(start)))
         m.d.comb += [
             hold.eq(active & uses & unit.busy),
             unit.begin.eq(self.begin),
@@ -246,8 +255,8 @@ class TrackMachine(wiring.Component):
             unit.sum.eq(sum_),
         ]
         # Jumps.
-        empty, several = ~self.number.any(), self.number[1:].any()
-        met = {Jump.ALWAYS: C(1, 1), Jump.NEG: negative, Jump.POS: ~negative, Jump.EMPTY: empty, Jump.SEVERAL: several}
+        empty, one = ~self.number.any(), self.number == 1
+        met = {Jump.ALWAYS: C(1, 1), Jump.NEG: negative, Jump.POS: ~negative, Jump.EMPTY: empty, Jump.ONE: one}
         m.d.comb += [
             taken.eq(go & Cat(met.get(jump, C(0, 1)) for jump in Jump).bit_select(now.jump, 1)),
             stop.eq(go & (now.jump == Jump.END)),

@@ -145,12 +145,13 @@ class QuickUnit(Unit):
         low = Signal(half, reset_less=True)
         carried = Signal(bits, reset_less=True)
         upper = Signal(signed(half), reset_less=True)
-        begins = doing == Start.TIMES
+        begins = Signal()
         part = Mux(begins, self.sum[:half], upper) * self.factor
         ready = Signal()
         multiplied = Signal()
         power = Cat(C(0, CHANCE_BITS + RESULT_BITS - POWER_BITS - _LOW), self.table.data[:POWER_BITS], C(1, 1))
         m.d.sync += [
+            begins.eq(self.start == Start.TIMES),
             Cat(low, carried).eq(Mux(begins, part, 0)),
             upper.eq(self.sum[half:]),
             product.eq(Mux(last == Start.EXP, power, Cat(low, part + carried).as_signed())),

@@ -160,7 +160,8 @@ class Tracking:
             "order": order, "order_lag": order - fixed_log(math.log2(3.5)),
             "zero": 0, "one": 1, "three": 3, "minus_one": -1, "minus_two": -2,
             "count": one, "half": one // 2, "almost_half": one // 2 - 1,
-            "quarter": one // 4, "minus_quarter": -one // 4, "sixteenth": one // 16,
+            "quarter": one // 4, "minus_quarter": -one // 4,
+            "sixteenth": one // 16, "minus_sixteenth": -one // 16,
             "least_noise": one >> 10, "most_noise": 1 << RESULT_BITS - 2,  # which no error reaches
             "slope": round(self.slope * (1 << self.shifts["acceleration"])),
             "clock": 1 << t, "tick": self.tick_cycles,

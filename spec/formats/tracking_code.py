@@ -3,7 +3,8 @@
 The machine has one adder with an accumulator, the *sum*; a memory of words; and a unit that takes products,
 logarithms, powers and shifts, and whose result is read as `~`. An instruction takes a clock. It waits while the unit
 works and it needs it. A word is read before its use, so none is read right behind its change. A jump tests the sum that
-was before it, and meanwhile adds a term as others do; it stores nothing.
+was before it, and meanwhile adds a term as others do; it stores nothing. A machine that reads two words at a time takes
+the first two terms of a line at once.
 """
 
 from collections.abc import Mapping
@@ -25,15 +26,6 @@ class Left(IntEnum):
     SUM = 3
 
 
-class Source(IntEnum):
-    """Lists where the right operand comes from."""
-
-    NONE = 0
-    UNIT = 1
-    INPUT = 2
-    WORD = 3
-
-
 class Jump(IntEnum):
     """When an instruction jumps."""
 
@@ -42,7 +34,7 @@ class Jump(IntEnum):
     NEG = 2  # sum < 0
     POS = 3
     EMPTY = 4  # no count
-    SEVERAL = 5  # more than one
+    ONE = 5
     END = 6
 
 
@@ -53,6 +45,7 @@ OUTPUTS = ("", "velocity", "position_fine", "quality", "acceleration")
 ADDRESS_BITS = 7
 FIRST_CHOSEN = (1 << ADDRESS_BITS) - 8  # address of what the tick chooses
 FIRST_INPUT = FIRST_CHOSEN - 8  # of inputs: the words there are 0
+_TERM = ("left", "first", "word", "subtract", "by_sign")  # what an instruction adds
 _LEFTS = {"lo+": Left.LEAST, "hi+": Left.MOST}
 
 
@@ -61,8 +54,8 @@ class Instruction:
     """An instruction."""
 
     left: Left = Left.SUM
-    source: Source = Source.NONE
-    word: str = ""  # of the source
+    first: str = ""  # a word, or $ and an input, in the place of a left operand of zero
+    word: str = ""  # the right operand; ~: the result of the unit
     # whether the operand is subtracted, or added with the sign that was kept; whether the sign of the sum is kept
     subtract: bool = False
     by_sign: bool = False
@@ -75,17 +68,9 @@ class Instruction:
     target: str = ""
 
     @property
-    def needs_unit(self) -> bool:
-        """Whether it waits until the unit has finished."""
-        return self.source == Source.UNIT or self.start not in (Start.NONE, Start.CHANCE)
-
-
-def _operand(word: str) -> dict[str, object]:
-    if word == "~":
-        return {"source": Source.UNIT}
-    if word.startswith("$"):
-        return {"source": Source.INPUT, "word": word[1:]}
-    return {"source": Source.WORD, "word": word}
+    def reads(self) -> tuple[str, ...]:
+        """The words that it reads."""
+        return tuple(word for word in (self.first, self.word) if word and word[0] not in "$~")
 
 
 def _chain(words: list[str]) -> list[Instruction]:
@@ -99,8 +84,8 @@ def _chain(words: list[str]) -> list[Instruction]:
         nonlocal fresh
         left = Left.ZERO if fresh else left
         fresh = False
-        operand = {} if word == "zero" else _operand(word)
-        done.append(Instruction(left, subtract="-" in sign, by_sign="s" in sign, **operand))  # type: ignore[arg-type]
+        first, word = (word, "") if word[0] == "$" else ("", word * (word != "zero"))
+        done.append(Instruction(left, first, word, "-" in sign, "s" in sign))
 
     def last(**changes: object) -> None:
         if not done:
@@ -125,8 +110,6 @@ def _chain(words: list[str]) -> list[Instruction]:
             last(start=Start[word.upper()], how=next(rest))
         elif word == "product":
             last(start=Start.TIMES, how=next(rest))
-        elif word == "times":
-            done.append(Instruction(Left.ZERO, start=Start.TIMES, **_operand(next(rest)), how=next(rest)))  # type: ignore[arg-type]
         elif word == "out":
             last(output=next(rest))
         elif word in ("zero", "sum"):
@@ -140,6 +123,18 @@ def _chain(words: list[str]) -> list[Instruction]:
     return done
 
 
+def _paired(chain: list[Instruction]) -> list[Instruction]:
+    """Return a line whose first two terms are added at once, if one of them is a word or an input as it is."""
+    one, other = (*chain, Instruction(Left.ZERO))[:2]
+    if one == Instruction(Left.ZERO, one.first, one.word, one.subtract, one.by_sign) and other.left == Left.SUM:
+        for plain, right in ((one, other), (other, one)):
+            first = plain.first or plain.word
+            if not (first in ("", "~", *CHOSEN) or plain.subtract or plain.by_sign or right.first):
+                both = replace(right, left=Left.ZERO, first=first)
+                return [replace(other, **{name: getattr(both, name) for name in _TERM}), *chain[2:]]
+    return chain
+
+
 @dataclass(frozen=True)
 class Code:
     """Instructions, and the places of the labels among them."""
@@ -149,15 +144,17 @@ class Code:
 
 
 @cache
-def assembled(listing: str = LISTING, apart: int = 2) -> Code:
+def assembled(listing: str = LISTING, apart: int = 2, ports: int = 1) -> Code:
     """Return the instructions of a listing, with some that do nothing where a word would be read too early.
 
-    The one that reads a word is `apart` instructions behind one that stores it, or more.
+    The one that reads a word is `apart` instructions behind one that stores it, or more. Each reads `ports` words.
     """
     code: list[Instruction] = []
     labels: dict[str, int] = {}
     for line in listing.splitlines():
         words = line.partition("#")[0].split()
+        if words[:1] in (["quick"], ["small"]):
+            words = words[1:] if (words[0] == "quick") == (ports > 1) else []
         if not words:
             continue
         if words[0].endswith(":"):
@@ -169,29 +166,39 @@ def assembled(listing: str = LISTING, apart: int = 2) -> Code:
         elif words == ["end"]:
             code.append(Instruction(jump=Jump.END))
         else:
-            code += _chain(words)
-    return _spaced(_joined(code, labels), apart)
+            chain = _chain(words)
+            code += _paired(chain) if ports > 1 else chain
+    return _spaced(_joined(code, labels), apart, ports)
 
 
-def _spaced(code: Code, apart: int) -> Code:
+def _spaced(code: Code, apart: int, ports: int) -> Code:
     """Return a code with enough instructions between a word's change and its use."""
     made: list[Instruction] = []
     places: list[int] = []
     for one in code.instructions:
-        if one.source == Source.WORD:
-            near = (back for back in range(1, apart) if back <= len(made) and _same(made[-back].store, one.word))
-            made += [Instruction()] * (apart - next(near, apart))
+        reads, backs = one.reads, range(1, min(apart, len(made) + 1))
+        near = (back for back in backs if any(_same(made[-back].store, word) for word in reads))
+        made += [Instruction()] * (apart - next(near, apart))
+        if ports > 1 and _clash(one, *made[:-3:-1]):
+            made.append(Instruction())
         places.append(len(made))
         made.append(one)
     return Code(tuple(made), {label: places[place] for label, place in code.labels.items()})
+
+
+def _clash(one: Instruction, before: Instruction = Instruction(), second: Instruction = Instruction()) -> bool:
+    """Tell whether an instruction is too early for the quick unit, as of the two before it; see `QuickUnit`."""
+    if one.start == Start.BY:
+        return second.start in (Start.TIMES, Start.EXP)
+    return before.start == Start.BY and (one.start == Start.TIMES or one.how == "by")
 
 
 def _joined(code: list[Instruction], labels: dict[str, int]) -> Code:
     """Return a code in which a jump also adds the term behind it, or the one at its target; it tests the sum before."""
 
     def is_term(place: int) -> bool:
-        one = replace(code[place], left=Left.SUM, source=Source.NONE, word="", subtract=False, by_sign=False)
-        return replace(one, keep=False) == Instruction() != code[place]
+        one = code[place]
+        return Instruction(one.left, one.first, one.word, one.subtract, one.by_sign, one.keep) == one != Instruction()
 
     def takes_sum(place: int) -> bool:
         one = code[place]
@@ -218,7 +225,7 @@ def _joined(code: list[Instruction], labels: dict[str, int]) -> Code:
             term = at if always else place + 1
             free = always or not (term in entered or takes_sum(at) or (code[term].keep and takes_sign(at)))
             stored = code[place - 1].store
-            if free and is_term(term) and not (stored and _same(stored, code[term].word)):
+            if free and is_term(term) and not any(_same(stored, word) for word in code[term].reads):
                 target = f"{one.target}+1" if always else one.target
                 labels.setdefault(target, term + 1)
                 code[place] = replace(code[term], jump=one.jump, target=target)
@@ -245,8 +252,9 @@ def _longest(times: Times, output: str = "") -> int:
 
 def _longest_of(counts: int, times: Times, output: str) -> int:
     """Return them for no count, one, or several; nothing else of how ways exclude each other is known."""
-    known = {Jump.ALWAYS: True, Jump.END: True, Jump.EMPTY: counts == 0, Jump.SEVERAL: counts > 1}
-    code, labels = assembled(apart=times.apart).instructions, assembled(apart=times.apart).labels
+    known = {Jump.ALWAYS: True, Jump.END: True, Jump.EMPTY: counts == 0, Jump.ONE: counts == 1}
+    made = assembled(apart=times.apart, ports=times.ports)
+    code, labels = made.instructions, made.labels
     entry: dict[int, tuple[int, int]] = {labels["tick"]: (0, 0)}  # clock, and when the unit has finished
     longest, open_ = 0, {labels["tick"]}
     while open_:
@@ -254,9 +262,10 @@ def _longest_of(counts: int, times: Times, output: str) -> int:
         open_.remove(place)
         clock, free = entry[place]
         one = code[place]
-        if one.needs_unit:
+        begun = times.of(one.start)
+        if begun or one.word == "~":
             clock = max(clock, free)
-        if begun := times.of(one.start):
+        if begun:
             free = clock + begun
         clock += 1
         if one.output == output if output else one.jump == Jump.END:
@@ -286,7 +295,7 @@ class Program:
     @cached_property
     def code(self) -> Code:
         """The instructions."""
-        return assembled(apart=self.times.apart)
+        return assembled(apart=self.times.apart, ports=self.times.ports)
 
     @property
     def lead(self) -> int:
@@ -311,7 +320,7 @@ class Program:
     @cached_property
     def words(self) -> dict[str, int]:
         """First contents of all words by name: offsets, what changes, constants."""
-        used = [name for one in self.code.instructions for name in (one.word * (one.source == Source.WORD), one.store)]
+        used = [name for one in self.code.instructions for name in (*one.reads, one.store)]
         names = dict.fromkeys(name for name in used if name and name not in CHOSEN)
         changing = [name for name in names if name not in self.constants and name not in OFFSETS]
         fixed = [name for name in self.constants if name in names or name == "zero"]  # in the place of no offset

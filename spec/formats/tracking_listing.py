@@ -10,11 +10,10 @@ One line is one chain of the adder, from left to right: `word = first term, furt
     o@m1, o@m2, o@m3       of the last count if n mod 4 ≥ 1, of that before if ≥ 2, of the third if = 3, else 0
     keep          the sign of the sum         log, exp      begin log2|sum|, 2^sum
     gain k        begin: logarithm of the gain of p (0), v (1) or a (2)
-    by            the second factor of products              times w name  begin w·factor/2^shift of that name
-    product name  begin: the sum times the factor, as `times` does with a word
+    by            the factor of products      product name  begin: sum·factor/2^shift of that name
     over n        begin: shift right by n     over by       by ⌊log2⌋ of the factor's whole part
     chance        the number that decides how results are rounded
-    out name      an output
+    out name      an output                   quick, small   before a line: only for the machine that is so
 """
 
 LISTING = """
@@ -34,7 +33,224 @@ reset:                                  # before the first tick
     after = minus_one
 tick:
     if empty goto silent
-    if several goto many
+    $number log
+    if one goto single
+    t = o@m1 + o@m2 + o@m3              # about the mean time, by logarithms; what is left goes into e
+    minus_log_n = zero - ~
+    $times log
+    since = $length + since min most_since
+    minus_log_n + ~ exp
+    quiet = $last
+    turn = turn + one
+    quick $number by
+    moved = $moved
+    quick tau = ~ product time
+    small tau = ~
+    small $number by
+    room = $counts + almost_half
+    small tau product time
+    dt = since - tau max clock
+    left = $times - ~
+    t over 6
+    quick dt by
+    places = $places - ~ keep log
+    log_64 + minus_log_n + ~ exp
+    raw = zero s+ ~
+    dt log
+    turn chance
+    c = raw
+    phase
+known:
+    if neg goto young
+    log_dt = ~
+    small dt by
+    a product half_velocity
+    near = raw - edge keep
+    share = log_dt - log_T
+    w = sum lo+ growing
+    step = zero
+    quick t = v + ~ product place
+    quick $number by
+    quick V = t + t - v
+    small t = v + ~
+    small V = sum + ~
+    small t product place
+    minus_sixteenth s+ near
+    if pos goto event
+    ~ keep                              # the same edge again: no event, unless it moved
+    minus_quarter s+ ~
+    if neg goto same
+event:
+    P = p + ~
+    w exp                               # memory grows by g·min(dt, T), if it grows or 4096·dt ≥ T
+    growth keep
+    share + log_4096 - growth
+    if neg goto grown
+    step = zero s+ ~
+grown:
+    small $number by
+    if one goto lone
+    left keep
+    P product mean
+    quick zero s+ left by
+    memory = T + step min most_memory
+    t = places - ~
+    small zero s+ left by
+    V product place_64
+    since = tau
+    P = P - moved
+    t s+ ~ keep log
+    log_64 + minus_log_n + ~ exp
+    e = zero s+ ~ keep log
+    edge = raw - moved
+heard:
+    room s- e
+    if neg goto slip
+    log_e = ~
+    e - mu over 2
+    slips = zero
+    minus_D4 s+ e
+    if pos goto alone
+    mu = mu + ~ keep
+    quick log_dt + log_32 exp
+    since + lead by
+    minus_D3 s+ mu s+ mu
+    if neg goto calm
+    small log_dt + log_32 exp
+fired:
+    T = memory - ~ lo+ ~ log
+    slow_T = zero
+sized:
+    of_e = log_e - log_dt
+    e keep
+    log_T = ~
+    log_X = log_dt - ~ min log_quarter gain 1
+    of_v = sum + of_e + log_X
+    sum + ~ exp
+    w = log_X + limit
+    log_X + log_256
+    if pos goto few
+    w = w + log_9_4
+few:
+    v = V s+ ~
+    log_X gain 2
+    of_v + log_X - log_dt + ~ exp
+    t = log_T + log_T
+    after = one
+    t = t + t - w
+    a = a s+ ~ keep log
+    log_X + log_64                      # order one, where the acceleration is not seen
+    if pos goto curved
+    of_a = log_T - of_slope
+    t + ~ + ~
+    if pos goto curved
+    of_a + ~ exp
+    as = zero
+    quality = of_straight
+    of_e = log_e + log_X
+    vs = v s- ~
+    log_X gain 0
+    velocity = vs
+    goto placed
+curved:
+    as = a product velocity             # the velocity at the time when it is shown
+    quality = of_curve
+    of_e = log_e + log_X
+    vs = v
+    velocity = sum + ~
+    log_X gain 0
+placed:
+    e keep
+    of_e + ~ exp
+    quick since by
+    noises = noises + noises_one min noises_most
+    p = P s+ ~
+place:                                  # and the place at the end of the tick
+    small since by
+    as product half_velocity
+    v keep
+    t = zero s+ v min most
+    vs + ~ product place
+    quick tick by
+    v = zero s+ t
+    least = one
+    if empty goto seen
+    p + ~ out position_fine
+shown:
+    small tick by
+    velocity product shown
+    w = doubt + log_X                   # D·√X, more if errors keep a sign
+    t = ~
+    w over 1
+    quick slope by
+    quality - log_T + ~ exp
+    t min most_shown max least_shown out velocity
+    t = ~
+    small slope by
+    as product acceleration
+    t max least min most_quality out quality
+    ~ out acceleration
+    after
+    if neg goto end
+    sum - one
+    if neg goto ready
+learn:                                  # nothing below is in a hurry
+    e - lag keep log
+    w = D + D + D
+    log_X + log_3_2 + ~ exp
+    noises = noises max noises_first    # an upset may have made it less
+    quick sum min noises_offset by
+    lag = lag s+ ~
+    e over 1
+    t = e - before keep
+    log_X + log_256
+    if pos goto short
+    trouble
+    if pos goto short
+    t = e + ~ keep
+short:
+    small noises min noises_offset by
+    before = e
+    zero s+ t - D min w over by
+    a keep
+    t = zero s+ a min most
+    D = D + ~ min most_noise max least_noise
+    a = zero s+ t
+    if one goto offsets
+ready:                                  # growth of the memory and noise, for the next event
+    D log
+    Ds = D
+    growth = zero
+    growing = log_T
+    limit = order + ~ + ~
+    lag log
+    w = order_lag - log_X - limit
+    after = minus_one
+    trouble = w + ~ + ~                 # lag² over 7/2 U
+    D over 1
+    log_X + log_256
+    if pos goto scaled
+    trouble = trouble - log_9_4
+    Ds = D + ~
+scaled:
+    doubt = trouble + log_4 hi+ limit - order
+    minus_D3 = zero - Ds - Ds - Ds
+    minus_D4 = sum - Ds
+    trouble
+    if neg goto kept
+    growth = zero - count               # that outweighs any logarithm
+    growing = log_T + log_half
+    trouble - log_4
+    if neg goto end
+    slow_T = T + T
+end:
+    end
+kept:
+    T - slow_T
+    if pos goto end
+    growing = log_T + log_eighth
+    end
+single:
     $places keep
     tau = $times
     raw = zero s+ half
@@ -44,189 +260,11 @@ tick:
     dt = sum - tau max clock log
     turn = turn + one chance
     moved = $moved
+    quick dt by
     room = $counts + almost_half
-    goto known
-many:                                   # about the mean time, by logarithms; what is left goes into e
-    $number log
-    t = o@m1 + o@m2 + o@m3
-    log_n = ~
-    $times log
-    quiet = $last
-    zero - log_n + ~ exp
-    since = $length + since min most_since
-    tau = ~
-    $number by
-    turn = turn + one
-    times tau time
-    dt = since - tau max clock
-    left = $times - ~
-    t over 6
-    places = $places - ~ keep log
-    log_64 - log_n + ~ exp
-    moved = $moved
-    room = $counts + almost_half
-    raw = zero s+ ~
-    dt log
-    turn chance
-    c = raw
-known:
-    log_dt = ~
-    dt by
     phase
-    if neg goto young
-    times a half_velocity
-    near = raw - edge keep
-    t = v + ~
-    V = sum + ~
-    times t place
-    share = log_dt - log_T
-    w = sum lo+ growing
-    P = p + ~
-    zero s+ near - sixteenth
-    if neg goto same
-event:
-    w exp                               # memory grows by g·min(dt, T), if it grows or 4096·dt ≥ T
-    growth keep
-    share + least_log
-    if neg goto full
-    step = zero s+ ~
-grown:
-    if several goto mean
-    e = c - P keep log
-    edge = raw - moved
-    since = tau
-    memory = T + step min most_memory
-    goto heard
-mean:
-    $number by
-    times P mean
-    left keep
-    edge = raw - moved
-    t = places - ~
-    zero s+ left by
-    since = tau
-    times V place_64
-    memory = T + step min most_memory
-    t s+ ~ keep log
-    log_64 - log_n + ~ exp
-    e = zero s+ ~ keep log
-heard:
-    room s- e
-    if neg goto slip
-    log_e = ~
-    e - mu over 2
-    slips = zero
-    zero s+ e - D4
-    if pos goto alone
-    mu = mu + ~ keep
-    since + lead by
-    zero - D3 s+ mu s+ mu
-    if pos goto four
-    T = memory log
-    of_e = log_e - log_dt
-    goto sized
-alone:
-    mu = mu + ~
-    since + lead by
-    log_dt + log_8 exp
-    of_e = log_e - log_dt
-    goto fired
-four:
-    log_dt + log_32 exp
-    of_e = log_e - log_dt
-fired:
-    slow_T = zero
-    T = memory - ~ lo+ ~ log
-sized:
-    e keep
-    log_T = ~
-    log_X = log_dt - log_T min log_quarter gain 1
-    of_v = of_e + log_X + log_X
-    sum + ~ exp
-    of_a = of_v + log_X - log_dt
-    v = V s+ ~
-    log_X gain 2
-    of_a + ~ exp
-    of_a = log_T - of_slope
-    after = one
-    a = a s+ ~ keep log
-    log_X + log_64                      # order one, where the acceleration is not seen
-    if pos goto curved
-    log_T + log_T + log_T + log_T - log_X - limit + ~ + ~
-    if neg goto straight
-    sum - log_9_4
-    if pos goto curved
-    log_X + log_256
-    if neg goto straight
-curved:
-    times a velocity                    # the velocity at the time when it is shown
-    as = sum
-    quality = of_curve
-    vs = v
-    velocity = sum + ~
-    goto placed
-straight:
-    of_a + ~ exp
-    as = zero
-    quality = of_straight
-    vs = v s- ~
-    velocity = sum
-placed:
-    e keep
-    log_X gain 0
-    log_e + log_X + ~ exp
-    noises = noises + noises_one
-    p = P - moved s+ ~
-place:                                  # and the place at the end of the tick
-    since by
-    v keep
-    times as half_velocity
-    t = zero s+ v min most
-    vs + ~ product place
-    v = zero s+ t
-    least = one
-    if empty goto seen
-    p + ~ out position_fine
-shown:
-    tick by
-    w = doubt + log_X                   # D·√X, more if errors keep a sign
-    times velocity shown
-    noises = noises min noises_most
-    t = ~
-    w over 1
-    quality - log_T + ~ exp
-    t min most_shown max least_shown out velocity
-    t = ~
-    slope by
-    times as acceleration
-    t max least min most_quality out quality
-    ~ out acceleration
-    after
-    if neg goto end
-    sum - one
-    if neg goto ready
-learn:                                  # nothing below is in a hurry
-    t = e - before keep
-    before = e
-    log_X + log_256
-    if pos goto short
-    trouble
-    if pos goto short
-    e over 1
-    t = e + ~ keep
-short:
-    noises = noises max noises_first    # an upset may have made it less
-    sum min noises_offset by
-    w = D + D + D
-    zero s+ t - D min w over by
-    a keep
-    t = zero s+ a min most
-    D = D + ~ min most_noise max least_noise
-    a = zero s+ t
-    e - lag keep log
-    log_X + log_3_2 + ~ exp
-    lag = lag s+ ~
-    if several goto ready
+    goto known
+offsets:
     log_X + past_4
     if pos goto ready
     noises max noises_least by
@@ -237,44 +275,23 @@ short:
     o1 = o1 s- ~
     o2 = o2 s- ~
     o3 = o3 s- ~
-ready:                                  # growth of the memory and noise, for the next event
-    after = minus_one
-    D log
-    Ds = D
-    growth = zero
-    growing = log_T
-    least_log = log_4096
-    limit = ~ + ~ + order
-    lag log
-    w = log_X + limit - order_lag
-    trouble = ~ + ~ - w                 # lag² over 7/2 U
-    log_X + log_256
-    if pos goto scaled
-    D over 1
-    trouble = trouble - log_9_4
-    Ds = D + ~
-scaled:
-    doubt = trouble + log_4 max zero + limit - order
-    D3 = Ds + Ds + Ds
-    D4 = sum + Ds
-    trouble
-    if pos goto lost
-    T - slow_T
-    if pos goto end
-    growing = log_T + log_eighth
-end:
-    end
-lost:
-    growth = minus_one
-    least_log = count
-    growing = log_T + log_half
-    trouble - log_4
-    if neg goto end
-    slow_T = T + T
-    end
-full:
-    step = zero
-    goto grown
+    goto ready
+lone:
+    e = c - P keep log
+    edge = raw - moved
+    since = tau
+    memory = T + step min most_memory
+    P = P - moved
+    goto heard
+alone:
+    mu = mu + ~
+    quick log_dt + log_8 exp
+    since + lead by
+    small log_dt + log_8 exp
+    goto fired
+calm:
+    T = memory log
+    goto sized
 slip:                                   # counts were lost or added, or the offset was upset
     o@last = o@last min quarter max minus_quarter
     slips = slips + one
@@ -291,6 +308,7 @@ first:
     phase = minus_one
     goto nothing
 young:
+    log_dt = ~
     phase + one
     if neg goto first
 begin:
@@ -315,10 +333,7 @@ begin:
     after = zero
     quality = of_curve
     goto show
-same:                                   # the same edge again: no event, unless it moved
-    ~ keep
-    zero s+ ~ - quarter
-    if pos goto event
+same:
     edge = edge - moved
     p = p - moved
     goto show
@@ -331,7 +346,8 @@ silent:
     if neg goto nothing
 show:
     since + lead by
-    times as velocity
+    as product velocity
+    quick since by
     velocity = vs + ~
     goto place
 seen:
@@ -343,7 +359,7 @@ below:
     zero - P - o@down
 beyond:
     max zero
-    t = sum - half - D4 - Ds
+    t = sum - half + minus_D4 - Ds
     if neg goto still
     P = P s- t
     quiet + lead log
@@ -354,8 +370,8 @@ beyond:
 whole:
     w = of_speed - w - ~ exp
     t = zero s+ velocity - ~ lo+ ~
-    velocity = zero s+ t
     w + of_bound exp                    # the error is at most the bound
+    velocity = zero s+ t
     least = ~
 still:
     P out position_fine
@@ -375,5 +391,6 @@ nothing:
     p out position_fine
 quiet:
     as = zero
+    quick tick by
     goto shown
 """

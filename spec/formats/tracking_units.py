@@ -23,7 +23,7 @@ class Start(IntEnum):
 class Times:
     """Clocks from the begin of an operation of the unit until its result can be used."""
 
-    # log, exp, over, gain, by and times: at most
+    # log, exp, over, gain, by and times: at most; 0: nothing waits for it
     log: int
     exp: int
     over: int
@@ -32,6 +32,7 @@ class Times:
     times: int
     # clocks from when an instruction is fetched until it is executed, which are lost when a jump is taken: 1, or 3
     stages: int = 1
+    ports: int = 1
 
     @property
     def apart(self) -> int:
@@ -48,7 +49,7 @@ class Times:
         return getattr(self, start.name.lower(), 0)
 
 
-QUICK = Times(log=4, exp=5, over=3, gain=3, by=2, times=5)
+QUICK = Times(log=4, exp=5, over=3, gain=3, by=0, times=5, ports=2)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from tachometry.sim.golden.methods.track import Windows
 from tachometry.sim.golden.methods.track_recursion import Recursion, log2
 from tachometry.spec import TrackTachometer, of_texts
 from tachometry.spec.formats.tracking import CHANCE_BITS, GAIN_STEPS, GAINS, LOG_BITS, PLACE_BITS, WIDTH
-from tachometry.spec.formats.tracking_code import OUTPUTS, Instruction, Jump, Left, Program, Source
+from tachometry.spec.formats.tracking_code import OUTPUTS, Instruction, Jump, Left, Program
 from tachometry.spec.formats.tracking_units import Start
 
 
@@ -71,19 +71,13 @@ class Interpreter:
                 Jump.NEG: sum_ < 0,
                 Jump.POS: sum_ >= 0,
                 Jump.EMPTY: number == 0,
-                Jump.SEVERAL: number > 1,
+                Jump.ONE: number == 1,
             }[one.jump]
             place = self.program.code.labels[one.target] if taken else place
-            match one.source:
-                case Source.NONE:
-                    operand = 0
-                case Source.UNIT:
-                    operand = result
-                case Source.INPUT:
-                    operand = inputs[one.word]
-                case Source.WORD:
-                    operand = self.words[name(one.word)]
-            left = {Left.ZERO: 0, Left.SUM: sum_, Left.LEAST: min(sum_, 0), Left.MOST: max(sum_, 0)}[one.left]
+            terms = {"": 0, "~": result} | {f"${word}": value for word, value in inputs.items()}
+            terms |= {word: self.words[name(word)] for word in one.reads}
+            first, operand = terms[one.first], terms[one.word]
+            left = {Left.ZERO: first, Left.SUM: sum_, Left.LEAST: min(sum_, 0), Left.MOST: max(sum_, 0)}[one.left]
             minus = one.subtract != (one.by_sign and sign < 0)
             sum_ = left - operand if minus else left + operand
             if not -(1 << (WIDTH - 1)) <= sum_ < 1 << (WIDTH - 1):

@@ -1,6 +1,7 @@
 """The listing of the tracking method computes what the recursion says, on every way, and nothing overflows."""
 
 from collections import Counter
+from dataclasses import replace
 
 import pytest
 from support.nightly import nightly
@@ -9,7 +10,7 @@ from support.tracking import Interpreter, core, windows
 from tachometry.sim.golden.methods.track_recursion import Recursion, log2
 from tachometry.spec import TrackTachometer
 from tachometry.spec.formats.tracking import WIDTH
-from tachometry.spec.formats.tracking_code import FIRST_INPUT, Jump, assembled
+from tachometry.spec.formats.tracking_code import FIRST_INPUT, Instruction, Jump, assembled
 
 # Ticks of few clocks and of many, of one length and of several; words as wide as they come.
 CORES = [
@@ -32,10 +33,12 @@ def run(spec: TrackTachometer, seed: int, n_ticks: int) -> Counter[int]:
     return machine.met
 
 
-def test_listing() -> None:
+@pytest.mark.parametrize("multiplier", ["serial", "block"])
+def test_listing(multiplier: str) -> None:
     """Every instruction is met."""
-    met = sum((run(*motion) for motion in MOTIONS), Counter[int]())
-    code = CORES[0].program.code
+    cores = [replace(core, multiplier=multiplier) for core, *_ in MOTIONS]
+    met = sum((run(core, *motion) for core, (_, *motion) in zip(cores, MOTIONS, strict=True)), Counter[int]())
+    code = cores[0].program.code
     labels = {place: label for label, place in code.labels.items()}
     missed = [(labels.get(place), one) for place, one in enumerate(code.instructions) if not met[place]]
     assert not missed
@@ -66,8 +69,7 @@ def test_a_memory_of_the_most_events_shrinks_or_stays(grows: int) -> None:
     state.log_memory = machine.words["log_T"] = log2(state.memory)
     machine.words["growing"] = state.log_memory + state.log_growth
     if grows < 0:
-        state.grows = machine.words["growth"] = grows
-        machine.words["least_log"] = machine.words["count"]
+        state.grows, machine.words["growth"] = grows, -machine.words["count"]
     for both in (machine, state):
         both.tick(*rows[0])
     assert machine.words["T"] == state.memory
@@ -92,7 +94,47 @@ def test_a_jump_adds_the_term_behind_it(lines: str, word: str) -> None:
     assert next(one.word for one in code if one.jump not in (Jump.NEVER, Jump.END)) == word
 
 
+@pytest.mark.parametrize(
+    ("line", "terms"),
+    [
+        ("a + b - c", [("a", "b"), ("", "c")]),
+        ("~ + b", [("b", "~")]),
+        ("zero - a + b", [("b", "a")]),
+        ("$a s- ~", [("$a", "~")]),
+        ("a keep s+ b", [("", "a"), ("", "b")]),
+        ("a log + b", [("", "a"), ("", "b")]),
+        ("a - o@up", [("a", "o@up")]),
+        ("o@up - a", [("", "o@up"), ("", "a")]),  # what the tick chooses has one port
+        ("a min b", [("a", "b"), ("", "b")]),
+        ("a hi+ b", [("", "a"), ("", "b")]),
+    ],
+)
+def test_two_terms_are_added_at_once(line: str, terms: list[tuple[str, str]]) -> None:
+    made = assembled(f"{line}\nend", ports=2).instructions
+    assert [(one.first, one.word) for one in made if one.jump != Jump.END] == terms
+
+
+@pytest.mark.parametrize(
+    ("listing", "idle"),
+    [
+        ("a by; b product time", 1),  # the factor is not there yet
+        ("a by; b over by", 1),
+        ("a by; b over 1", 0),
+        ("a product time; b by", 0),
+        ("a product time; b; c by", 1),  # both would shift at once
+        ("a exp; b; c by", 1),
+        ("a exp; b; c; d by", 0),
+        ("a = b; c = d + a", 1),  # it is not written yet
+        ("a = b; c = a + d", 1),
+        ("a = b; c; d = a + c", 0),
+    ],
+)
+def test_what_comes_too_early_waits(listing: str, idle: int) -> None:
+    made = assembled(listing.replace("; ", "\n"), ports=2).instructions
+    assert made.count(Instruction()) == idle
+
+
 @nightly
 @pytest.mark.parametrize("seed", range(2, 22))
 def test_more_motions(seed: int) -> None:
-    run(CORES[seed % 4], seed, 4000)
+    run(replace(CORES[seed % 4], multiplier=("serial", "block")[seed // 4 % 2]), seed, 4000)

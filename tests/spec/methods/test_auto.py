@@ -82,9 +82,9 @@ def test_what_it_is_for_decides() -> None:
 
 TICKS = [
     ({"clock": "48MHz"}, "track", 960),
-    ({"clock": "12MHz"}, "track", 480),  # 40 µs: 413 clocks with multipliers
+    ({"clock": "12MHz"}, "track", 300),  # 25 µs: 249 clocks with multipliers
     ({"clock": "12.288MHz"}, "track", 1536),  # of 20 µs no whole number
-    ({"clock": "1MHz"}, "track", 500),
+    ({"clock": "1MHz"}, "track", 250),
     ({"clock": "200kHz"}, "s", 4),  # track would need 2 ms
     ({"clock": "12MHz", "method": "s"}, "s", 240),
     ({"clock": "12MHz", "method": "track", "multiplier": "serial"}, "track", 1200),
