@@ -124,6 +124,11 @@ class SmallUnit(Unit):
         by_places = (doing == Start.TIMES) | over_by
         power = doing == Start.EXP
         again = reads & is_read & ~is_power
+        # The same adder has the bits that decide how the result is rounded, as both ends of a carry chain take cells.
+        # The bit between, which is `up` twice, is their carry, and brings `up` to the pairs.
+        both = Signal(CHANCE_BITS + 7)
+        way = more | Cat(by_2, C(0, 1), by_8, C(0, 3))
+        m.d.comb += both.eq(Cat(work[:CHANCE_BITS], up, pairs) + Cat(self.chance, up, way))
         m.d.sync += [
             more.eq(
                 (Array(C(-small.pairs(*kind), 6) for kind in self.shifts)[self.how] & starts.replicate(6))
@@ -132,7 +137,7 @@ class SmallUnit(Unit):
                 | (C(-small.read_pairs, 6) & again.replicate(6))
             ),
             up.eq((whole[0] & power) | (over_by & ~self.places[0])),
-            pairs.eq((Cat(C(1, 1), pairs) + Cat(up, more | Cat(by_2, C(0, 1), by_8, C(0, 3)))) >> 1),
+            pairs.eq(both[CHANCE_BITS + 1 :]),
         ]
         with m.If((rests & ~begins) | again):
             m.d.sync += pairs.eq(0)
@@ -153,7 +158,7 @@ class SmallUnit(Unit):
         with m.If(ends):
             m.d.sync += is_read.eq(1)
         with m.If(ends):
-            m.d.sync += self.up.eq((work[:CHANCE_BITS] + self.chance)[-1] & ~large)
+            m.d.sync += self.up.eq(both[CHANCE_BITS] & ~large)
         with m.If(ends & is_factor):
             m.d.sync += [
                 self.factor.eq(Cat(work[0] & ~work[bits], work[1 : bits + 1])),

@@ -10,15 +10,18 @@ from tachometry.hdl.arithmetic.idle import Idle, IdleSum
 from tachometry.spec.formats.tracking import Tracking
 
 
-def added(*pairs: tuple[Value, Value]) -> list[Value]:
-    """Return the sums of some pairs, each modulo the width of its first term, out of one adder.
+def _sums(*sums: tuple[Value, Value, Value]) -> list[Value]:
+    """Return left + right + carry of each, modulo the width of left, out of one adder.
 
-    Both ends of a carry chain take cells. A bit between two sums keeps the carry of one from the next.
+    Both ends of a carry chain take cells. Between two sums there is a bit that is the carry in both terms: so it comes
+    into the second, and the carry of the first does not.
     """
-    rights = ((C(0, signed(len(left))) | right)[: len(left)] for left, right in pairs)
-    total = Cat(Cat(left, C(0, 1)) for left, _ in pairs) + Cat(Cat(right, C(0, 1)) for right in rights)
-    ends = list(accumulate(len(left) + 1 for left, _ in pairs))
-    return [total[end - 1 - len(left) : end - 1] for end, (left, _) in zip(ends, pairs, strict=True)]
+    rights = [(C(0, signed(len(left))) | right)[: len(left)] for left, right, _ in sums]
+    total = Cat(Cat(carry, left) for left, _, carry in sums) + Cat(
+        Cat(carry, right) for right, (_, _, carry) in zip(rights, sums, strict=True)
+    )
+    ends = accumulate(len(left) + 1 for left, _, _ in sums)
+    return [total[end - len(left) : end] for end, (left, _, _) in zip(ends, sums, strict=True)]
 
 
 class TickCounts(wiring.Component):
@@ -93,13 +96,13 @@ class TickCounts(wiring.Component):
         m.d.comb += takes.eq(counts & (before != form.most_number))
         # A count backward has its place one below that of a count forward.
         lower = Cat(bit ^ (backward & ~way[:number].any()) for number, bit in enumerate(way[: form.number_bits + 1]))
-        place = (Cat(C(1, 1), lower) & takes.replicate(form.number_bits + 2)).as_signed()
-        next_last, next_times, next_moved, next_places, waited = added(
-            (last, C(1, 1)),
-            (times, number),
-            (way, self.step),
-            (Mux(fresh, 0, places), place),
-            (self.elapsed, self.elapsed != self._max_ticks),
+        place = Cat(C(0, 1), lower & takes.replicate(len(lower))).as_signed()  # and one more
+        next_last, next_times, next_moved, next_places, waited = _sums(
+            (last, C(0, 1), C(1, 1)),
+            (times, number & ~1, number[0]),
+            (way, backward.replicate(len(way)), counts & ~backward),
+            (Mux(fresh, 0, places), place, takes),
+            (self.elapsed, C(0, 1), self.elapsed != self._max_ticks),
         )
         m.d.sync += [
             fresh.eq(self.tick),

@@ -324,7 +324,7 @@ class Program:
         names = dict.fromkeys(name for name in used if name and name not in CHOSEN)
         changing = [name for name in names if name not in self.constants and name not in OFFSETS]
         fixed = [name for name in self.constants if name in names or name == "zero"]  # in the place of no offset
-        return {name: self.constants.get(name, 0) for name in (*OFFSETS, *changing, *fixed)}
+        return {name: self.constants.get(name, 0) for name in (*OFFSETS, "zero", *changing, *fixed)}
 
     @cached_property
     def addresses(self) -> dict[str, int]:
