@@ -85,7 +85,6 @@ class SmallUnit(Unit):
             with m.Case(3):
                 m.d.comb += addend.eq(~operand)
         total = Signal(signed(WIDTH + 2))
-        m.d.comb += total.eq((Cat(C(1, 1), work[low:]).as_signed() + Cat(minus, addend).as_signed()) >> 1)
         # Where it goes.
         by_8, by_2, there, ends, to_go = (Signal(name=name) for name in ("by_8", "by_2", "there", "ends", "to_go"))
         # Whether the leading one is still so far up, known a clock before; of `far` only if the shift was by 8.
@@ -126,9 +125,15 @@ class SmallUnit(Unit):
         again = reads & is_read & ~is_power
         # The same adder has the bits that decide how the result is rounded, as both ends of a carry chain take cells.
         # The bit between, which is `up` twice, is their carry, and brings `up` to the pairs.
-        both = Signal(CHANCE_BITS + 7)
-        way = more | Cat(by_2, C(0, 1), by_8, C(0, 3))
-        m.d.comb += both.eq(Cat(work[:CHANCE_BITS], up, pairs) + Cat(self.chance, up, way))
+        both = Signal(CHANCE_BITS + 8 + len(total))
+        way = (more | Cat(by_2, C(0, 1), by_8, C(0, 3)))[:6]
+        m.d.comb += [
+            both.eq(
+                Cat(work[:CHANCE_BITS], up, pairs, minus, work[low:], work[-1], work[-1])
+                + Cat(self.chance, up, way, minus, addend)
+            ),
+            total.eq(both[CHANCE_BITS + 8 :]),
+        ]
         m.d.sync += [
             more.eq(
                 (Array(C(-small.pairs(*kind), 6) for kind in self.shifts)[self.how] & starts.replicate(6))
@@ -137,7 +142,7 @@ class SmallUnit(Unit):
                 | (C(-small.read_pairs, 6) & again.replicate(6))
             ),
             up.eq((whole[0] & power) | (over_by & ~self.places[0])),
-            pairs.eq(both[CHANCE_BITS + 1 :]),
+            pairs.eq(both[CHANCE_BITS + 1 :][:6]),
         ]
         with m.If((rests & ~begins) | again):
             m.d.sync += pairs.eq(0)
