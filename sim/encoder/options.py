@@ -13,8 +13,6 @@ if TYPE_CHECKING:  # numpy is slow to import
     from tachometry.sim.encoder.imperfections import Bounce, LineFault
     from tachometry.sim.encoder.motion import Vibration
 
-_MOTION, _FAULTS = "Motion", "Encoder faults"
-
 
 def _vibration(what: str, text: str) -> Vibration:
     from tachometry.sim.encoder.motion import Vibration
@@ -46,7 +44,7 @@ def _time(what: str, text: str) -> float:
 
 
 def _fault(help: str, metavar: str, parse: Callable[[str, str], float], name: str = "") -> float:
-    found: float = option(None, help, text="0", name=name, metavar=metavar, group=_FAULTS, parse=parse)
+    found: float = option(None, help, text="0", name=name, metavar=metavar, parse=parse)
     return found
 
 
@@ -83,12 +81,14 @@ class EncoderOptions:
         If a parameter is out of range.
     """
 
+    _group = "Encoder faults"
+
     vibration: Vibration | None = option(  # noqa: RUF009
         None,
         "Sinusoidal vibration of the shaft, such as 1mrad:50Hz (rad, mrad or deg; Hz, kHz, MHz or GHz). It is part of "
         "the true motion.",
         metavar="AMPL:FREQ",
-        group=_MOTION,
+        group="Motion",
         parse=_vibration,
     )
     jitter: float = _fault(
@@ -124,7 +124,6 @@ class EncoderOptions:
         "Contact bounce, such as 3:500us (s, ms, us or ns): after an edge the line falls back COUNT times within TIME, "
         "or within half the way to the next edge.",
         metavar="COUNT:TIME",
-        group=_FAULTS,
         parse=_bounce,
     )
     lost: float = _fault(
@@ -142,7 +141,6 @@ class EncoderOptions:
         "A broken wire, such as b:200ms: from then on line a, b, z, c of halls, or a complement as a_n is high, as an "
         "open input is.",
         metavar="LINE:TIME",
-        group=_FAULTS,
         parse=_line_fault,
     )
     stuck: LineFault | None = option(  # noqa: RUF009
@@ -150,14 +148,12 @@ class EncoderOptions:
         "A shorted wire, such as a:200ms: from then on line a, b, z, c of halls, or a complement as a_n stays as it "
         "is.",
         metavar="LINE:TIME",
-        group=_FAULTS,
         parse=_line_fault,
     )
     index_width: int = option(
         1,
         "Quarter periods for which the index is high, 1 to 16. A wider one than 1 is not gated by A and B.",
         metavar="N",
-        group=_FAULTS,
     )
     index_skew_s: float = option(
         None,
@@ -166,12 +162,9 @@ class EncoderOptions:
         text="0s",
         name="index-skew",
         metavar="TIME",
-        group=_FAULTS,
         parse=_time,
     )
-    seed: int = option(
-        0, "Seed of all random numbers; equal seeds give equal files.", metavar="N", group=_FAULTS, parse=_seed
-    )
+    seed: int = option(0, "Seed of all random numbers; equal seeds give equal files.", metavar="N", parse=_seed)
 
     def __post_init__(self) -> None:
         for name in ("jitter", "nonuniformity", "eccentricity"):

@@ -10,7 +10,6 @@ from tachometry.spec.language.option import ParameterError, option, options_of
 from tachometry.spec.language.units import CURRENT, PLAIN, Quantity, parse_bandwidth
 
 MAX_PERIOD = 1 << 24
-_GROUP = "Loop"
 # Least and greatest: beyond them no drive is, so they are slips of the pen.
 _SIZES = {
     "kp": ("1e-12", "1e12"),
@@ -50,7 +49,6 @@ class Law(Motor):
         text="100",
         name="kp",
         metavar="KP",
-        group=_GROUP,
         parse=Quantity(PLAIN),
     )
     velocity_gain: Fraction = option(  # noqa: RUF009
@@ -59,7 +57,6 @@ class Law(Motor):
         text="30",
         name="kv",
         metavar="KV",
-        group=_GROUP,
         parse=Quantity(PLAIN),
     )
     observer: Fraction = option(  # noqa: RUF009
@@ -68,7 +65,6 @@ class Law(Motor):
         text="40rad/s",
         metavar="BANDWIDTH",
         unit="rad/s",
-        group=_GROUP,
         parse=parse_bandwidth,
     )
     velocity_filter: Fraction | None = option(  # noqa: RUF009
@@ -77,7 +73,6 @@ class Law(Motor):
         shown="that of --observer; none with method track",
         metavar="[BANDWIDTH|none]",
         unit="rad/s",
-        group=_GROUP,
         parse=_Filter(),
     )
     current_limit: Fraction = option(  # noqa: RUF009
@@ -85,7 +80,6 @@ class Law(Motor):
         "Greatest commanded current, in A or mA; the observer is given the current that is held within it.",
         text="20A",
         metavar="CURRENT",
-        group=_GROUP,
         parse=Quantity(CURRENT),
     )
     control_period: int | None = option(
@@ -94,14 +88,12 @@ class Law(Motor):
         shown="one tick",
         metavar="TIME",
         unit="clocks",
-        group=_GROUP,
         parse_at=parse_clocks,
     )
     synchronised: bool = option(
         True,
         "Let velocity filter and observer work at the updates of the velocity (Fig. 11), or at every control tick "
         "(Fig. 2).",
-        group=_GROUP,
     )
 
     def __post_init__(self) -> None:

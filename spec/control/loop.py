@@ -17,7 +17,7 @@ from tachometry.spec.control.units import Units
 from tachometry.spec.core.described import written
 from tachometry.spec.core.front_end import OF_CONTROLS
 from tachometry.spec.core.scale import Scale
-from tachometry.spec.language.option import ParameterError, option, options_of
+from tachometry.spec.language.option import ParameterError, check_options, option, options_of
 from tachometry.spec.language.port import Port, Ports
 from tachometry.spec.language.units import PI, plural, rounded
 from tachometry.spec.methods.axes import CoreSpec
@@ -28,7 +28,6 @@ MAX_WORD_WIDTH = 80
 MULTIPLIERS = ("serial", "parallel")
 COMMANDS = ("ports", "generator")
 FIXED_OR_INPUTS = ("fixed", "inputs")
-_GROUP = "Loop"
 # Clocks of a product: to load the word, to subtract from it, to begin, to store the result; and between them one for
 # each bit of the coefficient, or one for the product and one to round it.
 _STEPS = 4
@@ -88,25 +87,22 @@ class LoopSpec(Law):
     wide.
     """
 
-    current_width: int = option(16, "Bits of current, 8 to 24.", metavar="N", group=_GROUP)
+    current_width: int = option(16, "Bits of current, 8 to 24.", metavar="N", limits=(8, 24))
     multiplier: str = option(
         "serial",
         "How products are formed: a bit a clock, or at once with multipliers of the FPGA.",
         name="loop-multiplier",
         choices=MULTIPLIERS,
-        group=_GROUP,
     )
     command: str = option(
         "ports",
         "Where commands come from: from outside, or from a generator in the core of constant speeds, ramps and sines.",
         choices=COMMANDS,
-        group=_GROUP,
     )
     gains: str = option(
         "fixed",
         "Whether gains and current limit are fixed, or inputs; a bus makes them registers that begin with the options.",
         choices=FIXED_OR_INPUTS,
-        group=_GROUP,
     )
 
     # Outputs are of one axis.
@@ -123,14 +119,7 @@ class LoopSpec(Law):
             raise ParameterError(OF_CONTROLS[name], "must not be given together with --loop, whose position would jump")
         if self.tachometer.compare is not None and self.tachometer.compare.depth:
             raise ParameterError("compare", "must not be a list together with --loop, whose inputs are commands")
-        if not 8 <= self.current_width <= 24:
-            raise ParameterError("current_width", f"must be from 8 to 24, not {self.current_width}")
-        if self.multiplier not in MULTIPLIERS:
-            raise ParameterError("loop_multiplier", f"must be serial or parallel, not {self.multiplier!r}")
-        if self.command not in COMMANDS:
-            raise ParameterError("command", f"must be ports or generator, not {self.command!r}")
-        if self.gains not in FIXED_OR_INPUTS:
-            raise ParameterError("gains", f"must be fixed or inputs, not {self.gains!r}")
+        check_options(self)
         self._check_formats()
         if self.period < self.latency.least_period:
             periods = [self.period]

@@ -6,21 +6,19 @@ from fractions import Fraction
 from tachometry.spec.language.option import option
 from tachometry.spec.language.units import PLAIN, TORQUE_CONSTANT, Quantity
 
-_GROUP = "Loop"
-
 
 @dataclass(frozen=True, kw_only=True)
 class Motor:
     """Describes the motor as its controller knows it."""
 
+    _group = "Loop"
     inertia: Fraction = option(  # noqa: RUF009
-        None, "Inertia J of motor and load, in kg m².", text="0.003", metavar="J", group=_GROUP, parse=Quantity(PLAIN)
+        None, "Inertia J of motor and load, in kg m².", text="0.003", metavar="J", parse=Quantity(PLAIN)
     )
     torque_constant: Fraction = option(  # noqa: RUF009
         None,
         "Torque constant K_t of the motor, in Nm/A or mNm/A.",
         text="60.3mNm/A",
         metavar="KT",
-        group=_GROUP,
         parse=Quantity(TORQUE_CONSTANT),
     )

@@ -11,8 +11,8 @@ from tachometry.spec.core.health import COMPLEMENTS
 from tachometry.spec.core.probe import edges_of
 from tachometry.spec.core.timing import MAX_TICK_CYCLES
 from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS
-from tachometry.spec.formats.velocity_output import NATIVE, UNITS
-from tachometry.spec.language.option import ParameterError
+from tachometry.spec.formats.velocity_output import NATIVE
+from tachometry.spec.language.option import ParameterError, check_options
 from tachometry.spec.language.units import PI, SpeedUnit, format_time, rounded, signed_width
 
 if TYPE_CHECKING:
@@ -24,14 +24,9 @@ _LONGEST_FILTER = Fraction(10, 1000)  # s; contacts bounce for 2 ms or so
 
 def check(spec: TachometerSpec) -> None:
     """Check what is asked for; ParameterError if a parameter is out of range."""
-    if spec.unit not in UNITS:
-        raise ParameterError("unit", f"must be one of {', '.join(UNITS)}, not {spec.unit!r}")
+    check_options(spec)
     _check_ticks(spec)
-    if spec.velocity_width is not None and not 8 <= spec.velocity_width <= 64:
-        raise ParameterError("velocity_width", f"must be from 8 to 64, not {spec.velocity_width}")
     _check_velocity(spec)
-    if not 8 <= spec.position_width <= 48:
-        raise ParameterError("position_width", f"must be from 8 to 48, not {spec.position_width}")
     most = max(255, int(spec.timing.clock_hz * _LONGEST_FILTER))
     if not 0 <= spec.filter_clocks <= most:
         longest = format_time(Fraction(most) / spec.timing.clock_hz)

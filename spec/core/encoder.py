@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from tachometry.spec.core.sensors import SENSORS, Sensor
-from tachometry.spec.language.option import REQUIRED, Option, ParameterError, option, parse_whole
+from tachometry.spec.language.option import REQUIRED, Option, ParameterError, check_options, option, parse_whole
 
-_GROUP = "Encoder"
 _MOST = 1 << 24  # counts
 _INVERTIBLE = ("a", "b", "c", "z")
 _MOST_MISSING = 4  # with more, a gap is too long to go by the speed before it
-_OF_TURN: dict[str, Any] = {"metavar": "N", "group": _GROUP, "parse": parse_whole}
+_OF_TURN: dict[str, Any] = {"metavar": "N", "parse": parse_whole}
 
 
 def _of_counts(what: str, text: str, known: Mapping[str, Any]) -> int:
@@ -69,12 +68,12 @@ class Encoder:
     A value out of range raises ParameterError.
     """
 
+    _group = "Encoder"
     pulses_per_rev: int = option(
         REQUIRED,
         "Pulses per revolution: periods of line A (or B) in one turn, as in the encoder's data sheet.",
         name="ppr",
         metavar="N",
-        group=_GROUP,
         parse=parse_whole,
         also=(
             Option("Lines of the disc, which are pulses per revolution (instead of --ppr).", name="lines", **_OF_TURN),
@@ -99,7 +98,6 @@ class Encoder:
         parse=_factor,
         shown="4",
         metavar="[4|2|1]",
-        group=_GROUP,
         tests=("", "2", "1"),
     )
     sensor: str = option(
@@ -108,16 +106,14 @@ class Encoder:
         "forward), step-dir (each rise of A is a step, forward while B is high), up-down (each rise of A counts up, "
         "of B down), or hall (A, B and C of a motor, 120 electrical degrees apart).",
         choices=tuple(SENSORS),
-        group=_GROUP,
         tests=("", "hall", "pulses"),
         tacit=True,
     )
-    reverse: bool = option(False, "Count backward what would be forward.", group=_GROUP, tacit=True)
+    reverse: bool = option(False, "Count backward what would be forward.", tacit=True)
     invert: str | None = option(
         None,
         "Lines to be inverted, which are high where they should be low: a, b, c, z, with commas between.",
         metavar="LINES",
-        group=_GROUP,
         parse=_inverted,
         tests=("", "a"),
         tacit=True,
@@ -128,15 +124,13 @@ class Encoder:
         "36-1. From the second gap on the missing teeth count where they would be. With --index the first tooth after "
         "a gap is the index, and there is no pin z. Output synced tells that the gap is where it should be.",
         metavar="N-M",
-        group=_GROUP,
         parse=_wheel,
         tests=(),
         tacit=True,
     )
 
     def __post_init__(self) -> None:
-        if self.sensor not in SENSORS:
-            raise ParameterError("sensor", f"must be one of {', '.join(SENSORS)}, not {self.sensor!r}")
+        check_options(self)
         if self.decoding is None:
             object.__setattr__(self, "decoding", 1 if self.missing_teeth else self.kind.decodings[0])
         self._check_decoding()

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from tachometry.spec.core.timing import parse_filter
-from tachometry.spec.language.option import ParameterError, option
+from tachometry.spec.language.option import check_options, option
 
 
 class Fault(IntEnum):
@@ -52,6 +52,7 @@ class Health:
         "swings about one edge has such edges as well (with --health).",
         name="health-edges",
         metavar="N",
+        limits=(2, 1 << 16),
         tests=("5",),
         tacit=True,
     )
@@ -60,6 +61,7 @@ class Health:
         "More than N illegal transitions in a second, 0 to 65535, are a fault (with --health).",
         name="health-errors",
         metavar="N",
+        limits=(0, (1 << 16) - 1),
         tests=("0",),
         tacit=True,
     )
@@ -76,6 +78,4 @@ class Health:
     )
 
     def __post_init__(self) -> None:
-        for name, value, least, most in (("edges", self.edges, 2, 1 << 16), ("errors", self.errors, 0, (1 << 16) - 1)):
-            if not least <= value <= most:
-                raise ParameterError(f"health_{name}", f"must be from {least} to {most}, not {value}")
+        check_options(self)

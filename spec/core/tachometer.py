@@ -73,6 +73,7 @@ class TachometerSpec:
         shown="as many as it can need",
         metavar="N",
         parse=parse_whole,
+        limits=(8, 64),
         tests=("", "needed - 2", "needed - 0"),
     )
     max_speed: Speed | None = option(  # noqa: RUF009
@@ -85,7 +86,11 @@ class TachometerSpec:
         tests=("", "some counts per tick"),
     )
     position_width: int = option(
-        32, "Bits of the position, 8 to 48; it wraps in two's complement.", metavar="N", tests=("8", "", "48")
+        32,
+        "Bits of the position, 8 to 48; it wraps in two's complement.",
+        metavar="N",
+        limits=(8, 48),
+        tests=("8", "", "48"),
     )
     filter_clocks: int = option(
         0,

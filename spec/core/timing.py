@@ -24,8 +24,6 @@ MAX_CLOCK_HZ = 10**11
 MAX_TICK_CYCLES = 1 << 20
 MIN_TICKS, MAX_TICKS = 2, 1 << 20
 
-_GROUP = "Timing"
-
 
 def parse_clocks(what: str, text: str, timing: Mapping[str, Any]) -> int:
     """Return a time as a whole number of clocks, as `whole_clocks` does, for an option."""
@@ -79,13 +77,13 @@ class Timing:
     A value out of range raises ParameterError.
     """
 
+    _group = "Timing"
     clock_hz: int = option(
         REQUIRED,
         "Clock of the core, in Hz, kHz, MHz or GHz.",
         text="48MHz",
         name="clock",
         metavar="FREQUENCY",
-        group=_GROUP,
         parse=parse_frequency,
     )
     tick_cycles: int = option(
@@ -97,7 +95,6 @@ class Timing:
         name="tick",
         metavar="TIME",
         unit="clocks",
-        group=_GROUP,
         parse_at=_tick,
         tests=("1", "3", "960", "2"),
         few=3,
@@ -106,14 +103,12 @@ class Timing:
                 "Frequency of the PWM, one period of which is the sampling period (instead of --tick).",
                 name="pwm",
                 metavar="FREQUENCY",
-                group=_GROUP,
                 parse_at=_of_frequency,
             ),
             Option(
                 "Sampling period of method rairan, whose tick is called dt (instead of --tick).",
                 name="dt",
                 metavar="TIME",
-                group=_GROUP,
                 parse_at=_tick,
                 fits=lambda spec: spec.facts.own_ticks,
             ),
@@ -128,7 +123,6 @@ class Timing:
         name="max-time",
         metavar="TIME",
         unit="ticks",
-        group=_GROUP,
         parse_at=_ticks,
         tests=("2", "500", "3", "4096"),
         few=3,

@@ -77,8 +77,9 @@ class Option:
     name: str = ""
     metavar: str | None = None
     unit: str = ""  # what the field's number counts: `clocks`, `ticks` or `rad/s`
-    group: str = "Core"  # heading in `--help`
+    group: str = ""  # heading in `--help`; empty: `_group` of the class, or Core
     choices: tuple[str, ...] = ()  # all texts that it takes; empty: others
+    limits: tuple[int, int] | None = None  # the least number that it may be, and the greatest
     shown: str | None = None  # the default, as `--help` shows it
     # makes the value from the name of the option in messages, and from the text
     parse: Callable[[str, str], Any] = parse_text
@@ -182,17 +183,30 @@ def options_of(spec: Any) -> tuple[Option, ...]:
 
 @cache
 def _declared(spec: Any) -> tuple[Option, ...]:
-    return tuple(about for item in fields(spec) for about in _of_field(item))
+    return tuple(about for item in fields(spec) for about in _of_field(spec, item))
 
 
-def _of_field(item: Field[Any]) -> Iterator[Option]:
+def _of_field(spec: Any, item: Field[Any]) -> Iterator[Option]:
     options = item.metadata.get("options", ())
     for about in options:
         name = about.name or item.name.replace("_", "-")
-        text = options[0].text  # of the main option, whichever is given
-        yield replace(about, name=name, text=text, field=item.name, default=False if about.part else item.default)
-        for own in options_of(about.part) if about.part else ():
-            yield replace(own, needs=name, field=own.parameter, within=(item.name, own.field))
+        own: dict[str, Any] = {"group": about.group or getattr(spec, "_group", "Core"), "text": options[0].text}
+        yield replace(about, name=name, field=item.name, default=False if about.part else item.default, **own)
+        for one in options_of(about.part) if about.part else ():
+            yield replace(one, needs=name, field=one.parameter, within=(item.name, one.field))
+
+
+def check_options(spec: Any) -> None:
+    """Check what options of a spec are, by their choices and limits; ParameterError names the first that is wrong."""
+    for about in options_of(type(spec)):
+        if (value := about.value_in(spec)) is None:
+            continue
+        if about.choices and value not in about.choices:
+            listed = " or ".join(about.choices) if len(about.choices) == 2 else f"one of {', '.join(about.choices)}"
+            raise ParameterError(about.parameter, f"must be {listed}, not {value!r}")
+        if about.limits and not about.limits[0] <= value <= about.limits[1]:
+            least, most = about.limits
+            raise ParameterError(about.parameter, f"must be from {least} to {most}, not {value}")
 
 
 def read_options(

@@ -12,10 +12,8 @@ from tachometry.spec.core.times import Times
 from tachometry.spec.core.widths import Widths
 from tachometry.spec.core.words import Words
 from tachometry.spec.formats.reciprocal import Reciprocal
-from tachometry.spec.language.option import ParameterError, option
+from tachometry.spec.language.option import option
 from tachometry.spec.language.units import plural, signed_width
-
-MAX_AVERAGE = 256
 
 
 class MTimes(Times["MTachometer"]):
@@ -120,7 +118,9 @@ class MTachometer(TachometerSpec):
     value out of range raises ParameterError.
     """
 
-    average: int = option(1, "Ticks that are averaged, 1 to 256.", metavar="N", unit="ticks", tests=("", "2", "3", "8"))
+    average: int = option(
+        1, "Ticks that are averaged, 1 to 256.", metavar="N", unit="ticks", limits=(1, 256), tests=("", "2", "3", "8")
+    )
 
     method = "m"
     facts = Facts(title="M", summary="counts the pulses of one tick, or of several", update_by="tick")
@@ -130,8 +130,3 @@ class MTachometer(TachometerSpec):
     latency = cached_property(MLatency)
     recovery = cached_property(MRecovery)
     words = cached_property(MWords)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not 1 <= self.average <= MAX_AVERAGE:
-            raise ParameterError("average", f"must be from 1 to {MAX_AVERAGE}, not {self.average}")

@@ -266,8 +266,6 @@ class RairanTachometer(TachometerSpec):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.estimate not in ESTIMATES:
-            raise ParameterError("estimate", f"must be one of {', '.join(ESTIMATES)}, not {self.estimate!r}")
         if self.bounds and self.paper_exact:
             raise ParameterError("bounds", "must not be given with paper_exact, whose estimate leaves them")
         if self.timing.max_ticks >= MAX_TABLE:

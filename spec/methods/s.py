@@ -12,7 +12,7 @@ from tachometry.spec.core.times import Times
 from tachometry.spec.core.words import Words
 from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal
 from tachometry.spec.formats.reciprocal import DividedReciprocal, NarrowReciprocal, Reciprocal
-from tachometry.spec.language.option import ParameterError, option
+from tachometry.spec.language.option import option
 from tachometry.spec.language.units import plural, signed_width
 
 # Up to this many ticks 1/m_s can be looked up in a table of block RAM.
@@ -236,8 +236,3 @@ class STachometer(TachometerSpec):
     latency = cached_property(SLatency)
     recovery = cached_property(SRecovery)
     words = cached_property(SWords)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.reciprocal_source not in _SOURCES:
-            raise ParameterError("reciprocal", f"must be serial or table, not {self.reciprocal_source!r}")

@@ -241,8 +241,6 @@ class TimedTachometer(TachometerSpec):
         super().__post_init__()
         if self.bounds and self.paper_exact:
             raise ParameterError("bounds", "must not be given with paper_exact, which has none")
-        if self.timer not in _TIMERS:
-            raise ParameterError("timer", f"must be clock or tick, not {self.timer!r}")
 
     @property
     def method_ports(self) -> tuple[Port, ...]:

@@ -214,7 +214,9 @@ class TrackTachometer(TachometerSpec):
         choices=_MULTIPLIERS,
         tests=("", "block"),
     )
-    fine_bits: int = option(6, "Fraction bits of position_fine, 1 to 16.", metavar="N", tests=("", "1", "16"))
+    fine_bits: int = option(
+        6, "Fraction bits of position_fine, 1 to 16.", metavar="N", limits=(1, 16), tests=("", "1", "16")
+    )
 
     method = "track"
     facts = Facts(
@@ -232,10 +234,6 @@ class TrackTachometer(TachometerSpec):
     words = cached_property(TrackWords)
 
     def __post_init__(self) -> None:
-        if self.multiplier not in _MULTIPLIERS:
-            raise ParameterError("multiplier", f"must be auto, serial or block, not {self.multiplier!r}")
-        if not 1 <= self.fine_bits <= 16:
-            raise ParameterError("fine_bits", f"must be from 1 to 16, not {self.fine_bits}")
         shortest, longest = self.timing.tick_cycles, MOST_MEMORY * self.timing.clock_hz
         if self.max_memory is not None and not shortest <= self.max_memory <= longest:
             least, given = (format_time(self.times.seconds(clocks)) for clocks in (shortest, self.max_memory))

@@ -22,7 +22,7 @@ def test_ends_of_ranges() -> None:
         ("frac_bits", "25", "from 4 to 24, not 25"),
         ("max_memory", "959clk", "from 20us, a tick, to 4s, not 19.9791667us"),
         ("max_memory", "192000001clk", "from 20us, a tick, to 4s, not 4.00000002s"),
-        ("multiplier", "large", "^multiplier must be auto, serial or block, not 'large'"),
+        ("multiplier", "large", "^multiplier must be one of auto, serial, block, not 'large'"),
     ):
         with pytest.raises(ParameterError, match=allowed):
             core(**{name: text})
