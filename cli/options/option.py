@@ -235,7 +235,8 @@ def option(group: str, name: str, *others: str, **attributes: Any) -> Callable[[
 
 def plain_options(group: str, helps: Mapping[str, str]) -> list[Callable[[Any], Any]]:
     """Return decorators of options by their names, as of `option`: texts, or flags where nothing stands for a value."""
-    return [option(group, name, is_flag=" " not in name, help=help) for name, help in helps.items()]
+    # What is no flag is not said to be none: click would then take a value that begins with - for another option.
+    return [option(group, name, is_flag=None if " " in name else True, help=help) for name, help in helps.items()]
 
 
 def declared(group: str, about: declaration.Option) -> Callable[[Command], Command]:
