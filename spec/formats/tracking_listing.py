@@ -220,6 +220,7 @@ short:
 ready:                                  # growth of the memory and noise, for the next event
     D log
     Ds = D
+    fifth = zero
     growth = zero
     growing = log_T
     limit = order + ~ + ~
@@ -232,10 +233,11 @@ ready:                                  # growth of the memory and noise, for th
     if pos goto scaled
     trouble = trouble - log_9_4
     Ds = D + ~
+    fifth = sum                         # D_s, as the memory is long
 scaled:
     doubt = trouble + log_4 hi+ limit - order
     minus_D3 = zero - Ds - Ds - Ds
-    minus_D4 = sum - Ds
+    minus_D4 = sum - Ds - fifth
     trouble
     if neg goto kept
     growth = zero - count               # that outweighs any logarithm
@@ -359,16 +361,16 @@ below:
     zero - P - o@down
 beyond:
     max zero
-    t = sum - half + minus_D4 - Ds
+    t = sum - half + minus_D3 - Ds - Ds
     if neg goto still
-    P = P s- t
     quiet + lead log
+    P = P s- t
     w = zero
     t - half
     if neg goto whole
     w = log_5_8
 whole:
-    w = of_speed - w - ~ exp
+    w = of_speed - ~ - w exp
     t = zero s+ velocity - ~ lo+ ~
     w + of_bound exp                    # the error is at most the bound
     velocity = zero s+ t

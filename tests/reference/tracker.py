@@ -121,7 +121,7 @@ class Tracker:
         self.memory = min(self.memory + growth * min(dt, self.memory), self.most_memory)
         self.mean += (e - self.mean) / 4
         least = math.inf
-        if abs(e) > 4 * self.sure:
+        if abs(e) > (4 + self.long) * self.sure:
             least = 8 * dt
         elif abs(self.mean) > 3 / 2 * self.sure:
             least = 32 * dt

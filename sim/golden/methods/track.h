@@ -7,14 +7,14 @@ struct Recursion {
   const Constants &k;
   const int64_t *logs, *powers, *gains, *reversed;
   int64_t phase = 0, turn = 0, noises, p = 0, v = 0, a = 0, shown_v = 0, shown_a = 0, memory = 0, log_memory = 0;
-  int64_t slow_until = 0, since = 0, quiet = 0, noise, sure, error = 0, mean = 0, lag = 0, edge = 0, slips = 0;
+  int64_t slow_until = 0, since = 0, quiet = 0, noise, sure, alarm, error = 0, mean = 0, lag = 0, edge = 0, slips = 0;
   int64_t log_share, offsets[4] = {0, 0, 0, 0}, grows = 1, log_growth = 0, log_limit = 0, trouble = 0, chance, moved = 0, quality = 0;
   int64_t *row = nullptr;
 
   Recursion(const Constants &k, const int64_t *logs, const int64_t *powers, const int64_t *gains, const int64_t *reversed)
       : k(k), logs(logs), powers(powers), gains(gains), reversed(reversed) {
     noises = k.noises_first;
-    noise = sure = k.quarter;
+    noise = sure = k.quarter, alarm = 4 * sure;
     log_share = -k.log_4;
   }
 
@@ -112,7 +112,7 @@ struct Recursion {
     }
     slips = 0;
     mean += round(e - mean, 2);
-    if (std::abs(e) >= 4 * sure) slow_until = 0, grown = std::min(grown, power(log_dt + k.log_8, 1));
+    if (std::abs(e) >= alarm) slow_until = 0, grown = std::min(grown, power(log_dt + k.log_8, 1));
     else if (2 * std::abs(mean) >= 3 * sure) slow_until = 0, grown = std::min(grown, power(log_dt + k.log_32, 1));
     memory = grown, log_memory = log2(memory);
     int64_t x = log_share = std::min(log_dt - log_memory, k.log_quarter), of_v = log_e - log_dt + x + x;
@@ -146,7 +146,9 @@ struct Recursion {
     log_limit = 2 * log2(noise) + k.order;
     sure = noise;
     int64_t lagging = log_share + log_limit - k.order_lag;
-    if (log_share + k.log_256 < 0) sure += round(noise, 1), lagging += k.log_9_4;
+    bool is_long = log_share + k.log_256 < 0;
+    if (is_long) sure += round(noise, 1), lagging += k.log_9_4;
+    alarm = (4 + is_long) * sure;
     grows = 1, log_growth = 0;
     trouble = 2 * log2(lag) - lagging;
     if (trouble >= 0) {

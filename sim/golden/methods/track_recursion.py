@@ -49,6 +49,7 @@ class Recursion:
         self.memory = self.log_memory = self.slow_until = 0
         self.since = self.quiet = 0
         self.noise = self.sure = k["quarter"]
+        self.alarm = 4 * self.sure
         self.error = self.mean = self.lag = self.edge = self.slips = 0
         self.log_share = -k["log_4"]
         self.offsets = [0] * 4
@@ -157,7 +158,7 @@ class Recursion:
         # A change of the speed leaves 8 or 32 events.
         quarter = self._round(e - self.mean, 2)
         self.mean += quarter
-        if abs(e) >= 4 * self.sure:
+        if abs(e) >= self.alarm:
             self.slow_until, memory = 0, min(memory, self._power(log_dt + k["log_8"]))
         elif 2 * abs(self.mean) >= 3 * self.sure:
             self.slow_until, memory = 0, min(memory, self._power(log_dt + k["log_32"]))
@@ -216,11 +217,12 @@ class Recursion:
         """Find what the next event takes of this one: growth of the memory, noise."""
         k = self._k
         self.log_limit = 2 * log2(self.noise) + k["order"]
-        self.sure = self.noise
+        self.sure, sures = self.noise, 4
         lagging = self.log_share + self.log_limit - k["order_lag"]
         if self.log_share + k["log_256"] < 0:
             self.sure += self._round(self.noise, 1)
-            lagging += k["log_9_4"]
+            lagging, sures = lagging + k["log_9_4"], 5
+        self.alarm = sures * self.sure
         self.grows, self.log_growth = 1, 0
         self.trouble = 2 * log2(self.lag) - lagging
         if self.trouble >= 0:
@@ -269,7 +271,7 @@ class Recursion:
         z, least = self._place, 1
         sign = -1 if z < 0 else 1
         offset = self.offsets[(end - 1 if z < 0 else end) & 3]
-        beyond = max(sign * (z + offset), 0) - k["half"] - 4 * self.sure - self.sure
+        beyond = max(sign * (z + offset), 0) - k["half"] - 5 * self.sure
         velocity = self._ahead()
         if beyond >= 0:
             z -= sign * beyond

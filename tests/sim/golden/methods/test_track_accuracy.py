@@ -13,11 +13,12 @@ from support.tracking import core
 
 from tachometry.sim import golden
 from tachometry.sim.golden.front_end import decoded
-from tachometry.sim.signals.recording import PinTrace, quadrature
+from tachometry.sim.signals.recording import PinTrace
 
 SPEC = core(tick="100us", max_time="100ms", max_speed="1000rad/s")
 ROWS = {situation.name: situation for situation in SITUATIONS}
-PROMISED = load("tracking").IN_FLOAT["100us"]
+BENCH = load("tracking")
+PROMISED = BENCH.IN_FLOAT["100us"]
 
 
 def errors(situation: Situation, seed: int, beside: bool = False) -> tuple[float, float]:
@@ -100,14 +101,7 @@ def test_a_speed_that_begins_to_change_gently_is_followed() -> None:
 
 
 # Near the rate of the ticks early and late counts share ticks, so errors in a row are alike: there it once failed.
-@pytest.mark.parametrize("rate", only([10_000], [5000, 9800, 10_000, 25_000]))
-def test_no_noise_of_a_disc_is_taken_for_a_change_of_the_speed(rate: int) -> None:
-    """In a million counts whose edges are off at random, at a constant speed."""
-    rng = np.random.default_rng(rate)
-    place = np.arange(1, 1_000_000) + rng.normal(0, 0.05, 999_999)
-    clock = np.maximum.accumulate(np.round(place * SPEC.timing.clock_hz / rate).astype(np.int64))
-    level = quadrature(np.arange(1_000_000))
-    trace = PinTrace(np.append(0, clock), level & np.uint8(1), level >> np.uint8(1), int(clock[-1]) + 10)
-    velocity = golden.run(SPEC, trace).updates.velocity[2000:] * SPEC.scale.rad_per_s_per_lsb
-    right = rate * 2 * np.pi / SPEC.encoder.counts_per_rev
-    assert np.abs(velocity - right).max() < 0.002 * right
+@pytest.mark.parametrize("rate", only([2], [0.5, 0.98, 1, 2, 2.5]))
+def test_no_noise_of_a_disc_is_taken_for_a_change_of_the_speed(rate: float) -> None:
+    """In a million counts whose edges are off by chance, of which a threshold of 4·D_s takes some for a change."""
+    assert BENCH.steady(SPEC, rate, 0.05, 2).max() < BENCH.ALARM
