@@ -14,6 +14,7 @@ from support.tracking import core
 from tachometry.sim import golden
 from tachometry.sim.golden.front_end import decoded
 from tachometry.sim.signals.recording import PinTrace
+from tachometry.spec import TrackTachometer
 
 SPEC = core(tick="100us", max_time="100ms", max_speed="1000rad/s")
 ROWS = {situation.name: situation for situation in SITUATIONS}
@@ -21,25 +22,25 @@ BENCH = load("tracking")
 PROMISED = BENCH.IN_FLOAT["100us"]
 
 
-def errors(situation: Situation, seed: int, beside: bool = False) -> tuple[float, float]:
+def errors(situation: Situation, seed: int, beside: bool = False, spec: TrackTachometer = SPEC) -> tuple[float, float]:
     """Return the RMS in rad/s of the golden model at its updates, and that of the independent one."""
     truth = situation.record(seed)
-    trace = PinTrace.of(truth.recording, SPEC)
-    updates = golden.run(SPEC, trace).updates
-    seconds = updates.clock / SPEC.timing.clock_hz
+    trace = PinTrace.of(truth.recording, spec)
+    updates = golden.run(spec, trace).updates
+    seconds = updates.clock / spec.timing.clock_hz
     judged = (seconds > situation.start_s) & (seconds <= truth.recording.duration)
     right = truth.true_speed(seconds[judged])
 
     def rms(velocity: np.ndarray) -> float:
         return math.sqrt(float(np.mean((velocity[judged] - right) ** 2)))
 
-    own = rms(updates.velocity * SPEC.scale.rad_per_s_per_lsb)
+    own = rms(updates.velocity * spec.scale.rad_per_s_per_lsb)
     if not beside:
         return own, math.nan
-    form, steps = SPEC.form, decoded(SPEC, trace)
+    form, steps = spec.form, decoded(spec, trace)
     memory, forget, longest = (form.constants[name] >> form.time_bits for name in ("most_memory", "forget", "max_time"))
-    model = Tracker(memory, forget, longest, SPEC.program.lead)
-    ends = updates.clock - SPEC.latency.datapath
+    model = Tracker(memory, forget, longest, spec.program.lead)
+    ends = updates.clock - spec.latency.datapath
     counted = steps.step != 0
     clocks, ways = steps.clock[counted], steps.step[counted]
     places = np.searchsorted(clocks, np.append(-1, ends), side="right").tolist()
@@ -48,7 +49,7 @@ def errors(situation: Situation, seed: int, beside: bool = False) -> tuple[float
         model.tick(end, counts[first:until])
         for end, first, until in zip(ends.tolist(), places, places[1:], strict=False)
     ]
-    count = 2 * np.pi / SPEC.encoder.counts_per_rev * SPEC.timing.clock_hz
+    count = 2 * np.pi / spec.encoder.counts_per_rev * spec.timing.clock_hz
     return own, rms(np.array(shown) * count)
 
 
@@ -82,6 +83,22 @@ def test_lines_at_fault(faults: dict[str, str]) -> None:
     """Edges are lost, and so are counts where both lines change at once."""
     own, other = errors(replace(ROWS["trapezoid, real"], faults=faults), 1, beside=True)
     assert own == pytest.approx(other, rel=0.1)
+
+
+OTHER_CORES = [
+    {"tick": "8us"}, {"tick": "1ms"}, {"clock": "12MHz"}, {"clock": "100MHz"}, {"decoding": "1"}, {"decoding": "2"},
+    {"ppr": "16"}, {"ppr": "10000"},
+]  # fmt: skip
+
+
+@nightly
+@pytest.mark.parametrize("name", ["ramp, real", "reversals, real", "slow sine, real"])
+@pytest.mark.parametrize("options", OTHER_CORES, ids=str)
+def test_other_cores_and_discs_are_as_good(options: dict[str, str], name: str) -> None:
+    spec = core(**{"tick": "100us", "max_time": "100ms", "max_speed": "400rad/s", **options})
+    situation = replace(ROWS[name], lines=spec.encoder.pulses_per_rev)
+    own, other = np.mean(np.square([errors(situation, seed, True, spec) for seed in (401, 402)]), axis=0) ** 0.5
+    assert own < 1.1 * other
 
 
 @nightly
