@@ -15,6 +15,7 @@ from tachometry.spec.control.law import Law
 from tachometry.spec.control.ports import loop_ports
 from tachometry.spec.control.units import Units
 from tachometry.spec.core.described import written
+from tachometry.spec.core.follows import Follows
 from tachometry.spec.core.front_end import OF_CONTROLS
 from tachometry.spec.core.scale import Scale
 from tachometry.spec.language.option import ParameterError, check_options, option, options_of
@@ -36,11 +37,8 @@ _UNFILTERED = 3  # to load the velocity, to subtract, to store
 _LIMIT = 2  # to hold the sum within few bits, and within the limit
 
 
-class LoopLatency:
+class LoopLatency(Follows["LoopSpec"]):
     """Counts the clocks of the ticks of a control loop, and of its computation."""
-
-    def __init__(self, spec: LoopSpec) -> None:
-        self.spec = spec
 
     @property
     def first_tick(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from tachometry.spec.control.coefficients import gain_per_lsb
@@ -22,44 +23,46 @@ _GAIN_HELP = {
     Term.ACCELERATION: "How much of the commanded acceleration becomes current.",
     Term.DISTURBANCE: "How much of the estimated disturbance becomes current.",
 }
+_COMMAND_HELP = {
+    "position": "Commanded position; it wraps as position does.",
+    "velocity": "Commanded velocity.",
+    "acceleration": "Commanded acceleration, or 0.",
+}
 _GAIN_UNIT = {Term.POSITION: " 1/s²", Term.VELOCITY: " 1/s"}
 
 
-def loop_ports(spec: LoopSpec) -> tuple[Port, ...]:
-    """Return ports beside those of the tachometer."""
-    form, tachometer = spec.form, spec.tachometer
-    fine = f"2^{-tachometer.widths.frac_bits - form.extra_bits} {tachometer.unit}"
-    return (
-        Port("enable", "input", help="The current is 0 unless this is high in the clock of control_tick."),
-        *(_generated(spec) if spec.command == "generator" else _commands(spec)),
-        *(_gains(spec) if spec.gains == "inputs" else ()),
-        strobe(CONTROL, "One clock for every control period: position and commands are taken."),
-        strobe(CURRENT, "One clock for every new current."),
-        held(
-            *(CURRENT, "current", spec.current_width),
-            signed=True,
-            unit=f"2^{-spec.units.current_frac_bits} A",
-            help="Commanded current, within the limit.",
-        ),
-        held(CURRENT, "current_saturated", help="This current was held within the limit."),
-        held(
-            *(CURRENT, "filtered_velocity", signed_width(form.most_y)),
-            signed=True,
-            unit=fine,
-            help="y, the velocity that is controlled: behind the filter, if there is one.",
-        ),
-        held(
-            *(CURRENT, "disturbance", signed_width(form.most_w)),
-            signed=True,
-            unit=fine,
-            help="Estimated disturbance as z - y; multiplied by torque_per_lsb of the manifest it is in Nm.",
-        ),
-        Port(
-            *("drive", "output"),
-            help="The current as a bit stream of a first-order sigma-delta modulator: 1 in (current + 2^(w-1)) of 2^w "
-            "clocks, w bits of current.",
-        ),
+def loop_ports(spec: LoopSpec) -> Iterator[Port]:
+    """Yield ports beside those of the tachometer."""
+    form, taken = spec.form, _TAKEN[spec.gains]
+    fine = f"2^{-spec.tachometer.widths.frac_bits - form.extra_bits} {spec.tachometer.unit}"
+    amperes = f"2^{-spec.units.current_frac_bits} A"
+    yield Port("enable", "input", help="The current is 0 unless this is high in the clock of control_tick.")
+    if spec.command == "generator":
+        yield from _generated(spec)
+    else:
+        for name, (width, unit) in _units(spec).items():
+            text = f"{_COMMAND_HELP[name]} {taken}"
+            yield Port(f"command_{name}", "input", width, signed=True, unit=unit, help=text)
+    if spec.gains == "inputs":
+        for term in GAINS:
+            unit = f"{float(gain_per_lsb(spec.units, form, term)):.9g}{_GAIN_UNIT.get(term, '')}"
+            yield Port(GAIN_PORTS[term], "input", form.gain_bits, unit=unit, help=f"{_GAIN_HELP[term]} {taken}")
+        text = f"Greatest current; a limit beyond that of the option is held at it. {taken}"
+        yield Port("current_limit", "input", form.current_limit.bit_length(), unit=amperes, help=text)
+        yield Port("freeze", "input", help="Commands, gains and limit stay as they were, but enable does not.")
+    yield strobe(CONTROL, "One clock for every control period: position and commands are taken.")
+    yield strobe(CURRENT, "One clock for every new current.")
+    text = "Commanded current, within the limit."
+    yield held(CURRENT, "current", spec.current_width, signed=True, unit=amperes, help=text)
+    yield held(CURRENT, "current_saturated", help="This current was held within the limit.")
+    text = "y, the velocity that is controlled: behind the filter, if there is one."
+    yield held(CURRENT, "filtered_velocity", signed_width(form.most_y), signed=True, unit=fine, help=text)
+    text = "Estimated disturbance as z - y; multiplied by torque_per_lsb of the manifest it is in Nm."
+    yield held(CURRENT, "disturbance", signed_width(form.most_w), signed=True, unit=fine, help=text)
+    text = (
+        "The current as a bit stream of a first-order sigma-delta modulator: 1 in (current + 2^(w-1)) of 2^w clocks, "
     )
+    yield Port("drive", "output", help=text + "w bits of current.")
 
 
 def _units(spec: LoopSpec) -> dict[str, tuple[int, str]]:
@@ -72,80 +75,29 @@ def _units(spec: LoopSpec) -> dict[str, tuple[int, str]]:
     }
 
 
-def _commands(spec: LoopSpec) -> tuple[Port, ...]:
-    """Return commands from outside."""
-    told = {
-        "position": "Commanded position; it wraps as position does.",
-        "velocity": "Commanded velocity.",
-        "acceleration": "Commanded acceleration, or 0.",
-    }
-    taken = _TAKEN[spec.gains]
-    return tuple(
-        Port(f"command_{name}", "input", width, signed=True, unit=unit, help=f"{told[name]} {taken}")
-        for name, (width, unit) in _units(spec).items()
-    )
-
-
-def _gains(spec: LoopSpec) -> tuple[Port, ...]:
-    """Return gains and limit from outside."""
-    form, taken = spec.form, _TAKEN[spec.gains]
-    return (
-        *(
-            Port(
-                *(GAIN_PORTS[term], "input", form.gain_bits),
-                unit=f"{float(gain_per_lsb(spec.units, form, term)):.9g}{_GAIN_UNIT.get(term, '')}",
-                help=f"{_GAIN_HELP[term]} {taken}",
-            )
-            for term in GAINS
-        ),
-        Port(
-            *("current_limit", "input", form.current_limit.bit_length()),
-            unit=f"2^{-spec.units.current_frac_bits} A",
-            help=f"Greatest current; a limit beyond that of the option is held at it. {taken}",
-        ),
-        Port("freeze", "input", help="Commands, gains and limit stay as they were, but enable does not."),
-    )
-
-
-def _generated(spec: LoopSpec) -> tuple[Port, ...]:
-    """Return what the command generator is told, and what it commands."""
-    form = spec.generator
-    taken = _TAKEN[spec.gains]
-    inputs = (
-        Port(
-            *("generator_mode", "input", MODE_WIDTH),
-            help=f"0: a constant velocity; 1: a ramp to it; 2 or 3: a sine, which begins here at rest. {taken}",
-        ),
-        Port(
-            *("generator_velocity", "input", WORD, True),
-            unit=f"2^{form.velocity_shift - form.fraction} counts per control tick",
-            help=f"Velocity of constant and ramp. {taken}",
-        ),
-        Port(
-            *("generator_acceleration", "input", WORD),
-            unit=f"2^{-form.fraction} counts per control tick squared",
-            help=f"Most by which the velocity of a ramp changes. {taken}",
-        ),
-        Port(
-            *("generator_amplitude", "input", AMPLITUDE_WIDTH, True),
-            unit=f"2^{-POSITION_FRAC_BITS} counts",
-            help=f"How far the middle of a sine is from where it begins. {taken} It counts when the sine begins.",
-        ),
-        Port(
-            *("generator_rate", "input", WORD),
-            unit=f"2^{-RATE_FRAC_BITS}",
-            help=f"4·sin²(π·f·T) of a sine of frequency f, control ticks of T. {taken}",
-        ),
-    )
-    told = {
+def _generated(spec: LoopSpec) -> Iterator[Port]:
+    """Yield what the command generator is told, and what it commands."""
+    form, taken = spec.generator, _TAKEN[spec.gains]
+    text = f"0: a constant velocity; 1: a ramp to it; 2 or 3: a sine, which begins here at rest. {taken}"
+    yield Port("generator_mode", "input", MODE_WIDTH, help=text)
+    unit = f"2^{form.velocity_shift - form.fraction} counts per control tick"
+    text = f"Velocity of constant and ramp. {taken}"
+    yield Port("generator_velocity", "input", WORD, signed=True, unit=unit, help=text)
+    unit = f"2^{-form.fraction} counts per control tick squared"
+    text = f"Most by which the velocity of a ramp changes. {taken}"
+    yield Port("generator_acceleration", "input", WORD, unit=unit, help=text)
+    unit = f"2^{-POSITION_FRAC_BITS} counts"
+    text = f"How far the middle of a sine is from where it begins. {taken} It counts when the sine begins."
+    yield Port("generator_amplitude", "input", AMPLITUDE_WIDTH, signed=True, unit=unit, help=text)
+    text = f"4·sin²(π·f·T) of a sine of frequency f, control ticks of T. {taken}"
+    yield Port("generator_rate", "input", WORD, unit=f"2^{-RATE_FRAC_BITS}", help=text)
+    texts = {
         "position": "Commanded position; where enable is low, the position.",
         "velocity": "How far the commanded position has gone since the control tick before.",
         "acceleration": "How much the commanded velocity has changed since the control tick before.",
     }
-    return inputs + tuple(
-        held(CONTROL, f"command_{name}", width, signed=True, unit=unit, help=told[name])
-        for name, (width, unit) in _units(spec).items()
-    )
+    for name, (width, unit) in _units(spec).items():
+        yield held(CONTROL, f"command_{name}", width, signed=True, unit=unit, help=texts[name])
 
 
 def loop_entries(spec: LoopSpec) -> dict[str, Any]:
@@ -194,10 +146,6 @@ def _gain_entries(spec: LoopSpec) -> dict[str, Any]:
         }
         for term in GAINS
     }
-    amperes = {
-        "per_lsb": float(spec.units.amperes),
-        "unit": "A",
-        "most": form.current_limit,
-        "option": form.current_limit,
-    }
+    limit = form.current_limit
+    amperes = {"per_lsb": float(spec.units.amperes), "unit": "A", "most": limit, "option": limit}
     return {"gains": found | {"current_limit": amperes}}

@@ -38,11 +38,10 @@ def check(spec: TachometerSpec) -> None:
     _check_index_state(spec)
     _check_place(spec)
     if spec.health and spec.encoder.sensor != "quadrature":
-        raise ParameterError(
-            "health", f"must be left out for {spec.encoder.sensor}: it watches two lines in quadrature"
-        )
-    clocks = spec.health and spec.health.complements
-    if clocks and not COMPLEMENTS[0] <= clocks <= COMPLEMENTS[1]:
+        rest = f"must be left out for {spec.encoder.sensor}: it watches two lines in quadrature"
+        raise ParameterError("health", rest)
+    clocks = spec.health.complements if spec.health else None
+    if clocks is not None and not COMPLEMENTS[0] <= clocks <= COMPLEMENTS[1]:
         times = (format_time(Fraction(one) / spec.timing.clock_hz) for one in (*COMPLEMENTS, clocks))
         raise ParameterError("complements", "must be from {} to {} at this clock, not {}".format(*times))
     edges_of(spec.probe)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+from tachometry.spec.core.follows import Follows
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 from tachometry.spec.core.scale import Scale
 from tachometry.spec.core.tachometer import TachometerSpec
@@ -76,14 +77,7 @@ def nearest_ticks(spec: STachometer | TrackTachometer, axes: int) -> list[int]:
     return [one for one in found if one is not None]
 
 
-class _OfAxes:
-    """Answers one question about a core of many axes, as `Follows` does of one axis."""
-
-    def __init__(self, spec: AxesSpec) -> None:
-        self.spec = spec
-
-
-class AxesLatency(_OfAxes):
+class AxesLatency(Follows["AxesSpec"]):
     """Counts the clocks from a pin of an axis to what is shown of it."""
 
     @property
@@ -132,7 +126,7 @@ class AxesLatency(_OfAxes):
         return self.count + 1 + self.spec.parallel
 
 
-class AxesRecovery(_OfAxes):
+class AxesRecovery(Follows["AxesSpec"]):
     """Says how long a core of many axes takes until all is right again after an upset; see `Recovery`."""
 
     @property
@@ -149,7 +143,7 @@ class AxesRecovery(_OfAxes):
         return own * slots + (1 << (slots - 1).bit_length()) + 2 * self.spec.axis.times.longest_tick * slots
 
 
-class AxesWords(_OfAxes):
+class AxesWords(Follows["AxesSpec"]):
     """Says of a core of many axes what commands show."""
 
     @property

@@ -14,18 +14,7 @@ _PAGE = 4096  # bytes, the least that can be mapped
 
 
 def linux(spec: AnySpec, name: str, bus: Bus, made: Mapping[str, str]) -> dict[str, str]:
-    """Return texts by file name, those of `FILES`.
-
-    Parameters
-    ----------
-    spec : TachometerSpec, AxesSpec or LoopSpec
-    name : str
-        Of the Verilog module.
-    bus : Bus
-        One of `BUSES`.
-    made : mapping of str to str
-        The core and what lies beside it; the program in C needs its driver.
-    """
+    """Return texts by file name, those of `FILES`, as `Target.files` says; the program in C needs the core's driver."""
     registers = registers_on(spec, bus)
     values = captured_values(registers)
     speeds, positions = (

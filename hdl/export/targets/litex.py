@@ -10,16 +10,5 @@ FILES = ("NAME_litex.py",)
 
 
 def litex(spec: AnySpec, name: str, bus: Bus, made: Mapping[str, str]) -> dict[str, str]:
-    """Return the text of `NAME_litex.py` by its name.
-
-    Parameters
-    ----------
-    spec : TachometerSpec or AxesSpec
-    name : str
-        Of the Verilog module.
-    bus : Bus
-        Wishbone.
-    made : mapping of str to str
-        The core, which the module reads from the file beside it.
-    """
+    """Return the text of `NAME_litex.py`, which reads the core from the file beside it, as `Target.files` says."""
     return render_files(FILES, name, spec=spec.tachometer, registers=registers_on(spec, bus))

@@ -37,15 +37,7 @@ class HalPin:
 
 
 def rio(spec: TachometerSpec, name: str, bus: Bus | None, made: Mapping[str, str]) -> dict[str, str]:
-    """Return the plugin, the Verilog between RIO and the core, and the core, as texts by file name.
-
-    Parameters
-    ----------
-    name : str
-        Of the module of the core.
-    bus : None
-    made : mapping of str to str
-        The core, and what lies beside it.
+    """Return the plugin, the Verilog between RIO and the core, and the core, as `Target.files` says.
 
     Raises
     ------

@@ -41,18 +41,7 @@ BUSES = (*_INTERFACES, "none")
 
 
 def vivado(spec: AnySpec, name: str, bus: Bus | None, made: Mapping[str, str]) -> dict[str, str]:
-    """Return texts by file name: an IP in the folder `NAME_ip`, with copies of the core and its constraints.
-
-    Parameters
-    ----------
-    spec : TachometerSpec, AxesSpec or LoopSpec
-    name : str
-        Of the Verilog module, which the module of the IP, `NAME_ip`, contains.
-    bus : Bus or None
-        One of `BUSES`.
-    made : mapping of str to str
-        The core and what lies beside it.
-    """
+    """Return an IP in the folder `NAME_ip`, whose module contains the core, with copies, as `Target.files` says."""
     ports = ports_on(spec, bus)
     there = _INTERFACES[bus.name] if bus else None
     outer = {port.name: port.name for port in ports}

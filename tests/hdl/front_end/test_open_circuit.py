@@ -100,6 +100,7 @@ def test_mutants_are_noticed(box: type, right: str, wrong: str) -> None:
     ("texts", "message"),
     [
         ({"complements": "1"}, "complements must be from 2us to 1.048576s at this clock, not 1us"),
+        ({"complements": "0"}, "complements must be from 2us to 1.048576s at this clock, not 0s"),
         ({"complements": "soon"}, "complements must be"),
     ],
 )
