@@ -1,7 +1,7 @@
 """Single flip-flop upsets of every method, and how long they are seen: `make upset`.
 
 Names of methods as arguments choose those, `axes` a core of many, and `loop` those with a control loop; `--upsets N`
-says how many of each; of `track` a twentieth, as each of them plays 1300 counts.
+says how many of each; of `track` a fortieth, as each of them plays 1300 counts.
 """
 
 import sys
@@ -17,7 +17,7 @@ from support.report import Table, arguments, chosen
 
 SUBJECTS: dict[str, Callable[[int], Campaign]] = {
     **{name: partial(upsets, name) for name in (*UPSET, OUTPUTS)},
-    "track": lambda n: tracking.upsets(max(n // 20, 1)),
+    "track": lambda n: tracking.upsets(max(n // 40, 1)),
     "axes": axes.upsets,
     **{name: partial(loops.upsets, name) for name in loops.LOOPS},
 }
