@@ -1,21 +1,11 @@
 """The small unit of the tracking machine: one register that is added to, and goes to the right."""
 
 from amaranth import Array, C, Cat, Module, Mux, Signal, Value, signed
-from amaranth.lib.enum import Enum
 
 from tachometry.hdl.methods.track_unit import Unit
 from tachometry.spec.formats.tracking import CHANCE_BITS, LOG_BITS, RESULT_BITS, WIDTH
 from tachometry.spec.formats.tracking_code import BY_FACTOR
 from tachometry.spec.formats.tracking_units import Small, Start
-
-
-class State(Enum):
-    """Lists what the small unit does."""
-
-    RESTS = 0
-    READS = 1  # the table
-    ADDS = 2
-    SHIFTS = 3
 
 
 class SmallUnit(Unit):
@@ -33,7 +23,7 @@ class SmallUnit(Unit):
         bits, doing, table = self._bits, self.doing, self.table.data
         small = Small(self._program.form)
         low, width, end = small.low, small.low + WIDTH, small.log_end
-        state = Signal(State)
+        reads, adds, shifts = (Signal(name=name) for name in ("reads", "adds", "shifts"))  # else it rests
         work = Signal(signed(width), reset_less=True)
         operand = Signal(signed(WIDTH), reset_less=True)
         steps = Signal(range(small.digits + 1), reset_less=True)
@@ -43,7 +33,7 @@ class SmallUnit(Unit):
         is_log, is_factor, is_product, is_power, is_read, doubled, extreme = flags
         seeks = is_log | is_factor
         begins = (doing != Start.NONE) & (doing != Start.CHANCE)
-        rests, reads, adds, shifts = (state == State(number) for number in range(4))
+        rests = ~(reads | adds | shifts)
         # What is added next: a digit of the factor, which turns meanwhile, or all at once.
         before = Signal()
         owed = Signal()
@@ -184,11 +174,8 @@ class SmallUnit(Unit):
                 )
             ),
         ]
-        with m.If(begins):
-            m.d.sync += state.eq(State.READS)
-        with m.Elif(reads):
-            m.d.sync += state.eq(State.ADDS)
-        with m.Elif(adds & ~multiplies):
-            m.d.sync += state.eq(State.SHIFTS)
-        with m.Elif(ends):
-            m.d.sync += state.eq(Mux(is_log, State.READS, State.RESTS))
+        m.d.sync += [
+            reads.eq(begins | (ends & is_log)),
+            adds.eq(reads | (adds & multiplies)),
+            shifts.eq((adds & ~multiplies) | (shifts & ~ends)),
+        ]
