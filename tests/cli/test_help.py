@@ -30,19 +30,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize("flag", ["--help", "-h"])
 def test_commands_are_listed(flag: str, capsys: pytest.CaptureFixture[str]) -> None:
     text = shown(capsys, flag)
-    for command in (
-        "plan",
-        "generate",
-        "simulate",
-        "replay",
-        "compare",
-        "sweep",
-        "loop",
-        "figures",
-        "build",
-        "program",
-        "monitor",
-    ):
+    for command in "plan generate simulate replay compare sweep loop figures build program monitor".split():
         assert f"\n  {command} " in text
     assert max(map(len, text.splitlines())) <= 80
 

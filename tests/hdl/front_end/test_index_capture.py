@@ -18,10 +18,7 @@ Z = np.array([0, 0, 0, 0, 1, 1, 0, 0, 0, 0], dtype=np.uint8)
 
 def make_spec(*, reset: bool = False, filter_clocks: int = 0) -> STachometer:
     return STachometer(
-        encoder=Encoder(25),
-        timing=Timing(1_000_000, 4, 4),
-        index=Index(reset, "edge"),
-        filter_clocks=filter_clocks,
+        encoder=Encoder(25), timing=Timing(1_000_000, 4, 4), index=Index(reset, "edge"), filter_clocks=filter_clocks
     )
 
 

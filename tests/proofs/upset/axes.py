@@ -17,10 +17,7 @@ from tachometry.spec.core.index import Index
 _CYCLES = 15  # of a motion
 _OF_POSITION = ("position", "index_position")  # and what is held of an axis
 
-SPEC = AxesSpec(
-    tachometer=STachometer(encoder=Encoder(500), timing=Timing(5_000_000, 120, 20), index=Index()),
-    axes=3,
-)
+SPEC = AxesSpec(tachometer=STachometer(encoder=Encoder(500), timing=Timing(5_000_000, 120, 20), index=Index()), axes=3)
 
 
 def _trace(spec: AxesSpec, seed: int) -> AxesTrace:

@@ -9,18 +9,7 @@ import numpy as np
 import pytest
 import usable_gain
 from support.nightly import nightly
-from usable_gain import (
-    GAINS,
-    IDEAL,
-    KINDS,
-    MOTOR,
-    REAL,
-    core,
-    is_usable,
-    setting,
-    usable,
-    variants,
-)
+from usable_gain import GAINS, IDEAL, KINDS, MOTOR, REAL, core, is_usable, setting, usable, variants
 
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.engines.loop import Log, LoopSimulation, Observer
