@@ -89,16 +89,17 @@ def component(plugin: Any) -> str:
         bodies.append(f"static void convert_{variable}(data_t *data) {{\n" + "\n".join(body))
         bodies[-1] += f"\n*data->{variable} = value;\n}}\n"
         calls.append(f"convert_{variable}(data);")
-    position = pins["position"]["varname"]
-    enable = pins.get("index-enable", {}).get("varname")
+    positions = [pin["varname"] for name, pin in pins.items() if name.startswith("position")]
+    enables = [pin["varname"] for name, pin in pins.items() if name.startswith("index-enable")]
     read = [f'if (scanf("%lf", &number) != 1) return 1;\ndata->{one["variable"]} = number;' for one in sent.values()]
     show = [f'printf("%.17g ", (double)*data->{pin["varname"]});' for pin in pins.values()]
     lines = [
         *("#include <math.h>", "#include <stdbool.h>", "#include <stdint.h>", "#include <stdio.h>"),
         *("typedef struct {", *fields, "} data_t;", *bodies, "int main(void) {", "data_t all, *data = &all;", *begin),
-        f'if (scanf("%lf %lf", data->{position}_SCALE, data->{position}_OFFSET) != 2) return 1;',
+        'double scale, offset; if (scanf("%lf %lf", &scale, &offset) != 2) return 1;',
+        *(f"*data->{one}_SCALE = scale; *data->{one}_OFFSET = offset;" for one in positions),
         *("double number;", 'while (scanf("%lf", &number) == 1) {'),
-        *([f"if (number != 0) *data->{enable} = 1;"] if enable else []),
+        *(f"if (number != 0) *data->{enable} = 1;" for enable in enables),
         *(*read, *calls, *show, 'printf("\\n");', "}", "return 0;", "}"),
     ]
     return "\n".join(lines) + "\n"

@@ -9,7 +9,7 @@ from tachometry.hdl.export.targets.litex import FILES as LITEX
 from tachometry.hdl.export.targets.litex import litex
 from tachometry.hdl.export.targets.rio import FILES as RIO
 from tachometry.hdl.export.targets.rio import rio
-from tachometry.spec.control import AnySpec
+from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.registers.buses import Bus
 
@@ -23,13 +23,11 @@ class Target:
     names: tuple[str, ...]  # the files, in which NAME stands for that of the module
     # texts by file name, of the spec, the name and the bus of the core, and of its files without a target
     files: Callable[[Any, str, Any, Mapping[str, str]], dict[str, str]]
-    # axes and loops: cores of many axes, and with a control loop, can go into it
-    axes: bool = True
-    loops: bool = False
+    loops: bool = False  # cores with a control loop can go into it
 
 
 TARGETS = {
-    "rio": Target("plugin for RIO, with pins for LinuxCNC, in DIR/NAME_rio", ("none",), RIO, rio, axes=False),
+    "rio": Target("plugin for RIO, with pins for LinuxCNC, in DIR/NAME_rio", ("none",), RIO, rio),
     "litex": Target("module for LiteX in DIR/NAME_litex.py, with --bus wishbone", ("wishbone",), LITEX, litex),
     "vivado": Target(
         "IP for Vivado (IP-XACT) in DIR/NAME_ip, with --bus axi-lite, apb or none",
@@ -64,12 +62,8 @@ def bus_for(target: str, bus: str | None) -> str:
 
 def check_core(target: str, spec: AnySpec) -> None:
     """Refuse a core that is not for this target, with a ParameterError."""
-    if target not in TARGETS or spec is spec.tachometer:
-        return
-    if spec.axes is None and not TARGETS[target].loops:
+    if isinstance(spec, LoopSpec) and target in TARGETS and not TARGETS[target].loops:
         raise ParameterError("target", f"must not be {target} with a loop: it is for a tachometer alone")
-    if spec.axes is not None and not TARGETS[target].axes:
-        raise ParameterError("target", f"must be another than {target} with axes: its plugin is for one encoder each")
 
 
 def targets_for(name: str, bus: str) -> dict[str, list[str]]:
