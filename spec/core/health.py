@@ -40,10 +40,7 @@ OPEN = {"a": Fault.A_OPEN, "b": Fault.B_OPEN, "z": Fault.Z_OPEN}  # of lines tha
 class Health:
     """Says when a core that watches its encoder finds a fault of it.
 
-    Raises
-    ------
-    ParameterError
-        If a number is out of range.
+    It raises ParameterError if a number is out of range.
     """
 
     edges: int = option(

@@ -16,10 +16,7 @@ _EDGES = {"rising": RISING, "falling": FALLING, "both": RISING | FALLING}
 def parse_probes(what: str, text: str) -> str:
     """Return the edges of each probe, with commas between, of these or of a number of probes that latch rises.
 
-    Raises
-    ------
-    ParameterError
-        If it is neither, or there are none or too many.
+    It raises ParameterError if it is neither, or there are none or too many.
     """
     word = text.strip().lower()
     few = word.isascii() and word.isdecimal() and len(word) < 3

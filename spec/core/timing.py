@@ -141,11 +141,8 @@ class Timing:
         """Return timing from texts (`48MHz`, `20us`, `10ms`, `960clk`) or whole numbers (Hz, clocks, clocks); None is
         the default.
 
-        Raises
-        ------
-        ParameterError
-            Also if the tick is not a whole number of clocks, or the maximum time not of ticks: the message names the
-            two nearest that are.
+        It raises ParameterError also if the tick is not a whole number of clocks, or the maximum time not of ticks: the
+        message names the two nearest that are.
         """
         times = {"tick": tick, "max-time": max_time}
         given = {name: f"{value}clk" if isinstance(value, int) else value for name, value in times.items()}

@@ -187,11 +187,6 @@ def ratio(unit: str, other: str) -> Fraction | None:
     return None
 
 
-def parse_time(what: str, text: str) -> Fraction:
-    """Return seconds in a text such as `20us`; `what` names the quantity in the message of the ValueError."""
-    return read_exactly(what, text, TIME)
-
-
 class _Frequency:
     """Reads hertz in a text such as `48MHz`, a whole number; a plain number is hertz, if it can be nothing else.
 
@@ -211,10 +206,8 @@ class _Frequency:
 
 
 parse_frequency = _Frequency()
-
-
-# Reads rad/s in a text such as `200rad/s` or `30Hz`.
-parse_bandwidth = Quantity(BANDWIDTH)
+# They read seconds in a text such as `20us`, and rad/s in one such as `200rad/s` or `30Hz`.
+parse_time, parse_bandwidth = Quantity(TIME), Quantity(BANDWIDTH)
 
 
 def format_time(seconds: Fraction) -> str:

@@ -304,27 +304,12 @@ class RairanTachometer(TachometerSpec):
 
     @property
     def method_ports(self) -> tuple[Port, ...]:
-        return (
-            held(
-                *(UPDATE, "n_ep1", self.widths.max_pulse_count.bit_length()),
-                unit="counts",
-                help="Nep1 of the velocity: counts in a sampling period dt. With --paper-exact: the register Nep1 of "
-                "Table 1 as it is, whichever of Nep1 and Ndt1 the velocity comes from.",
-            ),
-            held(
-                *(UPDATE, "n_dt1", self.widths.interval),
-                unit="dt",
-                help="Ndt1 of the velocity: sampling periods dt from one count to the next. With --paper-exact: the "
-                "register Ndt1 of Table 1 as it is.",
-            ),
-            *(
-                [
-                    held(
-                        *(UPDATE, "dt_shift", self.times.max_tick_shift.bit_length()),
-                        help="k: dt of this measurement is 2^k times the nominal one.",
-                    )
-                ]
-                if self.adaptive
-                else []
-            ),
-        )
+        text = "Nep1 of the velocity: counts in a sampling period dt. With --paper-exact: the register Nep1 of Table 1 "
+        text += "as it is, whichever of Nep1 and Ndt1 the velocity comes from."
+        n_ep1 = held(UPDATE, "n_ep1", self.widths.max_pulse_count.bit_length(), unit="counts", help=text)
+        text = "Ndt1 of the velocity: sampling periods dt from one count to the next. With --paper-exact: the register "
+        n_dt1 = held(UPDATE, "n_dt1", self.widths.interval, unit="dt", help=text + "Ndt1 of Table 1 as it is.")
+        if not self.adaptive:
+            return n_ep1, n_dt1
+        text = "k: dt of this measurement is 2^k times the nominal one."
+        return n_ep1, n_dt1, held(UPDATE, "dt_shift", self.times.max_tick_shift.bit_length(), help=text)

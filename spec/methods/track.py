@@ -190,10 +190,7 @@ class TrackTachometer(TachometerSpec):
     The memory over which it fits a parabola through the counts grows while they come where they are expected, and falls
     when they do not. The velocity is new in every tick; docs/concepts/track.md has the rules.
 
-    Raises
-    ------
-    ParameterError
-        If a parameter is out of range.
+    It raises ParameterError if a parameter is out of range.
     """
 
     timing: Timing = Timing.parse(max_time=_MAX_TIME)  # noqa: RUF009
@@ -281,25 +278,16 @@ class TrackTachometer(TachometerSpec):
 
     @property
     def method_ports(self) -> tuple[Port, ...]:
-        return (
-            held(
-                *(UPDATE, "acceleration", self.scale.acceleration.width),
-                signed=True,
-                unit=f"2^{-self.scale.acceleration.frac_bits} {self.scale.acceleration.unit}",
-                help="Acceleration; multiplied by rad_per_s2_per_lsb of the manifest it is in rad/s².",
-            ),
-            held(
-                *(UPDATE, "position_fine", self.position_width + self.fine_bits),
-                signed=True,
-                unit=f"2^{-self.fine_bits} counts",
-                help="Position at the end of this period, between the counts as well; it wraps as position does.",
-            ),
-            held(
-                *(UPDATE, "quality", self.form.quality_bits),
-                unit=f"2^{-self.widths.frac_bits} {self.unit}",
-                help="Standard deviation that the velocity is expected to have, by the noise that was seen.",
-            ),
-        )
+        shown = self.scale.acceleration
+        unit = f"2^{-shown.frac_bits} {shown.unit}"
+        text = "Acceleration; multiplied by rad_per_s2_per_lsb of the manifest it is in rad/s²."
+        acceleration = held(UPDATE, "acceleration", shown.width, signed=True, unit=unit, help=text)
+        width, unit = self.position_width + self.fine_bits, f"2^{-self.fine_bits} counts"
+        text = "Position at the end of this period, between the counts as well; it wraps as position does."
+        position = held(UPDATE, "position_fine", width, signed=True, unit=unit, help=text)
+        unit = f"2^{-self.widths.frac_bits} {self.unit}"
+        text = "Standard deviation that the velocity is expected to have, by the noise that was seen."
+        return acceleration, position, held(UPDATE, "quality", self.form.quality_bits, unit=unit, help=text)
 
 
 def in_loop(spec: TachometerSpec, velocity_gain: Fraction) -> TachometerSpec:

@@ -17,10 +17,7 @@ _WHOSE = ("axis", "index_axis")  # what is held says it by its name
 class AxesMap(RegisterMap):
     """Holds all registers of a core of many axes: those of axis 0, of axis 1 …, in windows of one size.
 
-    Raises
-    ------
-    ParameterError
-        If the core does not hold the values of every axis.
+    It raises ParameterError if the core does not hold the values of every axis.
     """
 
     axes: AxesSpec

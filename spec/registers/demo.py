@@ -117,10 +117,7 @@ class DemoMap(RegisterMap):
 class DemoLoopMap(LoopMap, DemoMap):
     """Holds all registers of a demo of a core with a control loop: first those of the loop, then those of the demo.
 
-    Raises
-    ------
-    ParameterError
-        If the gains of the loop are fixed.
+    It raises ParameterError if the gains of the loop are fixed.
     """
 
     def _added(self) -> Iterable[Draft]:

@@ -25,10 +25,7 @@ class LoopMap(RegisterMap):
     What is written is taken with all else in the clock before a control tick, unless LOOP.freeze is set. A value that
     does not fit is held at the nearest that does, but a position wraps.
 
-    Raises
-    ------
-    ParameterError
-        If the gains of the loop are fixed.
+    It raises ParameterError if the gains of the loop are fixed.
     """
 
     loop: LoopSpec

@@ -42,11 +42,8 @@ class HalPin:
 def rio(spec: CoreSpec, name: str, bus: Bus | None, made: Mapping[str, str]) -> dict[str, str]:
     """Return the plugin, the Verilog between RIO and the core, and the core, as `Target.files` says.
 
-    Raises
-    ------
-    ParameterError
-        If a number of the core is wider than RIO's, the index sets the position of the core to 0, or the core does not
-        hold the values of each of its axes.
+    It raises ParameterError if a number of the core is wider than RIO's, the index sets the position of the core to 0,
+    or the core does not hold the values of each of its axes.
     """
     alone, values = spec.tachometer, _values(spec)
     _check(spec, values)
