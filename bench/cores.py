@@ -294,7 +294,7 @@ CONFIGURATIONS = (
         "track-block",
         "tracking, 1000 rad/s, multiplier of the FPGA",
         TrackTachometer(**COMMON, max_speed=MAX_SPEED, multiplier="block"),
-        {"ECP5": {"COMB": 1350, "FF": 900, "MULT": 2, "Fmax": 60}, "UP5K": {"Fmax": 24}},
+        {"ECP5": {"COMB": 1320, "FF": 900, "MULT": 2, "Fmax": 70}, "UP5K": {"Fmax": 24}},
         is_option=False,
         targets=("ECP5", "UP5K"),
     ),

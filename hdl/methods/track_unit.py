@@ -119,7 +119,11 @@ class Unit(wiring.Component):
 
 
 class QuickUnit(Unit):
-    """A multiplier for half a word, and a barrel shifter in two stages; `tracking_units.QUICK` has their times."""
+    """A multiplier for half a word, and a barrel shifter in two stages; `tracking_units.QUICK` has their times.
+
+    A factor may begin while another operation is under way, but not two clocks after a product or a power, which is
+    shifted when it would be. It is used two clocks after its begin, or later. The program sees to both.
+    """
 
     def _work(self, m: Module) -> None:
         bits, doing, how = self._bits, self.doing, self.how_done

@@ -45,7 +45,6 @@ OUTPUTS = ("", "velocity", "position_fine", "quality", "acceleration")
 ADDRESS_BITS = 7
 FIRST_CHOSEN = (1 << ADDRESS_BITS) - 8  # address of what the tick chooses
 FIRST_INPUT = FIRST_CHOSEN - 8  # of inputs: the words there are 0
-_TERM = ("left", "first", "word", "subtract", "by_sign")  # what an instruction adds
 _LEFTS = {"lo+": Left.LEAST, "hi+": Left.MOST}
 
 
@@ -130,8 +129,8 @@ def _paired(chain: list[Instruction]) -> list[Instruction]:
         for plain, right in ((one, other), (other, one)):
             first = plain.first or plain.word
             if not (first in ("", "~", *CHOSEN) or plain.subtract or plain.by_sign or right.first):
-                both = replace(right, left=Left.ZERO, first=first)
-                return [replace(other, **{name: getattr(both, name) for name in _TERM}), *chain[2:]]
+                both = replace(other, first=first, word=right.word, subtract=right.subtract, by_sign=right.by_sign)
+                return [replace(both, left=Left.ZERO), *chain[2:]]
     return chain
 
 
