@@ -219,8 +219,8 @@ short:
     if one goto offsets
 ready:                                  # growth of the memory and noise, for the next event
     D log
-    Ds = D
-    fifth = zero
+    minus_Ds = zero - D
+    t = sum
     growth = zero
     growing = log_T
     limit = order + ~ + ~
@@ -231,13 +231,13 @@ ready:                                  # growth of the memory and noise, for th
     D over 1
     log_X + log_256
     if pos goto scaled
+    minus_Ds = minus_Ds - ~
     trouble = trouble - log_9_4
-    Ds = D + ~
-    fifth = sum                         # D_s, as the memory is long
+    t = minus_Ds + minus_Ds             # five D_s, as the memory is long
 scaled:
     doubt = trouble + log_4 hi+ limit - order
-    minus_D3 = zero - Ds - Ds - Ds
-    minus_D4 = sum - Ds - fifth
+    minus_D3 = minus_Ds + minus_Ds + minus_Ds
+    minus_D4 = sum + t
     trouble
     if neg goto kept
     growth = zero - count               # that outweighs any logarithm
@@ -361,7 +361,7 @@ below:
     zero - P - o@down
 beyond:
     max zero
-    t = sum - half + minus_D3 - Ds - Ds
+    t = sum - half + minus_D3 + minus_Ds + minus_Ds
     if neg goto still
     quiet + lead log
     P = P s- t
