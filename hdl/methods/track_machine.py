@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from functools import reduce
-from operator import and_, or_
+from operator import and_
 
 from amaranth import Array, C, Cat, Module, Mux, Shape, Signal, Value, signed
 from amaranth.lib import data, wiring
@@ -155,7 +155,6 @@ class TrackMachine(wiring.Component):
         )
         fetch = rom.read_port()
         read = words.read_port()
-        others = [words.read_port() for _ in range(program.times.ports - 1)]
         write = words.write_port()
         # Fetch, read, execute.
         reset, tick = (at[program.code.labels[name]] for name in ("reset", "tick"))
@@ -184,8 +183,12 @@ class TrackMachine(wiring.Component):
             read.en.eq(~hold),
             go.eq(active & ~hold),
         ]
-        for other in others:
-            m.d.comb += [other.addr.eq(self._at(coming.first)), other.en.eq(~hold)]
+        added = C(0, signed(WIDTH))
+        two = program.times.ports > 1
+        if two:
+            second = words.read_port()
+            m.d.comb += [second.addr.eq(self._at(coming.first)), second.en.eq(~hold)]
+            added = second.data
         for _ in range(program.times.stages - 1):
             following = Signal(layout, reset_less=True)
             follows = Signal()
@@ -219,12 +222,12 @@ class TrackMachine(wiring.Component):
         given = Signal(signed(WIDTH), reset_less=True)
         with m.If(~hold):
             m.d.sync += [from_unit.eq(coming.from_unit), given.eq(0)]
-            term = coming.first if others else coming.word
+            term = coming.first if two else coming.word
             with m.If(term[3:] == FIRST_INPUT >> 3):
                 m.d.sync += given.eq(self._inputs()[term[:3]])
         flipped = (right ^ minus.replicate(WIDTH))[:WIDTH]
         m.d.comb += [
-            left.eq(reduce(or_, [Mux(used, sum_, 0), given, *(other.data for other in others)])),
+            left.eq(Mux(used, sum_, 0) | given | added),
             right.eq(word | Mux(from_unit, unit.result, 0)),
             minus.eq(now.subtract ^ (now.by_sign & sign)),
             carry.eq(minus ^ (from_unit & unit.up)),
