@@ -265,7 +265,7 @@ def test_ctrl_c_in_the_simulation(
     ("engine", "end"),
     # One engine and one signal show what is kept; how each engine ends is in tests/sim/engines.
     only_rows(
-        [("pysim", signal.SIGHUP)],
+        [("cxxrtl", signal.SIGHUP)],
         [(e, s) for e in ("pysim", "cxxrtl") for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)],
     ),
 )
