@@ -285,7 +285,8 @@ def test_ctrl_c_from_a_terminal_keeps_what_was_simulated(engine: str, end: signa
     process.send_signal(end)
     out, err = process.communicate(timeout=600)
     assert process.returncode == 130, err
-    told = re.fullmatch(r"tachometry: interrupted after (\d+) of 20000000 clocks\n", err)
+    # A loaded machine tells what it does after ten seconds, too.
+    told = re.search(r"^tachometry: interrupted after (\d+) of 20000000 clocks\n\Z", err, re.MULTILINE)
     assert told is not None, err
     assert summary(out)["simulated"].startswith(f"{told[1]} clocks")
     assert "PASS" in out
