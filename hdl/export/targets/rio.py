@@ -40,13 +40,8 @@ class HalPin:
 
 
 def rio(spec: CoreSpec, name: str, bus: Bus | None, made: Mapping[str, str]) -> dict[str, str]:
-    """Return the plugin, the Verilog between RIO and the core, and the core, as `Target.files` says.
-
-    It raises ParameterError if a number of the core is wider than RIO's, the index sets the position of the core to 0,
-    or the core does not hold the values of each of its axes.
-    """
+    """Return the plugin, the Verilog between RIO and the core, and the core, as `Target.files` says."""
     alone, values = spec.tachometer, _values(spec)
-    _check(spec, values)
     counted = _counted(spec)
     sent = {_sent_as(port): WORD if port.width > 1 else 1 for port in values}
     files = render_files(
@@ -68,7 +63,8 @@ def rio(spec: CoreSpec, name: str, bus: Bus | None, made: Mapping[str, str]) -> 
     return files | {f"{name}_rio/{name}.v": made[f"{name}.v"]}
 
 
-def _check(spec: CoreSpec, values: Iterable[Port]) -> None:
+def check(spec: CoreSpec) -> None:
+    """Raise ParameterError for a core with more than RIO has, or without what its pins need."""
     alone = spec.tachometer
     if isinstance(spec, AxesSpec) and not spec.parallel:
         raise ParameterError("parallel", "must be given together with --axes for RIO: HAL has pins for each axis")
@@ -78,7 +74,7 @@ def _check(spec: CoreSpec, values: Iterable[Port]) -> None:
         raise ParameterError("stream", "must not be given for RIO, which has no DMA for it")
     if alone.front_end.index_resets:
         raise ParameterError("index_reset", "must not be given for RIO: its pin index-enable resets the position")
-    for port in values:
+    for port in _values(spec):
         if port.width > WORD:
             option = "position_width" if port.unit == "counts" else "velocity_width"
             most = f"must be at most {WORD} for RIO, whose numbers have no more"

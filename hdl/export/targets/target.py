@@ -8,7 +8,7 @@ from tachometry.hdl.export.targets import linux, vivado
 from tachometry.hdl.export.targets.litex import FILES as LITEX
 from tachometry.hdl.export.targets.litex import litex
 from tachometry.hdl.export.targets.rio import FILES as RIO
-from tachometry.hdl.export.targets.rio import rio
+from tachometry.hdl.export.targets.rio import check, rio
 from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.registers.buses import Bus
@@ -24,10 +24,11 @@ class Target:
     # texts by file name, of the spec, the name and the bus of the core, and of its files without a target
     files: Callable[[Any, str, Any, Mapping[str, str]], dict[str, str]]
     loops: bool = False  # cores with a control loop can go into it
+    check: Callable[[Any], None] | None = None  # raises ParameterError for a core that cannot
 
 
 TARGETS = {
-    "rio": Target("plugin for RIO, with pins for LinuxCNC, in DIR/NAME_rio", ("none",), RIO, rio),
+    "rio": Target("plugin for RIO, with pins for LinuxCNC, in DIR/NAME_rio", ("none",), RIO, rio, check=check),
     "litex": Target("module for LiteX in DIR/NAME_litex.py, with --bus wishbone", ("wishbone",), LITEX, litex),
     "vivado": Target(
         "IP for Vivado (IP-XACT) in DIR/NAME_ip, with --bus axi-lite, apb or none",
@@ -62,8 +63,12 @@ def bus_for(target: str, bus: str | None) -> str:
 
 def check_core(target: str, spec: AnySpec) -> None:
     """Refuse a core that is not for this target, with a ParameterError."""
-    if isinstance(spec, LoopSpec) and target in TARGETS and not TARGETS[target].loops:
+    if (about := TARGETS.get(target)) is None:
+        return
+    if isinstance(spec, LoopSpec) and not about.loops:
         raise ParameterError("target", f"must not be {target} with a loop: it is for a tachometer alone")
+    if about.check is not None:
+        about.check(spec)
 
 
 def targets_for(name: str, bus: str) -> dict[str, list[str]]:
