@@ -97,7 +97,7 @@ EVERY_CLOCK_BARS = {
     "HX8K": {"Fmax": 100},
 }
 TRACK_BARS = {
-    "ECP5": {"COMB": 1000, "FF": 920, "MULT": 0, "Fmax": 85},
+    "ECP5": {"COMB": 880, "FF": 920, "MULT": 0, "Fmax": 90},
     "UP5K": {"Fmax": 24},
 }
 # The reference core, and 250 COMB and 100 FF for the bank.

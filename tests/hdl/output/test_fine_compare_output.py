@@ -45,7 +45,7 @@ def check(asked: str) -> None:
     box = fine_compare_output.FineCompareOutput(compare, 3, WIDTH, CARRYING, 8)
     seen = clock_by_clock(box, rows, SEEN)
     sign = -1 if compare.direction == "backward" else 1
-    awaited, apart = compare.start >> 14, sign * compare.step >> 14
+    awaited, apart = compare.in_lsb(compare.start, 2), sign * compare.in_lsb(compare.step, 2)
     place, turn, begun = 0, 0, list[int]()
     armed = of_tick = of_update = moved = False
     wanted = dict.fromkeys(SEEN, 0)
