@@ -1,19 +1,29 @@
 """The tracking method for many axes."""
 
+from collections.abc import Sequence
 from functools import reduce
 from operator import or_
 
-from amaranth import Module, Signal, Value, signed
+from amaranth import C, Cat, Module, Mux, Signal, Value, signed
 from amaranth.lib import data, wiring
+from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.axes.axis_tick_counts import counts_layout
-from tachometry.hdl.axes.track_turns import TrackTurns, tick_layout
+from tachometry.hdl.arithmetic.saturate import saturate
+from tachometry.hdl.axes.axis_tick_counts import BLOCK, counts_layout
+from tachometry.hdl.axes.track_turns import SHOWN_AFTER, TrackTurns, turn_layout
 from tachometry.hdl.output.update import shown_layout, update_layout
 from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput
 from tachometry.hdl.wires.delay import delay
 from tachometry.spec.methods.axes import AxesSpec
+from tachometry.spec.methods.axis import output_cycles
 from tachometry.spec.methods.track_axis import TrackAxis
+
+
+def tick_layout(axis: TrackAxis) -> data.StructLayout:
+    """Return what is new with the tick of an axis."""
+    shapes = {"pulse_count": signed(axis.widths.count), "position": signed(axis.position_width)}
+    return data.StructLayout({**shapes, "overflow": 1, "stalled": 1})
 
 
 class AxesTrackDatapath(wiring.Component):
@@ -81,32 +91,92 @@ class AxesTrackDatapath(wiring.Component):
             m.d.comb += turns.length.eq(length)
             if self._axis.front_end.index_resets:
                 m.d.comb += turns.handed_position.eq(self.handed_position)
-        valid = [turns.valid for turns in self.machines]
-        update = Signal(self.machines[0].update.shape())
-        m.d.comb += update.eq(self._of(valid, "update"))
+        valid, whose, ticks, update = self._shown(m)
         shown: data.View = update
         if self.velocity_output is not None:
             m.submodules.velocity_output = output = self.velocity_output
-            m.d.comb += [output.updates.valid.eq(reduce(or_, valid)), output.updates.p.eq(update)]
-            output_clocks = self._spec.plan.latency - self.machines[0].latency
-            valid, shown = list(delay(m, *valid, clocks=output_clocks)), output.shown.p
-        ticks = Signal(tick_layout(self._axis))
+            m.d.comb += [output.updates.valid.eq(valid), output.updates.p.eq(update)]
+            if len(self.machines) > 1:  # else they hold for long enough
+                whose, ticks = delay(m, whose, ticks, clocks=output_cycles(self._axis))
+            valid, shown = output.shown.valid, output.shown.p
         m.d.comb += [
-            self.tick.eq(reduce(or_, valid)),
-            self.velocity_valid.eq(self.tick),
-            self.axis.eq(self._of(valid, "axis")),
-            ticks.eq(self._of(valid, "ticks")),
-            *(getattr(self, name).eq(ticks[name]) for name in ticks.shape().members),
+            self.tick.eq(valid),
+            self.velocity_valid.eq(valid),
+            self.axis.eq(whose),
+            *(getattr(self, name).eq(ticks[name]) for name in tick_layout(self._axis).members),
             *(getattr(self, name).eq(shown[name]) for name in self._update.members),
         ]
         return m
 
-    def _of(self, valid: list[Signal], name: str) -> Value:
-        """Return what that machine shows whose turn it is; two never do at once."""
+    def _shown(self, m: Module) -> tuple[Signal, Signal, data.View, data.View]:
+        """Return a strobe, whose turn is shown with it, and what is new: it is added up once for all machines.
+
+        The position and the silence of every axis are in a memory.
+        """
+        axis, most = self._axis, self._axis.timing.max_ticks
+        kept = data.StructLayout(
+            {
+                "position": signed(axis.position_width),
+                "elapsed": range(most + 1),
+                "counted": 1,
+                "silent": range(most + 2),
+            }
+        )
+        m.submodules.state = state = Memory(shape=kept, depth=max(self._spec.axes, 2), init=[], attrs=BLOCK)
+        read, write = state.read_port(), state.write_port()
+        before, after = Signal(kept), Signal(kept)
+        # Strobes of every machine in four clocks of its turn; no two machines have the same one at once.
+        comes = [turns.comes for turns in self.machines]
+        reads = delay(m, *comes)
+        adds = delay(m, *reads)
+        shows = delay(m, *adds)
+        m.d.comb += read.addr.eq(self._of(comes, "axis"))
+        (of_axis,) = delay(m, read.addr, clocks=SHOWN_AFTER - 1)
+        layout = turn_layout(axis)
+        known, found = Signal(layout), Signal(layout)
+        m.d.comb += [known.eq(self._of(reads, "turn")), found.eq(self._of(shows, "turn"))]
+        m.d.sync += before.eq(read.data)
+        with m.If(known.first):
+            m.d.sync += [before.position.eq(0), before.elapsed.eq(most), before.counted.eq(0), before.silent.eq(1)]
+        moved, counted = delay(m, known.moved, known.counted)
+        position: Value = before.position + moved
+        if axis.front_end.index_resets:
+            (position,) = delay(m, known.position)
+        pulses, overflow = moved, C(0)
+        if axis.widths.max_count < axis.form.longest_tick:
+            pulses, overflow = saturate(m, moved, axis.widths.max_count)
+        long = before.silent == most + 1
+        m.d.sync += [
+            after.position.eq(position),
+            after.elapsed.eq(Mux(before.counted, 1, before.elapsed + (before.elapsed != most))),
+            after.counted.eq(counted),
+            after.silent.eq(Mux(moved.any(), 0, before.silent + ~long)),
+        ]
+        pulses, overflow = delay(m, pulses, overflow)
+        valid, whose = Signal(), Signal.like(self.axis)
+        ticks, new = Signal(tick_layout(axis)), Signal(update_layout(axis))
+        m.d.comb += [write.addr.eq(of_axis), write.data.eq(after), write.en.eq(reduce(or_, shows))]
+        m.d.sync += valid.eq(write.en)
+        # A bit below the point is 1, to round `place`.
+        rounded = (Cat(C(1, axis.fine_bits + 1), after.position).as_signed() + found.place) >> 1
+        with m.If(write.en):
+            m.d.sync += [
+                whose.eq(of_axis),
+                ticks.position.eq(after.position),
+                ticks.stalled.eq(after.silent == most + 1),
+                ticks.pulse_count.eq(pulses),
+                ticks.overflow.eq(overflow),
+                *(new[name].eq(found[name]) for name in ("velocity", "acceleration", "quality")),
+                new.position_fine.eq(rounded),
+                new.interval.eq(after.elapsed),
+                new.forced.eq(~after.counted),
+            ]
+        return valid, whose, ticks, new
+
+    def _of(self, strobes: Sequence[Signal], name: str) -> Value:
+        """Return what that machine has whose strobe is high; two never are at once."""
         values = [Value.cast(getattr(turns, name)) for turns in self.machines]
-        if len(values) > 1 and self.velocity_output is not None:  # else the others show 0
-            values = [value & is_it.replicate(len(value)) for value, is_it in zip(values, valid, strict=True)]
-        return reduce(or_, values)
+        return reduce(lambda rest, one: Mux(one[0], one[1], rest), zip(strobes[1:], values[1:], strict=True), values[0])
 
     def _length(self, m: Module) -> Signal:
         """Return the rounds of the tick whose counts have been handed over."""
