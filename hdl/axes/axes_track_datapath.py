@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from functools import reduce
 from operator import or_
 
-from amaranth import C, Cat, Module, Mux, Signal, Value, signed
+from amaranth import C, Module, Mux, Signal, Value, signed
 from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
@@ -157,8 +157,7 @@ class AxesTrackDatapath(wiring.Component):
         ticks, new = Signal(tick_layout(axis)), Signal(update_layout(axis))
         m.d.comb += [write.addr.eq(of_axis), write.data.eq(after), write.en.eq(reduce(or_, shows))]
         m.d.sync += valid.eq(write.en)
-        # A bit below the point is 1, to round `place`.
-        rounded = (Cat(C(1, axis.fine_bits + 1), after.position).as_signed() + found.place) >> 1
+        rounded = (after.position << axis.fine_bits) + (found.place >> 1) + found.place[0]
         with m.If(write.en):
             m.d.sync += [
                 whose.eq(of_axis),
