@@ -346,10 +346,11 @@ CONFIGURATIONS = (
                 ),
                 axes=axes,
             ),
+            {"ECP5": {"COMB": most}},
             is_option=False,
             targets=("ECP5",),
         )
-        for axes in (8, 32)
+        for axes, most in ((8, 1500), (32, 2880))
     ),
     *(
         Configuration(
