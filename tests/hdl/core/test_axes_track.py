@@ -25,7 +25,7 @@ def spec_of(axes: int, tick: int, max_ticks: int = 8, *, parallel: bool = False,
 
 def test_gates_and_golden_model_agree() -> None:
     """Of three axes on two machines, one of which has two in turn; a unit, an index that resets, a filter."""
-    spec = spec_of(3, 640, unit="rpm", index=Index(reset=True), filter_clocks=3)
+    spec = spec_of(3, 640, 2, unit="rpm", index=Index(reset=True), filter_clocks=3)
     assert spec.plan.machines == 2
     trace = motions(spec, 12 * 640)
     found = lockstep(spec, trace, PySim())
