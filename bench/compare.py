@@ -58,7 +58,7 @@ LinuxCNC's timestamps of 0.5 µs are the best by far.""",
         "Ramp",
         """Times in clocks of 0.1 µs are better than a lattice of 100 µs. The tracking method does not lag behind a
 ramp: its error is that of holding a value for a tick. Least squares over 16 edges are nearly as good, and M/T (T_c is a
-tick) has six times its error. T and LinuxCNC's timestamps follow. The tracking loops lag by a constant 2 ms. On a
+tick) has five times its error. T and LinuxCNC's timestamps follow. The tracking loops lag by a constant 2 ms. On a
 lattice of ticks S is the best.""",
         "--motion ramp:0:100rad/s:400ms --from 40ms",
     ),
@@ -68,7 +68,7 @@ lattice of ticks S is the best.""",
 M/T while its windows are short. With windows of 1 ms it is as good as LinuxCNC's timestamps. Methods that
 average over more keep their errors and their delays. The memory of the tracking method grows on a ramp
 as it does at constant speed, and it learns where the edges of the disc are. So its error is as small as with an ideal
-encoder, and a fiftieth of theirs.""",
+encoder, and a sixtieth of theirs.""",
         f"--methods {WITH_LONG_MT} "
         "--motion ramp:0:100rad/s:400ms --from 40ms --jitter 0.05 --nonuniformity 0.1 --phase-error 10 --seed 1",
     ),

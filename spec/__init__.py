@@ -16,6 +16,7 @@ from tachometry.spec.language.option import Option, ParameterError, options_of, 
 from tachometry.spec.language.port import Port
 from tachometry.spec.language.units import Speed
 from tachometry.spec.methods.axes import AxesSpec, CoreSpec
+from tachometry.spec.methods.axis import Plan
 from tachometry.spec.methods.m import MTachometer
 from tachometry.spec.methods.mt import MTTachometer
 from tachometry.spec.methods.rairan import RairanTachometer
@@ -117,7 +118,9 @@ def of_texts(
     if not why and asked:
         why = f"it has --{asked[0]}"
     elif not why:
-        why = f"its {spec.latency.busy} clocks fit the tick of {spec.timing.tick_cycles}"
+        plan = None if within is None else _plan_of(within(spec))
+        fits = f"its {spec.latency.busy} clocks fit" if plan is None else f"the turns of {plan.axes} axes fit"
+        why = f"{fits} the tick of {spec.timing.tick_cycles} clocks"
     return replace(spec, chosen=f"as {why}")
 
 
@@ -162,10 +165,14 @@ def _able(given: Mapping[str, str]) -> tuple[list[str], list[str]]:
     return [name for name in _PREFERRED if name in able] or able, asked
 
 
+def _plan_of(core: object) -> Plan | None:
+    return core.plan if isinstance(core, AxesSpec) else None
+
+
 def _check_machines(core: object) -> None:
     """Refuse tracking of many axes with a ParameterError where one machine has no time for all turns of a tick."""
-    if isinstance(core, AxesSpec) and core.plan.machines > 1:
-        machines = core.plan.machines
+    plan = _plan_of(core)
+    if plan is not None and (machines := plan.machines) > 1:
         raise ParameterError(
             "tick_cycles", f"must be so long that one machine is enough, not {machines}", f"needs {machines} machines"
         )

@@ -55,7 +55,8 @@ def rows_of(spec: TrackTachometer, seed: int, n_ticks: int) -> list[tuple[int, .
 @pytest.mark.parametrize("name", CORES)
 def test_machine(name: str) -> None:
     spec = CORES[name]
-    assert check(spec, rows_of(spec, 1, 1000), compiled.clock_by_clock) > 400
+    met = check(spec, rows_of(spec, 1, 1000), compiled.clock_by_clock)
+    assert met > 0.9 * len(spec.program.code.instructions)
 
 
 @pytest.mark.parametrize("name", CORES)

@@ -18,7 +18,7 @@ from support.verilog import play
 
 from tachometry.hdl.core.register_core import RegisterCore
 from tachometry.hdl.export import export
-from tachometry.hdl.export.targets.rio import rio
+from tachometry.hdl.export.targets.rio import check as check_rio
 from tachometry.hdl.output.record_stream import RecordStream
 from tachometry.sim import build, golden
 from tachometry.sim.encoder.stress import stress
@@ -205,4 +205,4 @@ def test_cores_that_send_none_refuse_it() -> None:
     with pytest.raises(ParameterError, match="stream must be left out of a demo"):
         DemoMap(spec)
     with pytest.raises(ParameterError, match="stream must not be given for RIO"):
-        rio(spec, "core", None, {})
+        check_rio(spec)

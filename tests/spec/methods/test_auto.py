@@ -13,9 +13,9 @@ PPR = {"ppr": "500", "max-speed": "400rad/s"}
 # Clocks of its program, serial and with multipliers of the FPGA.
 SERIAL, QUICK = (of_texts("track", PPR | {"multiplier": kind}).latency.busy for kind in ("serial", "block"))
 CHOICES = [
-    ({}, "track", f"as its {SERIAL} clocks fit the tick of 960"),
-    ({"tick": "10us"}, "track", f"as its {QUICK} clocks fit the tick of 480"),
-    ({"tick": "10us", "external-tick": "yes"}, "track", f"as its {QUICK} clocks fit the tick of 480"),
+    ({}, "track", f"as its {SERIAL} clocks fit the tick of 960 clocks"),
+    ({"tick": "10us"}, "track", f"as its {QUICK} clocks fit the tick of 480 clocks"),
+    ({"tick": "10us", "external-tick": "yes"}, "track", f"as its {QUICK} clocks fit the tick of 480 clocks"),
     ({"tick": "5us"}, "mt", f"as track needs a tick of {QUICK} clocks"),
     ({"tick": "250ns"}, "s", f"as track needs a tick of {QUICK} clocks and mt needs a tick of 20 clocks"),
     ({"axes": "4"}, "s", "as track needs 2 machines and mt is of one axis"),
@@ -28,7 +28,7 @@ CHOICES = [
     ({"dt": "20us"}, "rairan", "as it has --dt"),
     ({"average": "8"}, "m", "as it has --average"),
     ({"cancel": "no"}, "s", "as it has --cancel"),
-    ({"unit": "rpm", "lsb": "2^-11"}, "track", f"as its {SERIAL} clocks fit the tick of 960"),
+    ({"unit": "rpm", "lsb": "2^-11"}, "track", f"as its {SERIAL} clocks fit the tick of 960 clocks"),
 ]
 
 
