@@ -123,8 +123,10 @@ class AxesTrackDatapath(wiring.Component):
             }
         )
         m.submodules.state = state = Memory(shape=kept, depth=max(self._spec.axes, 2), init=[], attrs=BLOCK)
-        read, write = state.read_port(), state.write_port()
-        before, after = Signal(kept), Signal(kept)
+        read = state.read_port()
+        write = state.write_port()
+        before = Signal(kept)
+        after = Signal(kept)
         # Strobes of every machine in four clocks of its turn; no two machines have the same one at once.
         comes = [turns.comes for turns in self.machines]
         reads = delay(m, *comes)
@@ -133,7 +135,8 @@ class AxesTrackDatapath(wiring.Component):
         m.d.comb += read.addr.eq(self._of(comes, "axis"))
         (of_axis,) = delay(m, read.addr, clocks=SHOWN_AFTER - 1)
         layout = turn_layout(axis)
-        known, found = Signal(layout), Signal(layout)
+        known = Signal(layout)
+        found = Signal(layout)
         m.d.comb += [known.eq(self._of(reads, "turn")), found.eq(self._of(shows, "turn"))]
         m.d.sync += before.eq(read.data)
         with m.If(known.first):
@@ -153,8 +156,10 @@ class AxesTrackDatapath(wiring.Component):
             after.silent.eq(Mux(moved.any(), 0, before.silent + ~long)),
         ]
         pulses, overflow = delay(m, pulses, overflow)
-        valid, whose = Signal(), Signal.like(self.axis)
-        ticks, new = Signal(tick_layout(axis)), Signal(update_layout(axis))
+        valid = Signal()
+        whose = Signal.like(self.axis)
+        ticks = Signal(tick_layout(axis))
+        new = Signal(update_layout(axis))
         m.d.comb += [write.addr.eq(of_axis), write.data.eq(after), write.en.eq(reduce(or_, shows))]
         m.d.sync += valid.eq(write.en)
         rounded = (after.position << axis.fine_bits) + (found.place >> 1) + found.place[0]
