@@ -71,7 +71,7 @@ known:
     step = zero
     quick t = v + ~ product place
     quick $number by
-    quick V = t + t - v
+    quick V = t - v + t
     small t = v + ~
     small V = sum + ~
     small t product place
