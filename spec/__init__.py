@@ -105,9 +105,10 @@ def of_texts(
     for name in methods:
         try:
             spec = made(name)
+            plan = _plan_of(spec if within is None else within(spec))
             if name != methods[-1]:
                 _check_division(spec)
-                _check_machines(spec if within is None else within(spec))
+                _check_machines(plan)
         except ParameterError as error:
             if name == methods[-1]:
                 raise
@@ -118,7 +119,6 @@ def of_texts(
     if not why and asked:
         why = f"it has --{asked[0]}"
     elif not why:
-        plan = None if within is None else _plan_of(within(spec))
         fits = f"its {spec.latency.busy} clocks fit" if plan is None else f"the turns of {plan.axes} axes fit"
         why = f"{fits} the tick of {spec.timing.tick_cycles} clocks"
     return replace(spec, chosen=f"as {why}")
@@ -169,9 +169,8 @@ def _plan_of(core: object) -> Plan | None:
     return core.plan if isinstance(core, AxesSpec) else None
 
 
-def _check_machines(core: object) -> None:
+def _check_machines(plan: Plan | None) -> None:
     """Refuse tracking of many axes with a ParameterError where one machine has no time for all turns of a tick."""
-    plan = _plan_of(core)
     if plan is not None and (machines := plan.machines) > 1:
         raise ParameterError(
             "tick_cycles", f"must be so long that one machine is enough, not {machines}", f"needs {machines} machines"
