@@ -151,9 +151,7 @@ class SmallUnit(Unit):
             read = Mux(is_log, Cat(table[:LOG_BITS], work[end + 1], pairs[:5]), table)
             m.d.sync += [operand.eq(read << small.table_place), is_log.eq(0)]
         with m.If(ends):
-            m.d.sync += is_read.eq(1)
-        with m.If(ends):
-            m.d.sync += self.up.eq(both[CHANCE_BITS] & ~large)
+            m.d.sync += [is_read.eq(1), self.up.eq(both[CHANCE_BITS] & ~large)]
         with m.If(ends & is_factor):
             m.d.sync += [
                 self.factor.eq(Cat(work[0] & ~work[bits], work[1 : bits + 1])),
