@@ -36,7 +36,7 @@ MOST_NUMBER_BITS = 11  # of the counts of a tick that an event takes
 MOST_MEMORY = 4  # seconds
 MOST_EVENTS_BITS = 12  # memory does not grow beyond 2^12 events
 # The deviation of a slope at the end of N events in the time T, as D·√(1/N)/T: of a line and of a parabola.
-STRAIGHT, CURVE = 3.0, 12.0
+STRAIGHT, CURVE = 2.3, 12.0
 FORGET = Fraction(1, 10)  # seconds of silence after which the state is forgotten, if the maximum time is no longer
 GREATEST_ACCELERATION = 110_000  # rad/s²
 

@@ -235,7 +235,7 @@ ready:                                  # growth of the memory and noise, for th
     trouble = trouble - log_9_4
     t = minus_Ds + minus_Ds             # five D_s, as the memory is long
 scaled:
-    doubt = trouble + log_4 hi+ limit - order
+    doubt = trouble + log_9_4 hi+ limit - order
     minus_D3 = minus_Ds + minus_Ds + minus_Ds
     minus_D4 = sum + t
     trouble

@@ -52,7 +52,7 @@ struct Recursion {
     int64_t shown = product(velocity, k.tick, k.shown);
     row[0] = std::max(-k.most_shown, std::min(shown, k.most_shown));
     row[1] = place;
-    int64_t more = std::max<int64_t>(trouble + k.log_4, 0);
+    int64_t more = std::max<int64_t>(trouble + k.log_9_4, 0);
     int64_t deviation = power(round(more + log_limit - k.order + log_share, 1) + quality - log_memory, 1);
     row[2] = std::min(std::max(deviation, least), k.most_quality);
     row[3] = product(shown_a, k.slope, k.acceleration);

