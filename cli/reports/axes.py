@@ -3,7 +3,7 @@
 from tachometry.cli.reports.core import configuration, full_scale_text, measured, memory_text, speed_text
 from tachometry.sim.studies.plan import Plans
 from tachometry.spec import AxesSpec
-from tachometry.spec.language.units import plural
+from tachometry.spec.language.units import plural, short_time
 from tachometry.spec.registers.manifest import manifest
 
 
@@ -25,7 +25,8 @@ def axes_rows(spec: AxesSpec) -> list[tuple[str, str]]:
         f"{plural(spec.turn_cycles, 'clock')} of a tick"
     )
     rows = [(name, own.get(name, value)) for name, value in configuration(alone) if name != "note"]
-    rows += measured(alone, Plans.of(alone, greatest))
+    late = f"{short_time(spec.times.seconds(spec.latency.tick))} from the end of a tick to the last axis' velocity"
+    rows += measured(alone, Plans.of(alone, greatest), late)
     return [rows[0], ("axes", turns), *rows[1:], *(("note", note) for note in spec.words.notes)]
 
 

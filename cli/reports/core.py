@@ -73,8 +73,11 @@ def _full_scale(spec: TachometerSpec) -> str:
     return f"{held}, counted is up to {counted:.6g} {spec.scale.shown_unit.name}"
 
 
-def measured(spec: TachometerSpec, plans: Plans) -> list[tuple[str, str]]:
-    """Return the rows that say what a core measures: range, worst error and delay; none if it is not known."""
+def measured(spec: TachometerSpec, plans: Plans, late: str = "") -> list[tuple[str, str]]:
+    """Return the rows that say what a core measures: range, worst error and delay; none if it is not known.
+
+    `late` says how late the velocity is if that is not known from the spec of one axis.
+    """
     if (worst := plans.worst) is None:
         return []
     low, high = plans.range
@@ -87,7 +90,7 @@ def measured(spec: TachometerSpec, plans: Plans) -> list[tuple[str, str]]:
         ("range", f"{speed_text(spec, low, 4)} to {speed_text(spec, high)}{below}"),
         ("worst error", f"{error} at a constant {at}, measured in {time}, with a real disc"),
         ("real disc", f"{_REAL}; an ideal one has {speed_text(spec, ideal, 3)} there"),
-        ("delay", _delay(spec, plans)),
+        ("delay", _delay(spec, plans, late)),
     ]
 
 
@@ -97,13 +100,13 @@ _REAL = (
 )
 
 
-def _delay(spec: TachometerSpec, plans: Plans) -> str:
-    late = short_time(spec.times.seconds(spec.latency.tick_to_velocity))
+def _delay(spec: TachometerSpec, plans: Plans, late: str) -> str:
+    late = late or f"{short_time(spec.times.seconds(spec.latency.tick_to_velocity))} from tick to velocity"
     if spec.words.on_ramps:
-        return f"{late} from tick to velocity; {spec.words.on_ramps}"
+        return f"{late}; {spec.words.on_ramps}"
     times = plans.line.measurement_time / 2
     halves = dict.fromkeys(short_time(float(find(times))) for find in (np.nanmin, np.nanmax))
-    return f"{late} from tick to velocity, and half of the time it is measured in: {' to '.join(halves)}"
+    return f"{late}, and half of the time it is measured in: {' to '.join(halves)}"
 
 
 def advice(plans: Plans) -> list[tuple[str, str]]:

@@ -92,7 +92,10 @@ def test_generate(more: list[str], tmp_path: Path, capsys: pytest.CaptureFixture
     assert run("generate", *core, "--axes", "3", *more, "--name", "axes", "-o", tmp_path) == 0
     told = rows(capsys)
     assert any(line.startswith("axes 3, each looked at every 4 clocks and computed in ") for line in told)
-    assert json.loads((tmp_path / "axes.json").read_text())["parameters"]["axes"] == 3
+    manifest = json.loads((tmp_path / "axes.json").read_text())
+    assert manifest["parameters"]["axes"] == 3
+    late = manifest["latency_cycles"]["tick_latency"]
+    assert any(line.startswith(f"delay {late}us from the end of a tick to the last axis") for line in told)
     assert "*sync_z/stage0_reg*/D" in (tmp_path / "axes.xdc").read_text()
     subprocess.run(["iverilog", "-g2012", "-Wall", "-o", "bench", "axes.v", "axes_tb.sv"], cwd=tmp_path, check=True)
     done = subprocess.run(["./bench"], cwd=tmp_path, capture_output=True, text=True, check=True)

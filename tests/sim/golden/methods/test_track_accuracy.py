@@ -109,6 +109,15 @@ def test_the_errors_are_those_that_are_promised(name: str) -> None:
     assert np.median([errors(ROWS[name], seed)[0] for seed in seeds]) < 1.1 * PROMISED[name]
 
 
+@pytest.mark.parametrize("share", only([1, 1.001], [0.999, 1, 1.001]))
+def test_the_greatest_speed_is_measured_as_well_as_others(share: float) -> None:
+    """On a bad disc, whose edges are nearer to each other than at the greatest speed, and up to the full scale."""
+    other, greatest = (
+        errors(replace(ROWS["fast, bad"], motion=f"constant:{1000 * part}rad/s:200ms"), 401)[0] for part in (0.5, share)
+    )
+    assert greatest < 1.2 * other
+
+
 def test_a_speed_that_begins_to_change_gently_is_followed() -> None:
     """The errors grow as slowly as the noise is learned: they are not taken for noise."""
     gentle = replace(ROWS["fast, jitter"], motion="constant:30rad/s:500ms+s-curve:30rad/s:0:1s")
