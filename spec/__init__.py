@@ -16,7 +16,6 @@ from tachometry.spec.language.option import Option, ParameterError, options_of, 
 from tachometry.spec.language.port import Port
 from tachometry.spec.language.units import Speed
 from tachometry.spec.methods.axes import AxesSpec, CoreSpec
-from tachometry.spec.methods.axis import Plan
 from tachometry.spec.methods.m import MTachometer
 from tachometry.spec.methods.mt import MTTachometer
 from tachometry.spec.methods.rairan import RairanTachometer
@@ -105,10 +104,11 @@ def of_texts(
     for name in methods:
         try:
             spec = made(name)
-            plan = _plan_of(spec if within is None else within(spec))
+            core = spec if within is None else within(spec)
+            plan = core.plan if isinstance(core, AxesSpec) else None
             if name != methods[-1]:
                 _check_division(spec)
-                _check_machines(plan)
+                _check_machines(core)
         except ParameterError as error:
             if name == methods[-1]:
                 raise
@@ -141,8 +141,18 @@ def _with_tick(
         except ParameterError as error:
             if error.parameter not in _OF_TICK:
                 raise
-            refused.append(error)
+            refused.append(_of_whole(error, within))
     raise refused[0]
+
+
+def _of_whole(error: ParameterError, within: Callable[[TachometerSpec], object] | None) -> ParameterError:
+    """Return the refusal of a tick as the whole core words it: many axes need a longer one than an axis."""
+    if within is not None and error.refused is not None:
+        try:
+            within(error.refused)
+        except ParameterError as of_whole:
+            return of_whole if of_whole.parameter in _OF_TICK else error
+    return error
 
 
 def _able(given: Mapping[str, str]) -> tuple[list[str], list[str]]:
@@ -165,16 +175,11 @@ def _able(given: Mapping[str, str]) -> tuple[list[str], list[str]]:
     return [name for name in _PREFERRED if name in able] or able, asked
 
 
-def _plan_of(core: object) -> Plan | None:
-    return core.plan if isinstance(core, AxesSpec) else None
-
-
-def _check_machines(plan: Plan | None) -> None:
+def _check_machines(core: object) -> None:
     """Refuse tracking of many axes with a ParameterError where one machine has no time for all turns of a tick."""
-    if plan is not None and (machines := plan.machines) > 1:
-        raise ParameterError(
-            "tick_cycles", f"must be so long that one machine is enough, not {machines}", f"needs {machines} machines"
-        )
+    if isinstance(core, AxesSpec) and (machines := core.plan.machines) > 1:
+        other = f"--tick {core.words.tick_of_one_machine}"
+        raise ParameterError("tick_cycles", f"must be longer: try {other}", f"needs {machines} machines or {other}")
 
 
 def _check_division(spec: TachometerSpec) -> None:
@@ -186,9 +191,8 @@ def _check_division(spec: TachometerSpec) -> None:
 def _of_method(method: str, texts: Mapping[str, str]) -> TachometerSpec:
     """Return the core of a method."""
     spec = spec_class(method)
-    given = {**spec.facts.usual, **texts}
     known = {about.name: about for about in (*common_options(), *own_options(method))}
-    for name in given:
+    for name in texts:
         parameter = name.replace("-", "_")
         if name not in known:
             others = " and ".join(methods_with(name))
@@ -198,8 +202,9 @@ def _of_method(method: str, texts: Mapping[str, str]) -> TachometerSpec:
             other = next(about.name for about in known.values() if about.field == known[name].field)
             instead = "" if other == name else f", but {other}"
             raise ParameterError(parameter, f"must not be given with method {method}{instead}")
-    encoder, timing = Encoder(**read_options(Encoder, given)), Timing(**read_options(Timing, given))
-    return spec(encoder=encoder, timing=timing, **read_options(spec, given, vars(timing)))
+    encoder = Encoder(**read_options(Encoder, texts))
+    timing = Timing(**read_options(Timing, texts, usual=spec.facts.usual))
+    return spec(encoder=encoder, timing=timing, **read_options(spec, texts, vars(timing)))
 
 
 def of_options(options: Mapping[str, str]) -> AnySpec:

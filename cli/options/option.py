@@ -3,6 +3,7 @@
 import functools
 import importlib.util
 import os
+import re
 import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -20,7 +21,10 @@ from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.spec import METHODS, ParameterError, common_options, own_options
 from tachometry.spec.language import option as declaration
 from tachometry.spec.language.option import options_of, read_options
+from tachometry.spec.language.units import QUANTITY
 
+# What a message says that a quantity is.
+_NUMBER = re.compile(r", not (-?[\d.]+(?:e[+-]?\d+)?)( (?:rad/s|rev/s|rpm|Hz|Nm|s))?(?=$|[:;,])")
 _PICTURES = (".png", ".pdf", ".svg")
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -31,7 +35,24 @@ def message_of(error: ValueError) -> str:
     if not isinstance(error, ParameterError):
         return str(error)
     name, _, part = error.parameter.partition(" ")
-    return " ".join(filter(None, [_shown(name), part, error.rest]))
+    shown = _shown(name)
+    return " ".join(filter(None, [shown, part, error.rest if part else _as_typed(shown.split(",")[0], error.rest)]))
+
+
+def _as_typed(name: str, rest: str) -> str:
+    """Return a message with what was typed for an option; behind it what that is in the unit of the message."""
+    context = click.get_current_context(silent=True)
+    if context is None or name.lstrip("-") in getattr(context.obj, "vary", ()):  # of which it says the value
+        return rest
+    given = (one for one in context.command.get_params(context) if one.opts[0] == name and _is_given(context, one))
+    typed = next((context.params.get(one.name or "") for one in given), None)
+    quantity = re.fullmatch(QUANTITY, str(typed).strip(), re.ASCII)
+
+    def told(found: re.Match[str]) -> str:
+        alike = quantity is not None and float(quantity[1]) == float(found[1])
+        return f", not {typed}" if alike else f", not {typed} ({found[1]}{found[2] or ''})"
+
+    return _NUMBER.sub(told, rest) if quantity else rest
 
 
 def _shown(name: str) -> str:

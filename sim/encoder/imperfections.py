@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim.encoder.motion import FloatArray, cos2pi
 from tachometry.spec.language.option import ParameterError
-from tachometry.spec.language.units import TIME, read_nearest
+from tachometry.spec.language.units import TIME, read_nearest, short_time
 
 Rows = NDArray[np.intp]
 Levels = NDArray[np.uint8]
@@ -43,7 +43,7 @@ class Bounce:
         if not 1 <= self.count <= MAX_BOUNCES:
             raise ParameterError("bounce count", f"must be from 1 to {MAX_BOUNCES}, not {self.count}")
         if not 0 < self.time_s < math.inf:
-            raise ParameterError("bounce time", f"must be more than 0 s, not {self.time_s} s")
+            raise ParameterError("bounce time", f"must be more than 0 s, not {short_time(self.time_s)}")
 
     @staticmethod
     def parse(text: str) -> "Bounce":
@@ -65,7 +65,7 @@ class LineFault:
         if self.line not in _FAULTY:
             raise ParameterError("line", f"must be a, b, c, z, a_n, b_n or z_n, not {self.line!r}")
         if not 0 <= self.time_s < math.inf:
-            raise ParameterError("time", f"must be 0 s or more, not {self.time_s} s")
+            raise ParameterError("time", f"must be 0 s or more, not {short_time(self.time_s)}")
 
     @staticmethod
     def parse(what: str, text: str) -> "LineFault":

@@ -15,6 +15,7 @@ from tachometry.spec.language.units import (
     Unit,
     format_time,
     parse_frequency,
+    parse_time,
     plural,
     read_exactly,
     read_quantity,
@@ -68,6 +69,12 @@ def _ticks(what: str, text: str, timing: Mapping[str, Any]) -> int:
     return _whole(
         what, text, time_or_clocks(what, text, timing["clock_hz"]), timing["tick_cycles"] * clock, "tick", MIN_TICKS
     )
+
+
+def _usual_ticks(what: str, text: str, timing: Mapping[str, Any]) -> int:
+    """Return a time in ticks, rounded up, as many as there can be."""
+    ticks = parse_time(what, text) * timing["clock_hz"] / timing["tick_cycles"]
+    return min(max(math.ceil(ticks), MIN_TICKS), MAX_TICKS)
 
 
 @dataclass(frozen=True)
@@ -124,6 +131,7 @@ class Timing:
         metavar="TIME",
         unit="ticks",
         parse_at=_ticks,
+        fit_at=_usual_ticks,
         tests=("2", "500", "3", "4096"),
         few=3,
     )

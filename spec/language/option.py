@@ -27,10 +27,13 @@ class ParameterError(ValueError):
         The message behind the name.
     brief : str
         Why, in a few words behind the name of a method that another one is taken for; empty: the message.
+    refused : object or None
+        The spec, if this is all that is wrong with it; what is made of it may say better what is allowed.
     """
 
-    def __init__(self, parameter: str, rest: str, brief: str = "") -> None:
+    def __init__(self, parameter: str, rest: str, brief: str = "", refused: Any = None) -> None:
         super().__init__(parameter, rest)
+        self.refused = refused
         self.parameter = parameter
         self.rest = rest
         self.brief = brief or f"refuses: {self}"
@@ -87,6 +90,8 @@ class Option:
     # fields of the same class and of `Timing`
     parse_at: Callable[[str, str, Mapping[str, Any]], Any] | None = None
     text: str | None = None  # the default, if it is read as it would be if it were given
+    # makes the value of a default instead of `parse_at`: what nobody has typed must fit the other options
+    fit_at: Callable[[str, str, Mapping[str, Any]], Any] | None = None
     flag: bool = False  # whether it stands alone, for yes
     needs: str = ""  # name of the flag that must be given with it
     fits: Callable[[type[Any]], bool] | None = None  # whether the spec of a method has the option; None: always
@@ -210,7 +215,10 @@ def check_options(spec: Any) -> None:
 
 
 def read_options(
-    spec: type[Any], texts: Mapping[str, str], timing: Mapping[str, Any] = MappingProxyType({})
+    spec: type[Any],
+    texts: Mapping[str, str],
+    timing: Mapping[str, Any] = MappingProxyType({}),
+    usual: Mapping[str, str] = MappingProxyType({}),
 ) -> dict[str, Any]:
     """Return values of the fields of a class, from the texts that are given for its options.
 
@@ -221,6 +229,8 @@ def read_options(
         By the names of the options.
     timing : mapping of str to object
         What is known of the fields of `Timing`, for texts that say nothing without.
+    usual : mapping of str to str
+        Defaults in place of those of the options, by their names.
 
     Raises
     ------
@@ -246,12 +256,13 @@ def read_options(
     known = {about.field: about.default for about in options_of(spec)} | dict(timing)
     values: dict[str, Any] = {}
     for about in sorted(read.values(), key=lambda one: one.parse_at is not None):  # which needs what others say
-        text = texts.get(about.name, about.text or "")
+        text = texts.get(about.name, usual.get(about.name, about.text or ""))
         text = next((choice for choice in about.choices if choice.lower() == text.strip().lower()), text)
         if about.parse_at is None:
             values[about.field] = about.parse(about.parameter, text)
         else:
-            values[about.field] = about.parse_at(about.parameter, text, {**known, **values})
+            read_at = about.fit_at if about.fit_at and about.name not in texts else about.parse_at
+            values[about.field] = read_at(about.parameter, text, {**known, **values})
     for part in (about for about in options_of(spec) if about.part and about.field in values):
         own = [about for about in options_of(spec) if about.within[:1] == (part.field,) and about.field in values]
         made = {about.within[1]: values.pop(about.field) for about in own}

@@ -213,7 +213,7 @@ parse_time, parse_bandwidth = Quantity(TIME), Quantity(BANDWIDTH)
 def format_time(seconds: Fraction) -> str:
     """Return a time as people write it: the largest unit that leaves a number of at least 1."""
     for unit, (size, _) in TIME.items():
-        if seconds >= size:
+        if abs(seconds) >= size:
             return f"{float(seconds / size):.9g}{unit}"
     return f"{float(seconds):.9g}s"
 
@@ -223,10 +223,12 @@ def short_time(seconds: Fraction | float) -> str:
     return format_time(Fraction(f"{float(seconds):.4g}"))
 
 
-def next_written_time(clocks: int, clock_hz: int) -> str:
-    """Return the next time of so many clocks or more that is written in few digits; else the clocks."""
-    written = (written_time(number, clock_hz) for number in range(clocks, 2 * clocks))
-    short = (text for text in written if len(text) <= len("12.25ms") and not text.endswith(CLOCKS))
+def next_written_time(clocks: int, clock_hz: int, fits: Callable[[int], bool] = lambda clocks: True) -> str:
+    """Return the next time of so many clocks or more that fits, and is written in few digits; else the clocks."""
+    written = ((number, written_time(number, clock_hz)) for number in range(clocks, 2 * clocks))
+    short = (
+        text for number, text in written if len(text) <= len("12.25ms") and not text.endswith(CLOCKS) and fits(number)
+    )
     return next(short, f"{clocks}{CLOCKS}")
 
 

@@ -15,6 +15,7 @@ from tachometry.spec.core.times import Times
 from tachometry.spec.core.timing import Timing
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import INDEX, TICK, UPDATE, Port, Ports, held, pin, strobe
+from tachometry.spec.language.units import next_written_time, written_time
 from tachometry.spec.methods.axis import COUNT_LATENCY, FILTER_LATENCY, MAX_AXES, MIN_SLOTS, WARM_UP, Plan, slots_of
 from tachometry.spec.methods.s import STachometer
 from tachometry.spec.methods.s_axis import SAxis
@@ -52,21 +53,24 @@ def one_axis(spec: STachometer | TrackTachometer, axes: int, slots: int) -> SAxi
     return TrackAxis.of(spec, axes, slots) if isinstance(spec, TrackTachometer) else SAxis.of(spec, axes, slots)
 
 
-def fits(spec: STachometer | TrackTachometer, axes: int, cycles: int) -> bool:
-    """Tell whether a tick of so many clocks has whole rounds, and room for the turns of all axes."""
+def _axis_at(spec: STachometer | TrackTachometer, axes: int, cycles: int) -> SAxis | TrackAxis | None:
+    """Return the core that each axis is in a tick of so many clocks.
+
+    None if that has no whole rounds, or no room for the turns of all axes.
+    """
     slots = slots_of(axes, cycles)
     if slots is None:
-        return False
+        return None
     most = spec.timing.max_ticks * spec.timing.tick_cycles // cycles
-    alone = replace(spec, timing=Timing(spec.timing.clock_hz, cycles, max(most, 2)))
-    return one_axis(alone, axes, slots).plan.end + slots <= cycles
+    axis = one_axis(replace(spec, timing=Timing(spec.timing.clock_hz, cycles, max(most, 2))), axes, slots)
+    return axis if axis.plan.end + slots <= cycles else None
 
 
-def _possible(spec: STachometer | TrackTachometer, axes: int, cycles: int) -> bool:
+def _possible(spec: STachometer | TrackTachometer, axes: int, cycles: int) -> SAxis | TrackAxis | None:
     try:
-        return fits(spec, axes, cycles)
+        return _axis_at(spec, axes, cycles)
     except ParameterError:  # no axis can have this tick
-        return False
+        return None
 
 
 def nearest_ticks(spec: STachometer | TrackTachometer, axes: int) -> list[int]:
@@ -157,6 +161,18 @@ class AxesWords(Follows["AxesSpec"]):
         )
 
     @property
+    def tick_of_one_machine(self) -> str:
+        """The shortest tick from that of the core on in which one datapath has time for the turns of all axes."""
+        spec, slots, timing = self.spec.tachometer, self.spec.slots, self.spec.timing
+
+        def enough(cycles: int) -> bool:
+            axis = _possible(spec, self.spec.axes, cycles)
+            return axis is not None and axis.plan.machines == 1
+
+        turns = (1 + spec.external_tick) * (self.spec.axes * self.spec.turn_cycles + slots)
+        return next_written_time(max(turns, timing.tick_cycles), timing.clock_hz, enough)
+
+    @property
     def memory(self) -> tuple[str, int, int] | None:
         """The memory of the reciprocal: its kind, entries, bits of an entry. None: there is no such memory."""
         axis = self.spec.axis
@@ -210,15 +226,24 @@ class AxesSpec:
 
     def _check_tick(self) -> None:
         cycles = self.timing.tick_cycles
-        if not fits(self.tachometer, self.axes, cycles):
-            fewest = max(self.axes, MIN_SLOTS)
-            some = f"a number from {fewest} to {MAX_AXES}" if fewest < MAX_AXES else f"{MAX_AXES}"
-            near = " or ".join(map(str, nearest_ticks(self.tachometer, self.axes)))
-            raise ParameterError(
-                "tick_cycles",
-                f"must be a multiple of {some}, and long enough for a turn of every axis with --axes {self.axes}"
-                f"{f': {near}' if near else ''}, not {cycles}",
-            )
+        try:
+            if _axis_at(self.tachometer, self.axes, cycles) is not None:
+                return
+        except ParameterError as error:
+            if error.parameter != "tick":  # what that says is of one axis
+                raise
+        fewest = max(self.axes, MIN_SLOTS)
+        some = f"a number from {fewest} to {MAX_AXES}" if fewest < MAX_AXES else f"{MAX_AXES}"
+        written = [written_time(one, self.timing.clock_hz) for one in nearest_ticks(self.tachometer, self.axes)]
+        near = f"--tick {' or '.join(written)}" if written else "a longer --tick"
+        if isinstance(self.tachometer, TrackTachometer) and self.tachometer.multiplier == "serial":
+            near += " or --multiplier block"
+        raise ParameterError(
+            "tick_cycles",
+            f"must be a multiple of {some}, and long enough for a turn of every axis with --axes {self.axes}, "
+            f"not {cycles}: try {near}",
+            f"needs {near}",
+        )
 
     @property
     def method(self) -> str:

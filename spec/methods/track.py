@@ -248,6 +248,7 @@ class TrackTachometer(TachometerSpec):
                 f"must be longer for method {self.method}, which takes {short_time(self.times.seconds(shortest))} at "
                 f"{self.timing.clock_hz / 1e6:g} MHz, not {given}: try --tick {typed} or {other}",
                 f"needs a tick of {shortest} clocks",
+                self,
             )
         self._check_fine()
 

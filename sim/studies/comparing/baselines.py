@@ -18,6 +18,7 @@ from tachometry.sim.encoder.motion import FloatArray
 from tachometry.sim.golden.front_end import counted
 from tachometry.sim.signals.recording import MAX_TICKS, Recording
 from tachometry.spec import Encoder
+from tachometry.spec.language.units import short_time
 
 IntArray = NDArray[np.int64]
 
@@ -92,7 +93,7 @@ def read(steps: Steps, period_s: float) -> Readings:
     It raises ValueError if the period (s) is not more than 0, or there were more than `MAX_TICKS` readings.
     """
     if not period_s > 0:
-        raise ValueError(f"control period must be more than 0 s, not {period_s} s")
+        raise ValueError(f"control period must be more than 0 s, not {short_time(period_s)}")
     if not steps.duration / period_s <= MAX_TICKS:
         raise ValueError(
             f"what is compared must have at most {MAX_TICKS} control periods of {period_s:g} s: shorten it"
@@ -110,7 +111,7 @@ def clocks(seconds: FloatArray, clock_s: float, period_s: float) -> IntArray:
     It raises ValueError if the clock is not shorter than the control period.
     """
     if not 0 < clock_s < period_s:
-        raise ValueError(f"clock must be more than 0 s and shorter than the control period, not {clock_s} s")
+        raise ValueError(f"clock must be more than 0 s and shorter than the control period, not {short_time(clock_s)}")
     return np.floor(seconds / clock_s + 1e-6).astype(np.int64)
 
 
@@ -123,7 +124,7 @@ def _held(value: FloatArray, known: NDArray[np.bool_]) -> FloatArray:
 def low_pass(value: ArrayLike, period_s: float, filter_s: float) -> FloatArray:
     """Return first-order low-pass filter y = a y + (1 - a) x with a = filter_s / (filter_s + period_s), from y = 0."""
     if filter_s < 0:
-        raise ValueError(f"time constant of the filter must be at least 0 s, not {filter_s} s")
+        raise ValueError(f"time constant of the filter must be at least 0 s, not {short_time(filter_s)}")
     a = filter_s / (filter_s + period_s)
     added = (1 - a) * np.asarray(value, dtype=np.float64)
     return np.array(list(accumulate(added.tolist(), lambda y, x: a * y + x)), dtype=np.float64)

@@ -16,7 +16,7 @@ from tachometry.sim.studies.comparing import baselines, estimators
 from tachometry.sim.studies.comparing.baselines import Estimate, Steps
 from tachometry.sim.studies.comparing.compare import Curve
 from tachometry.spec.language.option import ParameterError, parse_flag, parse_whole
-from tachometry.spec.language.units import FREQUENCY, TIME, parse_bandwidth, read_nearest
+from tachometry.spec.language.units import FREQUENCY, TIME, parse_bandwidth, read_nearest, short_time
 
 
 def _time(what: str, text: str) -> float:
@@ -203,7 +203,9 @@ def steps_curve(name: str, steps: Steps) -> Curve:
     what, model = baseline_model(name)
     estimate = model(steps)
     if len(estimate.time) < 2:
-        raise ParameterError("motion", f"must last at least two control periods of {name}, not {steps.duration:.6g} s")
+        raise ParameterError(
+            "motion", f"must last at least two control periods of {name}, not {short_time(steps.duration)}"
+        )
     return Curve(name, what, estimate, np.empty(0))
 
 

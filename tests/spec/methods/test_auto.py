@@ -18,7 +18,9 @@ CHOICES = [
     ({"tick": "10us", "external-tick": "yes"}, "track", f"as its {QUICK} clocks fit the tick of 480 clocks"),
     ({"tick": "5us"}, "mt", f"as track needs a tick of {QUICK} clocks"),
     ({"tick": "250ns"}, "s", f"as track needs a tick of {QUICK} clocks and mt needs a tick of 20 clocks"),
-    ({"axes": "4"}, "s", "as track needs 2 machines and mt is of one axis"),
+    ({"axes": "4"}, "s", "as track needs 2 machines or --tick 21us and mt is of one axis"),
+    ({"axes": "4", "tick": "21us"}, "track", "as the turns of 4 axes fit the tick of 1008 clocks"),
+    ({"axes": "4", "tick": "5us"}, "s", "as track needs --tick 5.5us and mt is of one axis"),
     ({"bounds": "yes"}, "mt", "as it has --bounds"),
     ({"bounds": "yes", "tick": "250ns"}, "s", "as mt needs a tick of 23 clocks"),
     ({"max-memory": "5ms"}, "track", "as it has --max-memory"),
@@ -97,6 +99,22 @@ TICKS = [
 def test_without_a_tick_it_is_as_long_as_the_method_needs(texts: dict[str, str], method: str, tick: int) -> None:
     spec = of_options(PPR | texts)
     assert (spec.method, spec.timing.tick_cycles) == (method, tick)
+
+
+@pytest.mark.parametrize(
+    ("texts", "ticks"),
+    [
+        ({"tick": "30us"}, 3334),  # track: 100 ms
+        ({"tick": "5.25us", "method": "track"}, 19048),
+        ({"tick": "30us", "method": "s"}, 334),
+        ({"tick": "20ms", "method": "s"}, 2),
+        ({"tick": "1ns", "clock": "1GHz", "method": "s"}, 1 << 20),
+    ],
+)
+def test_a_maximum_time_that_nobody_gave_fits_every_tick(texts: dict[str, str], ticks: int) -> None:
+    spec = of_options(PPR | texts)
+    assert spec.timing.max_ticks == ticks
+    assert of_options(spec.options).timing == spec.timing
 
 
 @pytest.mark.parametrize(

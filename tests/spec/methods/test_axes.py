@@ -11,6 +11,7 @@ import pytest
 
 from tachometry.spec import AxesSpec, Encoder, ParameterError, Speed, STachometer, Timing, of_texts, with_axes
 from tachometry.spec.core.index import Index
+from tachometry.spec.core.timing import whole_clocks
 from tachometry.spec.registers.manifest import manifest
 
 ALONE = STachometer(
@@ -172,10 +173,10 @@ def test_a_tick_has_a_turn_for_every_axis() -> None:
         try:
             spec = spec_of(8, tick=tick, max_ticks=100)
         except ParameterError as error:
-            found = re.search(r" with --axes 8: (\d+)(?: or (\d+))?, not (\d+)$", str(error))
+            found = re.search(r" with --axes 8, not (\d+): try --tick ([\w.]+)(?: or ([\w.]+))?$", str(error))
             assert found is not None
-            assert int(found[3]) == tick
-            told[tick] = [int(number) for number in found.groups()[:2] if number]
+            assert int(found[1]) == tick
+            told[tick] = [whole_clocks("tick", text, 48_000_000) for text in found.groups()[1:] if text]
         else:
             assert tick % spec.slots == 0
             assert 8 * spec.turn_cycles + spec.slots <= tick

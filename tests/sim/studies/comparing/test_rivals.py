@@ -63,7 +63,7 @@ def test_what_is_swept_makes_a_difference(method: str) -> None:
         ("foaw:noise-bound=x", "noise-bound must be a number, not 'x'"),
         ("foaw:best-fit=x", "best-fit must be yes or no, not 'x'"),
         ("least-squares:edges=x", "edges must be a whole number, not 'x'"),
-        ("hostmot2:period=40ms", "motion must last at least two control periods of hostmot2:period=40ms, not 0.06 s"),
+        ("hostmot2:period=40ms", "motion must last at least two control periods of hostmot2:period=40ms, not 60ms"),
     ],
 )
 def test_refusals(name: str, message: str) -> None:
