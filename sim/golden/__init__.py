@@ -48,12 +48,14 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
         tick_errors = np.empty(0, dtype=np.int64)
     else:
         last, tick_errors = windows(spec, trace)
-        beyond, nominal = None, np.ones_like(last)
+        beyond, nominal = None, np.broadcast_to(np.int64(1), last.shape)
     ticks, index = count(spec, steps, last, beyond)
+    del last  # as long as all ticks
     wrong = health.faults(spec, trace, steps, index)
     ticks = health.with_health(spec, with_stalled(spec, ticks, nominal), wrong)
     measured = golden.updates(ticks, steps, trace.n_clocks)
-    measured = measured.having(cause=measured.clock - spec.latency.datapath)
+    if "cause" not in measured.columns:
+        measured = measured.having(cause=measured.clock - spec.latency.datapath)
     updates = in_unit(spec, filtered(spec, ticks, measured))
     probes = probe.latched(spec, steps, trace, updates)
     ticks = probe.with_probed(spec, ticks, probes)

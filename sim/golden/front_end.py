@@ -311,8 +311,7 @@ def count(
         ±max_pulse_count is saturated, whatever comes after.
     """
     window = places(last, steps.clock, "left")
-    forward, backward = (np.bincount(window[steps.step == sign], minlength=len(last) + 1)[:-1] for sign in (1, -1))
-    sums = forward - backward
+    sums = np.subtract(*(np.bincount(window[steps.step == sign], minlength=len(last) + 1)[:-1] for sign in (1, -1)))
     reached = np.cumsum(sums)
     overflow = np.abs(sums) > spec.widths.max_pulse_count
     if beyond is not None:
@@ -320,19 +319,21 @@ def count(
         sums = np.where(left != 0, left * spec.widths.max_pulse_count, sums)
         overflow = (left != 0) | beyond
     origins = _Origins.of(spec, steps)
-    shaft = reached
-    if spec.front_end.index_resets:
-        shaft = reached - np.append(0, origins.captured)[np.searchsorted(steps.index, last, side="right")]
     strobe = last + spec.latency.tick
-    glitches = places(steps.swallowed, strobe, "right")
     columns = {
         "pulse_count": np.clip(sums, -spec.widths.max_pulse_count, spec.widths.max_pulse_count),
         "position": wrapped(spec, reached - origins.after(last)),
-        "position_modulo": shaft % (spec.front_end.modulus or 1),
-        "homed": homed(spec, steps, strobe),
         "overflow": overflow,
-        "swallowed_edges": 2 * np.minimum(glitches, (1 << 15) - 1),
     }
+    if spec.front_end.index_once:
+        columns["homed"] = homed(spec, steps, strobe)
+    if spec.front_end.modulus is not None:
+        shaft = reached
+        if spec.front_end.index_resets:
+            shaft = reached - np.append(0, origins.captured)[np.searchsorted(steps.index, last, side="right")]
+        columns["position_modulo"] = shaft % spec.front_end.modulus
+    if spec.filter_clocks:
+        columns["swallowed_edges"] = 2 * np.minimum(places(steps.swallowed, strobe, "right"), (1 << 15) - 1)
     if steps.wheel is not None:
         columns["synced"] = steps.wheel.synced(strobe - 1)
     index = {"index_position": wrapped(spec, origins.captured - origins.at_index)}

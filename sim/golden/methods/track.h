@@ -1,18 +1,23 @@
-// The recursion of track.py, line by line. `Constants` and `Windows` stand before this text; tables and state come with
-// the call.
+// The recursion of track.py, line by line. `Constants` stand before this text. The state, in which tables are,
+// belongs to the caller.
 static inline int bits_of(int64_t x) { return x ? 64 - __builtin_clzll((uint64_t)x) : 0; }
 static inline int64_t sign_of(int64_t x) { return x < 0 ? -1 : 1; }
 
-struct Recursion {
-  const Constants &k;
-  const int64_t *logs, *powers, *gains, *reversed;
+struct Tables {
+  int64_t logs[1 << LOG_INDEX], powers[1 << EXP_INDEX], gains[3 * GAINS];
+};
+
+struct Recursion : Tables {
+  Constants k;
+  int64_t reversed[1 << CHANCE_BITS] = {};
   int64_t phase = 0, turn = 0, noises, p = 0, v = 0, a = 0, shown_v = 0, shown_a = 0, memory = 0, log_memory = 0;
   int64_t slow_until = 0, since = 0, quiet = 0, noise, sure, alarm, error = 0, mean = 0, lag = 0, edge = 0, slips = 0;
   int64_t log_share, offsets[4] = {0, 0, 0, 0}, grows = 1, log_growth = 0, log_limit = 0, trouble = 0, chance, moved = 0, quality = 0;
   int64_t *row = nullptr;
 
-  Recursion(const Constants &k, const int64_t *logs, const int64_t *powers, const int64_t *gains, const int64_t *reversed)
-      : k(k), logs(logs), powers(powers), gains(gains), reversed(reversed) {
+  Recursion(const Constants &k, const Tables &tables) : Tables(tables), k(k) {
+    for (int i = 0; i < 1 << CHANCE_BITS; i++)
+      for (int bit = 0; bit < CHANCE_BITS; bit++) reversed[i] |= (int64_t)(i >> bit & 1) << (CHANCE_BITS - 1 - bit);
     noises = k.noises_first;
     noise = sure = k.quarter, alarm = 4 * sure;
     log_share = -k.log_4;
@@ -187,17 +192,16 @@ struct Recursion {
   }
 };
 
-extern "C" __attribute__((visibility("default"))) void track(const int64_t *constants, const int64_t *tables, int64_t ticks, const int64_t *windows, int64_t *rows) {
-  int64_t reversed[1 << CHANCE_BITS];
-  for (int i = 0; i < 1 << CHANCE_BITS; i++) {
-    reversed[i] = 0;
-    for (int bit = 0; bit < CHANCE_BITS; bit++) reversed[i] |= (int64_t)(i >> bit & 1) << (CHANCE_BITS - 1 - bit);
-  }
-  const int64_t *logs = tables, *powers = logs + (1 << LOG_INDEX), *gains = powers + (1 << EXP_INDEX);
-  Recursion state(*(const Constants *)constants, logs, powers, gains, reversed);
+#define CALLED extern "C" __attribute__((visibility("default")))
+
+CALLED int64_t size() { return sizeof(Recursion); }
+CALLED void begin(Recursion *state, const Constants *constants, const Tables *tables) {
+  new (state) Recursion(*constants, *tables);
+}
+CALLED void track(Recursion *state, int64_t ticks, const int64_t *windows, int64_t *rows) {
   for (int64_t i = 0; i < ticks; i++) {
     auto of = [&](int column) { return windows[column * ticks + i]; };
-    state.row = rows + 4 * i;
-    state.tick(of(0), of(1), of(2), of(3), of(4), (int)of(5), of(6) != 0, (int)of(7), of(8));
+    state->row = rows + 4 * i;
+    state->tick(of(0), of(1), of(2), of(3), of(4), (int)of(5), of(6) != 0, (int)of(7), of(8));
   }
 }

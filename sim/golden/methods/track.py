@@ -35,15 +35,19 @@ class Windows:
     length: NDArray[np.int64]  # clocks of the tick
 
     @classmethod
-    def of(cls, steps: Steps, last: NDArray[np.int64], most: int) -> "Windows":
-        """Return the counts of windows that end with the clocks `last`, of which an event takes `most`."""
-        counted = (steps.step != 0) & (steps.clock <= (last[-1] if len(last) else -1))
-        clock, step = steps.clock[counted], steps.step[counted].astype(np.int64)
+    def of(cls, steps: Steps, last: NDArray[np.int64], most: int, begin: int = -1, place: int = 0) -> "Windows":
+        """Return the counts of windows that end with the clocks `last`, of which an event takes `most`.
+
+        The first window comes after the clock `begin`, which ends at the position `place`.
+        """
+        chosen = slice(*np.searchsorted(steps.clock, (begin, last[-1] if len(last) else begin), side="right"))
+        counted = steps.step[chosen] != 0
+        clock, step = steps.clock[chosen][counted], steps.step[chosen][counted].astype(np.int64)
         window = np.searchsorted(last, clock)
-        through = np.append(0, np.cumsum(step))  # place before each count, and at last
-        first = np.searchsorted(clock, np.append(-1, last[:-1]), side="right")  # count of each tick
+        through = np.cumsum(np.append(place, step))  # place before each count, and at last
+        first = np.searchsorted(clock, np.append(begin, last[:-1]), side="right")  # count of each tick
         until = np.searchsorted(clock, last, side="right")
-        begin = through[first]
+        before = through[first]
         age = last[window] - clock
         taken = np.arange(len(clock)) - first[window] < most
 
@@ -64,13 +68,13 @@ class Windows:
         return cls(
             number=np.minimum(until - first, most),
             times=summed(age),
-            places=summed(2 * (through[:-1] - begin[window]) + step),
+            places=summed(2 * (through[:-1] - before[window]) + step),
             last=of_count(age, until - 1),
-            moved=through[until] - begin,
+            moved=through[until] - before,
             kind=of_count(lower & 3, latest),
             down=of_count(step < 0, latest),
             end=through[until] & 3,
-            length=np.diff(last, prepend=-1),
+            length=np.diff(last, prepend=begin),
         )
 
     def rows(self) -> Iterator[tuple[int, ...]]:
@@ -78,13 +82,16 @@ class Windows:
         yield from zip(*(column.tolist() for column in vars(self).values()), strict=True)
 
 
-Rows = Callable[[Tracking, int, Windows], NDArray[np.int64]]
+# What is shown in each tick, shape (n, 4), of windows that come after those of the call before.
+Rows = Callable[[Windows], NDArray[np.int64]]
+Begin = Callable[[Tracking, int], Rows]
+_PIECE = 1 << 16  # ticks at a time, for which memory is needed beside that of the columns
 
 
-def rows(form: Tracking, lead: int, windows: Windows) -> NDArray[np.int64]:
-    """Return what is shown in each tick, shape (n, 4), by the Python model."""
+def rows(form: Tracking, lead: int) -> Rows:
+    """Return the Python model after a reset."""
     state = Recursion(form, lead)
-    return np.array([state.tick(*row) for row in windows.rows()], dtype=np.int64).reshape(-1, 4)
+    return lambda windows: np.array([state.tick(*row) for row in windows.rows()], dtype=np.int64).reshape(-1, 4)
 
 
 def constants_of(form: Tracking, lead: int) -> dict[str, int]:
@@ -94,14 +101,14 @@ def constants_of(form: Tracking, lead: int) -> dict[str, int]:
 
 
 @functools.cache
-def compiled(names: tuple[str, ...]) -> Rows | None:
+def compiled(names: tuple[str, ...]) -> Begin | None:
     """Return the same by its twin in C++, made once for all; None: there is no compiler."""
     if build.find_compiler() is None:
         return None
     numbers = {name: value for name, value in vars(tracking).items() if name.isupper() and isinstance(value, int)}
     text = "\n".join(
         (
-            "#include <algorithm>\n#include <cstdint>\n#include <cstdlib>",
+            "#include <algorithm>\n#include <cstdint>\n#include <cstdlib>\n#include <new>",
             *(f"static const int {name} = {value};" for name, value in numbers.items()),
             f"struct Constants {{ int64_t {', '.join(names)}; }};",
             files(__package__).joinpath("track.h").read_text(encoding="utf-8"),
@@ -109,16 +116,22 @@ def compiled(names: tuple[str, ...]) -> Rows | None:
     )
     key = build.digest(text, build.version(build.compiler()), build.compiler(), build.flags())
     library = ctypes.CDLL(str(build.cached(key, ".so", lambda folder: build.compile_library(text, folder))))
-    tables = np.array((*LOGS, *POWERS), dtype=np.int64)
+    library.size.restype = ctypes.c_int64
 
-    def of(form: Tracking, lead: int, windows: Windows) -> NDArray[np.int64]:
+    def of(form: Tracking, lead: int) -> Rows:
         constants = np.array(list(constants_of(form, lead).values()), dtype=np.int64)
-        all_tables = np.concatenate((tables, np.array(form.gains, dtype=np.int64).ravel()))
-        columns = np.array([*vars(windows).values()], dtype=np.int64)
-        found = np.empty((columns.shape[1], 4), dtype=np.int64)
-        where = [ctypes.c_void_p(array.ctypes.data) for array in (constants, all_tables, columns, found)]
-        library.track(where[0], where[1], ctypes.c_int64(columns.shape[1]), where[2], where[3])
-        return found
+        tables = np.concatenate((LOGS, POWERS, np.ravel(form.gains)), dtype=np.int64)
+        state = np.empty(library.size(), dtype=np.uint8)
+        library.begin(*(ctypes.c_void_p(array.ctypes.data) for array in (state, constants, tables)))
+
+        def shown(windows: Windows) -> NDArray[np.int64]:
+            columns = np.array([*vars(windows).values()], dtype=np.int64)
+            found = np.empty((columns.shape[1], 4), dtype=np.int64)
+            begun, given, taken = (ctypes.c_void_p(array.ctypes.data) for array in (state, columns, found))
+            library.track(begun, ctypes.c_int64(len(found)), given, taken)
+            return found
+
+        return shown
 
     return of
 
@@ -132,23 +145,25 @@ class Model:
     def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
         """Return all updates below `n_clocks` clocks, with the velocity in counts per tick as the datapath has it."""
         spec = self._spec
-        windows = Windows.of(steps, ticks.clock - spec.latency.tick, spec.form.most_number)
-        lead = spec.program.lead
-        found = (compiled(tuple(constants_of(spec.form, lead))) or rows)(spec.form, lead, windows)
-        velocity, place, quality, acceleration = found.T
+        shown = (compiled(tuple(constants_of(spec.form, spec.program.lead))) or rows)(spec.form, spec.program.lead)
         unused, shift = 64 - spec.position_width - spec.fine_bits, PLACE_BITS - spec.fine_bits
-        fine = (ticks.position << spec.fine_bits) + ((place + (1 << shift - 1)) >> shift)
-        counted = windows.number > 0
-        number = np.arange(len(counted))
-        before = np.maximum.accumulate(
-            np.append(-spec.timing.max_ticks, np.where(counted, number, -spec.timing.max_ticks))
-        )[:-1]
-        columns = {
-            "velocity": velocity,
-            "interval": np.minimum(number - before, spec.timing.max_ticks),
-            "forced": ~counted,
-            "acceleration": acceleration,
-            "quality": quality,
-            "position_fine": fine << unused >> unused,
-        }
-        return Table(ticks.clock + spec.latency.datapath, columns)
+        n, most = len(ticks), spec.timing.max_ticks
+        names = ("velocity", "interval", "forced", "acceleration", "quality", "position_fine")
+        columns = {name: np.empty(n, dtype=bool if name == "forced" else np.int64) for name in names}
+        begin, reached, latest = -1, 0, -most
+        for first in range(0, n, _PIECE):
+            piece = slice(first, first + _PIECE)
+            last = ticks.clock[piece] - spec.latency.tick
+            windows = Windows.of(steps, last, spec.form.most_number, begin, reached)
+            begin, reached = int(last[-1]), reached + int(windows.moved.sum())
+            velocity, place, quality, acceleration = shown(windows).T
+            fine = (ticks.position[piece] << spec.fine_bits) + ((place + (1 << shift - 1)) >> shift)
+            counted = windows.number > 0
+            number = np.arange(first, first + len(last))
+            before = np.maximum.accumulate(np.append(latest, np.where(counted, number, latest)))
+            latest = int(before[-1])
+            interval = np.minimum(number - before[:-1], most)
+            values = (velocity, interval, ~counted, acceleration, quality, fine << unused >> unused)
+            for name, value in zip(names, values, strict=True):
+                columns[name][piece] = value
+        return Table(ticks.clock + spec.latency.datapath, {"cause": ticks.clock, **columns})

@@ -17,7 +17,7 @@ from tachometry.sim.golden.methods import track
 from tachometry.sim.golden.methods.track_recursion import Recursion
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.spec import TrackTachometer
-from tachometry.spec.formats.tracking import GAIN_STEPS, LOG_BITS, PLACE_BITS, WIDTH
+from tachometry.spec.formats.tracking import GAIN_STEPS, LOG_BITS, PLACE_BITS, WIDTH, Tracking
 
 CORES = {
     "default": core(),
@@ -34,7 +34,7 @@ def compiled(spec: TrackTachometer, held: track.Windows) -> NDArray[np.int64]:
     """Return what the twin in C++ shows."""
     found = track.compiled(tuple(track.constants_of(spec.form, spec.program.lead)))
     assert found
-    return found(spec.form, spec.program.lead, held)
+    return found(spec.form, spec.program.lead)(held)
 
 
 @pytest.mark.parametrize("name", CORES)
@@ -42,7 +42,7 @@ def test_twins(name: str) -> None:
     """The C++ shows what the Python shows, bit by bit, and all of it changes."""
     spec = CORES[name]
     held = windows(spec, 1, 1500)
-    right = track.rows(spec.form, spec.program.lead, held)
+    right = track.rows(spec.form, spec.program.lead)(held)
     assert np.array_equal(compiled(spec, held), right)
     assert all(len(np.unique(column)) > 30 for column in right.T)
 
@@ -78,7 +78,7 @@ def test_states_stay_within_their_words(seed: int) -> None:
 def test_twins_on_more_motions(seed: int) -> None:
     spec = CORES[[*CORES][seed % len(CORES)]]
     held = windows(spec, seed, 20_000)
-    assert np.array_equal(compiled(spec, held), track.rows(spec.form, spec.program.lead, held))
+    assert np.array_equal(compiled(spec, held), track.rows(spec.form, spec.program.lead)(held))
 
 
 def test_gains_are_those_of_least_squares() -> None:
@@ -104,13 +104,13 @@ def test_without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     spec = core()
     trace = trace_of(np.arange(1, 300) ** 2 * 5, np.arange(1, 300))
     right = golden.run(spec, trace).updates
-    used: list[track.Windows] = []
-
-    def rows(*given: object) -> NDArray[np.int64]:
-        used.append(given[2])  # type: ignore[arg-type]
-        return python(*given)  # type: ignore[arg-type]
-
+    used: list[int] = []
     python = track.rows
+
+    def rows(form: Tracking, lead: int) -> track.Rows:
+        used.append(lead)
+        return python(form, lead)
+
     track.compiled.cache_clear()
     monkeypatch.setattr(build, "find_compiler", lambda: None)
     monkeypatch.setattr(track, "rows", rows)
@@ -120,6 +120,18 @@ def test_without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     assert right.velocity.any()
     for name in ("velocity", "acceleration", "position_fine"):
         assert np.array_equal(found[name], right[name])
+
+
+def test_pieces_of_a_run_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ticks are computed some at a time, as if at once."""
+    spec = core(tick="100us", max_time="10ms")
+    position = np.cumsum(np.sign(np.sin(np.arange(300) / 20)).astype(np.int64))
+    trace = trace_of(np.cumsum(np.arange(300) % 60 * 300 + 500), position)
+    right = golden.run(spec, trace).updates
+    monkeypatch.setattr(track, "_PIECE", 7)
+    found = golden.run(spec, trace).updates
+    assert len(found) > 500
+    assert all(np.array_equal(found[name], right[name]) for name in right.columns)
 
 
 def places(start: str, gap: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
