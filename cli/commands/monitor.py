@@ -157,6 +157,7 @@ def monitor(
                 if recorder is not None:
                     stack.enter_context(recorder)
                 name = stack.enter_context(target.presence())
+                stop.orderly = True
                 label, described = target.label(name), target.manifest
                 session = Session(label, lambda: target.open(name), described, period, settings, screen.notice)
                 with screen:
@@ -194,6 +195,7 @@ def _selftest(target: Target) -> int:
 def _serve(target: Target, path: Path, seconds: Fraction | None) -> int:
     """Run a simulated board until it is stopped, for other programs."""
     with _interrupts() as stop, target.presence() as name:
+        stop.orderly = True
         with Outputs({"--serve": path}) as outputs:
             outputs["--serve"].write_text(json.dumps(target.manifest, indent=2) + "\n", encoding="utf-8", newline="\n")
         click.echo(name)
@@ -201,14 +203,22 @@ def _serve(target: Target, path: Path, seconds: Fraction | None) -> int:
     return 0
 
 
+class _Stop(threading.Event):
+    """Is set when the monitor shall end."""
+
+    orderly = False  # from the beginning of what must have an orderly end: a compilation has none
+
+
 @contextmanager
-def _interrupts() -> Iterator[threading.Event]:
-    """Yield an event that Ctrl-C, SIGTERM and SIGHUP set; later on they interrupt, but not while all is tidied up."""
-    stop = threading.Event()
+def _interrupts() -> Iterator[_Stop]:
+    """Yield what Ctrl-C, SIGTERM and SIGHUP set; before and later on they interrupt, but not while all is tidied up."""
+    stop = _Stop()
     begun = 0.0
 
     def hear(number: int, frame: FrameType | None) -> None:
         nonlocal begun
+        if not stop.orderly:
+            raise KeyboardInterrupt
         if not stop.is_set():
             begun = time.monotonic()
             stop.set()

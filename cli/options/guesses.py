@@ -27,8 +27,10 @@ _WORDS_OF = {
     "output": "dir export o out outdir",
     "ppr": "pulses resolution",
     "speeds": "range",
+    "trace counts": "csv",
     "tick": "fs period rate sample-time samples sampling ts",
     "unit": "units",
+    "vcd": "fst wave waveform waves",
     "velocity-width": "width",
 }
 

@@ -29,6 +29,7 @@ def print_checked(results: Sequence[Checked]) -> int:
         return 1
     n_files = sum(len(checked.files) for checked in results)
     played = sum(checked.simulated == "" for checked in results)
-    verdict = f"PASS: {n_files} files of {cores} are what the manifests say; {played} agree with the golden model"
+    agree = f"{played} agree with the golden model" if played else "none was simulated"
+    verdict = f"PASS: {n_files} files of {cores} are what the manifests say; {agree}"
     console.print(Text(verdict, style="bold green"), soft_wrap=True)
     return 0

@@ -1,6 +1,5 @@
 """Compares files of cores with what their manifests say, and the cores with the golden model, where they lie."""
 
-import importlib.util
 import json
 import os
 import re
@@ -57,9 +56,6 @@ design -stash {side}
 """
 
 
-NO_COCOTB = "to simulate, cocotb must be there: pip install cocotb; or take --no-simulation"
-
-
 @dataclass(frozen=True)
 class Make:
     """Makes the files of a core as texts by file name."""
@@ -113,7 +109,13 @@ def _is_manifest(path: Path) -> bool:
 
 
 def check(
-    path: Path, make: Make, *, simulation: bool = True, netlists: Sequence[Path] = (), waves: Path | None = None
+    path: Path,
+    make: Make,
+    *,
+    simulation: bool = True,
+    netlists: Sequence[Path] = (),
+    waves: Path | None = None,
+    say: Callable[[str], None] = lambda step: None,
 ) -> Checked:
     """Make the core of a manifest again, and compare its files and its behaviour with what lies beside the manifest.
 
@@ -127,14 +129,17 @@ def check(
         Verilog to be simulated in place of NAME.v, a netlist with the models of its cells, for example.
     waves : Path or None
         Folder for the waveform of a core that differs; it is made then.
+    say : callable
+        Told what is being done.
 
     Raises
     ------
     ValueError
         If the file is no manifest; if this version makes no such core.
     OSError
-        If there is no simulator, or it fails. Without cocotb files are compared all the same, and `why_not` says so.
+        If there is no cocotb or no simulator, or it fails.
     """
+    say("comparing its files")
     spec = of_manifest(path)
     written: dict[str, Any] = json.loads(read_text(path, MOST_JSON))
     name = str(written.get("module", ""))
@@ -155,7 +160,10 @@ def check(
         return checked
     if "bus" in written and spec is not spec.tachometer and spec.axes is None:
         return replace(checked, why_not="there is no bench for a loop on a bus")
-    return _simulated(checked, spec, name, sources, waves)
+    bench = cocotb_bench(spec, name)
+    clocks = json.loads(bench[f"{name}_vectors.json"])["clocks"]
+    say(f"playing {clocks} clocks on its Verilog")
+    return _simulated(checked, bench, name, sources, waves)
 
 
 def _expected(spec: AnySpec, name: str, written: Mapping[str, Any], folder: Path, make: Make) -> dict[str, str]:
@@ -261,15 +269,14 @@ def _equivalent(there: str, text: str, name: str, yosys: str) -> bool:
     return done.returncode == 0
 
 
-def _simulated(checked: Checked, spec: AnySpec, name: str, sources: Sequence[Path], waves: Path | None) -> Checked:
-    """Play a motion on Verilog in a folder of its own, and hold it against the golden model."""
-    bench = cocotb_bench(spec, name)
-    if importlib.util.find_spec("cocotb") is None:
-        return replace(checked, why_not=NO_COCOTB)
+def _simulated(
+    checked: Checked, bench: Mapping[str, str], name: str, sources: Sequence[Path], waves: Path | None
+) -> Checked:
+    """Play a bench on Verilog in a folder of its own, and hold it against the golden model."""
     with scratch() as folder:
         text = "\n".join(source.read_text(encoding="utf-8") for source in sources)
         described = checked.manifest.read_text(encoding="utf-8")
-        for file, content in (bench | {f"{name}.v": text, f"{name}.json": described}).items():
+        for file, content in {**bench, f"{name}.v": text, f"{name}.json": described}.items():
             (folder / file).write_text(content, encoding="utf-8")
         with patch.dict(os.environ, {} if waves is None else {"WAVES": "1"}):  # which cocotb reads
             done = run_tool([sys.executable, f"test_{name}.py"], folder)

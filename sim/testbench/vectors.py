@@ -28,7 +28,7 @@ from tachometry.spec.language.provenance import LICENSE, generator, notice
 
 # It has no hole: it reads its name and its data where it lies, so it is a program that linters and mypy read.
 _BENCH = files(__package__) / "templates" / "test_NAME.py"
-# Clocks of the motion, and five times as many of the standstill after it: Icarus takes some 40,000 a second.
+# Clocks of the motion, and at most five times as many of the standstill after it: Icarus takes some 40,000 a second.
 _MOVING = 160_000
 _FEWEST_TICKS, _MOST_TICKS = 3, 1000
 _ACTS = ("probe_arm", *LIST_PINS)  # inputs, or registers on a bus, which no bench writes
@@ -135,8 +135,7 @@ def usual_motion(spec: TachometerSpec, seed: int = 1, most: int = _MOVING) -> Re
     rest.
 
     With a compare output it goes over its first positions before that. It moves for at most so many clocks. The rest
-    outlasts the maximum time, so that the core reads zero, unless that takes as many as a million clocks for 160,000 of
-    them.
+    outlasts the maximum time, so that the core reads zero, if that takes at most five times as many; else it is short.
     """
     bounces = spec.filter_clocks and spec.encoder.sensor in ("quadrature", "pulses", "hall")
     encoder = VirtualEncoder.of(
@@ -180,7 +179,9 @@ def _usual_form(spec: TachometerSpec, longest: int, *, backward: bool) -> str:
     """Return the segments of `usual_motion`."""
     cycles, clock_hz = spec.timing.tick_cycles, spec.timing.clock_hz
     moving = max(min(longest, _MOST_TICKS * cycles), _FEWEST_TICKS * cycles)
-    standing = min(5 * longest, cycles * (8 * spec.timing.max_ticks // 5 + 10))
+    standing = cycles * (8 * spec.timing.max_ticks // 5 + 10)
+    if standing > 5 * longest:
+        standing = max(longest // 8, cycles)
     most = _fastest(spec)
     part = moving / 8 / clock_hz
 

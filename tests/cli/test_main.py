@@ -79,6 +79,10 @@ def test_ctrl_c_during_an_import(module: str, tmp_path: Path) -> None:
 COMMANDS = {
     "generate": (["generate", "--ppr", "9", "-o", "out"], "tachometry.cli.commands.generate.export"),
     "simulate": ([*SIMULATE, "--trace", "out/t.csv"], "tachometry.cli.options.outputs.write_trace"),
+    "monitor": (
+        "monitor sim:icebreaker --ppr 9 --max-speed 9rad/s --record out/r.csv".split(),
+        "tachometry.sim.engines.board.Cxxrtl",  # which compiles it
+    ),
 }
 
 
@@ -86,7 +90,7 @@ COMMANDS = {
 @pytest.mark.parametrize(
     ("stop", "command"),
     only_rows(
-        [("SIGINT", "generate"), ("SIGTERM", "simulate"), ("SIGHUP", "generate")],
+        [("SIGINT", "generate"), ("SIGTERM", "simulate"), ("SIGHUP", "generate"), ("SIGTERM", "monitor")],
         [(stop, command) for stop in ("SIGINT", "SIGTERM", "SIGHUP") for command in COMMANDS],
     ),
 )

@@ -301,6 +301,17 @@ def test_the_glitch_filter_tells_what_it_swallowed(capsys: pytest.CaptureFixture
     assert rows["mismatches"] == "0"
 
 
+def test_what_probes_have_latched_is_told_and_where_records_are(capsys: pytest.CaptureFixture[str]) -> None:
+    probes = ["--method", "s", "--stream", "axi", "--probe", "2", "--pulse", "probe_1:200ms"]
+    motion = ["--motion", "constant:15rpm:300ms"]
+    assert run("simulate", *CORE, *motion, *FEW_CLOCKS, *probes) == 0
+    rows = summary(capsys.readouterr().out)
+    assert rows["probes"] == "latched 1 time, the last that of probe 1 at position 20"
+    assert rows["stream"].endswith("with stream.dtype of the manifest")
+    assert run("simulate", *CORE, *motion, *FEW_CLOCKS, *probes[:-2]) == 0
+    assert summary(capsys.readouterr().out)["probes"].startswith("latched 0 times: --pulse probe_0:20ms ")
+
+
 def test_waveform_has_the_clock_and_curves_of_both_speeds(tmp_path: Path) -> None:
     core = "--method s --ppr 500 --clock 1MHz --tick 100us --max-speed 400rad/s --engine pysim".split()
     motion = f"--motion ramp:0:100rad/s:8ms --vcd {tmp_path / 'w.vcd'} --vcd-from 5ms --vcd-to 6ms".split()
