@@ -145,7 +145,7 @@ class Tracking:
         most = (1 << (WIDTH - 2)) - 16
         shown = self.max_count << self.velocity_out
         noises = 1 << (self.factor_bits - CHANCE_BITS - 1)  # one event among those that the noise is learned from
-        of_quality = math.log2(self.quality) + t - PLACE_BITS
+        of_quality = math.log2(self.quality) - a - t - 6 - 3 / 2  # over the roots of the order and of log_8
         logs = {
             "of_straight": math.log2(STRAIGHT) + of_quality, "of_curve": math.log2(CURVE) + of_quality, "none": -127,
             "log_3_2": math.log2(3 / 2), "log_9_4": math.log2(9 / 4), "log_8": 3, "log_32": 5, "log_64": 6,
@@ -158,7 +158,7 @@ class Tracking:
             **{name: fixed_log(value) for name, value in logs.items()},
             "past_4": fixed_log(2) + 1, "log_quarter": -fixed_log(2) - 1,
             "order": order, "order_lag": order - fixed_log(math.log2(3.5)),
-            "zero": 0, "one": 1, "three": 3, "minus_one": -1, "minus_two": -2,
+            "zero": 0, "one": 1, "three": 3, "minus_one": -1, "minus_two": -2, "fade": -5,
             "count": one, "half": one // 2, "almost_half": one // 2 - 1,
             "quarter": one // 4, "minus_quarter": -one // 4,
             "sixteenth": one // 16, "minus_sixteenth": -one // 16,

@@ -29,7 +29,7 @@ reset:                                  # before the first tick
     phase = minus_two
     quiet = zero
     since = zero
-    doubt = log_4 - order
+    doubt = log_8
     after = minus_one
 tick:
     if empty goto silent
@@ -68,12 +68,13 @@ known:
     near = raw - edge keep
     share = log_dt - log_T
     w = sum lo+ growing
-    step = zero
+    quick step = zero
     quick t = v + ~ product place
     quick $number by
     quick V = t - v + t
     small t = v + ~
     small V = sum + ~
+    small step = zero
     small t product place
     minus_sixteenth s+ near
     if pos goto event
@@ -108,7 +109,6 @@ heard:
     if neg goto slip
     log_e = ~
     e - mu over 2
-    slips = zero
     minus_D4 s+ e
     if pos goto alone
     mu = mu + ~ keep
@@ -135,9 +135,10 @@ few:
     v = V s+ ~
     log_X gain 2
     of_v + log_X - log_dt + ~ exp
-    t = log_T + log_T
+    quick t = log_T + log_T
     after = one
-    t = t + t - w
+    quick t = t + t - w
+    small t = log_T + log_T + log_T + log_T - w
     a = a s+ ~ keep log
     log_X + log_64                      # order one, where the acceleration is not seen
     if pos goto curved
@@ -149,8 +150,8 @@ few:
     quality = of_straight
     of_e = log_e + log_X
     vs = v s- ~
+    velocity = sum
     log_X gain 0
-    velocity = vs
     goto placed
 curved:
     as = a product velocity             # the velocity at the time when it is shown
@@ -179,9 +180,9 @@ place:                                  # and the place at the end of the tick
 shown:
     small tick by
     velocity product shown
-    w = doubt + log_X                   # D·√X, more if errors keep a sign
+    w = doubt + log_X - slips hi+ slips     # D·√X, more if errors keep a sign
     t = ~
-    w over 1
+    limit + w over 1
     quick slope by
     quality - log_T + ~ exp
     t min most_shown max least_shown out velocity
@@ -211,6 +212,7 @@ learn:                                  # nothing below is in a hurry
 short:
     small noises min noises_offset by
     before = e
+    slips = slips lo+ fade max none
     zero s+ t - D min w over by
     a keep
     t = zero s+ a min most
@@ -227,7 +229,7 @@ ready:                                  # growth of the memory and noise, for th
     lag log
     w = order_lag - log_X - limit
     after = minus_one
-    trouble = w + ~ + ~                 # lag² over 7/2 U
+    trouble = ~ + w + ~                 # lag² over 7/2 U
     D over 1
     log_X + log_256
     if pos goto scaled
@@ -235,7 +237,7 @@ ready:                                  # growth of the memory and noise, for th
     trouble = trouble - log_9_4
     t = minus_Ds + minus_Ds             # five D_s, as the memory is long
 scaled:
-    doubt = trouble + log_9_4 hi+ limit - order
+    doubt = trouble + log_9_4 hi+ log_8
     minus_D3 = minus_Ds + minus_Ds + minus_Ds
     minus_D4 = sum + t
     trouble
@@ -296,7 +298,7 @@ calm:
     goto sized
 slip:                                   # counts were lost or added, or the offset was upset
     o@last = o@last min quarter max minus_quarter
-    slips = slips + one
+    slips = slips hi+ one
     sum - three
     if pos goto begin
     log_dt + log_4 - log_T - one
@@ -315,7 +317,7 @@ young:
     if neg goto first
 begin:
     e = c - p keep log
-    slips = zero
+    slips = none
     edge = raw - moved
     of_velocity - log_dt + ~ exp
     phase = zero

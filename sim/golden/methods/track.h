@@ -20,7 +20,7 @@ struct Recursion : Tables {
       for (int bit = 0; bit < CHANCE_BITS; bit++) reversed[i] |= (int64_t)(i >> bit & 1) << (CHANCE_BITS - 1 - bit);
     noises = k.noises_first;
     noise = sure = k.quarter, alarm = 4 * sure;
-    log_share = -k.log_4;
+    log_share = -k.log_4, trouble = -k.log_9_4;
   }
 
   int64_t log2(int64_t x) const {
@@ -57,8 +57,8 @@ struct Recursion : Tables {
     int64_t shown = product(velocity, k.tick, k.shown);
     row[0] = std::max(-k.most_shown, std::min(shown, k.most_shown));
     row[1] = place;
-    int64_t more = std::max<int64_t>(trouble + k.log_9_4, 0);
-    int64_t deviation = power(round(more + log_limit - k.order + log_share, 1) + quality - log_memory, 1);
+    int64_t more = std::max<int64_t>(trouble + k.log_9_4, 0) + k.log_8;
+    int64_t deviation = power(round(std::max(more + log_share, slips) + log_limit, 1) + quality - log_memory, 1);
     row[2] = std::min(std::max(deviation, least), k.most_quality);
     row[3] = product(shown_a, k.slope, k.acceleration);
   }
@@ -109,13 +109,12 @@ struct Recursion : Tables {
     }
     int64_t log_e = log2(e);
     if (std::abs(e) >= k.half + n * k.count) {
-      slips++;
+      slips = std::max<int64_t>(slips, 0) + 1;
       offsets[kind] = std::max(-k.quarter, std::min(offsets[kind], k.quarter));
       if (slips >= 3 || log_dt + k.log_4 - log_memory - 1 >= 0) return begin(at, raw, tau, dt, log_dt);
       p = at - moved;
       return emit(ahead(), place());
     }
-    slips = 0;
     mean += round(e - mean, 2);
     if (std::abs(e) >= alarm) slow_until = 0, grown = std::min(grown, power(log_dt + k.log_8, 1));
     else if (2 * std::abs(mean) >= 3 * sure) slow_until = 0, grown = std::min(grown, power(log_dt + k.log_32, 1));
@@ -133,6 +132,7 @@ struct Recursion : Tables {
       shown_v -= power(log_at - k.of_slope, sign_of(a)), shown_a = 0, quality = k.of_straight;
     emit(ahead(), place());
     // What is learned.
+    slips = std::max(std::min<int64_t>(slips, 0) + k.fade, k.none);
     noises = std::min(noises + k.noises_one, k.noises_most);
     if (is_long && trouble < 0) change = e + round(e, 1);
     noise += round(std::min(std::abs(change) - noise, 3 * noise), shift(std::min(noises, k.noises_offset)));
@@ -163,7 +163,7 @@ struct Recursion : Tables {
   }
   void begin(int64_t at, int64_t raw, int64_t tau, int64_t dt, int64_t log_dt) {
     int64_t e = at - p;
-    phase = 2, slips = 0;
+    phase = 2, slips = k.none;
     v = shown_v = power(log2(e) + k.of_velocity - log_dt, sign_of(e));
     p = at - moved, edge = raw - moved;
     since = tau, memory = dt, log_memory = log_dt, log_share = k.log_quarter;

@@ -54,7 +54,7 @@ class Recursion:
         self.log_share = -k["log_4"]
         self.offsets = [0] * 4
         self.grows, self.log_growth = 1, 0
-        self.log_limit = self.trouble = 0
+        self.log_limit, self.trouble = 0, -k["log_9_4"]
         self._chance, self.quality = _HALF, 0
 
     # The arithmetic.
@@ -148,13 +148,12 @@ class Recursion:
             e = self._power(log2(rest_of) + k["log_64"] - log_n, -1 if rest_of < 0 else 1)
         log_e = log2(e)
         if abs(e) >= k["half"] + (n << PLACE_BITS):
-            self.slips += 1
+            self.slips = max(self.slips, 0) + 1
             self.offsets[kind] = max(-k["quarter"], min(self.offsets[kind], k["quarter"]))
             if self.slips >= 3 or log_dt + k["log_4"] - self.log_memory - 1 >= 0:
                 return self._begin(at, raw, tau, dt, log_dt)
             self.p = at - self._moved
             return self._emit(self._ahead())
-        self.slips = 0
         # A change of the speed leaves 8 or 32 events.
         quarter = self._round(e - self.mean, 2)
         self.mean += quarter
@@ -192,6 +191,7 @@ class Recursion:
     def _learn(self, n: int, e: int, change: int, kind: int) -> None:
         """Learn the noise, the lag and the offsets of the edges."""
         k, x = self._k, self.log_share
+        self.slips = max(min(self.slips, 0) + k["fade"], k["none"])
         self.noises = min(self.noises + k["noises_one"], k["noises_most"])
         shift = self._shift(min(self.noises, k["noises_offset"]))
         if x + k["log_256"] < 0 and self.trouble < 0:
@@ -241,7 +241,7 @@ class Recursion:
         """Take the speed from the event before to this one."""
         k = self._k
         e = at - self.p
-        self.phase, self.slips = TRACKS, 0
+        self.phase, self.slips = TRACKS, k["none"]
         self.v = self.shown_v = self._power(log2(e) + k["of_velocity"] - log_dt, -1 if e < 0 else 1)
         self.p, self.edge = at - self._moved, raw - self._moved
         self.since, self.memory, self.log_memory, self.log_share = tau, dt, log_dt, k["log_quarter"]
@@ -292,8 +292,8 @@ class Recursion:
         """Return what is shown, with a deviation of at least so many LSB."""
         k, place = self._k, self._place if place is None else place
         shown = self._product(velocity, k["tick"], "shown")
-        more = max(self.trouble + k["log_9_4"], 0)
-        noise = self._round(more + self.log_limit - k["order"] + self.log_share, 1)
+        more = max(self.trouble + k["log_9_4"], 0) + k["log_8"]
+        noise = self._round(max(more + self.log_share, self.slips) + self.log_limit, 1)
         return (
             max(-k["most_shown"], min(shown, k["most_shown"])),
             place,

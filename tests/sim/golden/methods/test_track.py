@@ -178,6 +178,21 @@ def test_quality_is_the_velocity_at_least_while_the_shaft_has_stopped() -> None:
     assert not found.quality[10_100:].any()
 
 
+def test_quality_is_greater_after_counts_were_lost() -> None:
+    """The place is that of one event then, which leaves an error in the velocity; this is forgotten, and so is that."""
+    spec, n, lost = core(), 20_000, 12_000
+    place = np.arange(1, n) + np.random.default_rng(3).normal(0, 0.1, n - 1)
+    clock = np.round(place * spec.timing.tick_cycles / 0.9).astype(np.int64)  # so a tick holds a count, or none
+    kept = np.r_[:lost, lost + 4 : n - 1]
+    found, at = golden.run(spec, trace_of(clock[kept], np.arange(1, len(kept) + 1))).updates, round(lost / 0.9)
+    wrong = np.abs(found.velocity - np.median(found.velocity))
+    before, after = found.quality[at - 10], found.quality[at + 10 : at + 3000]
+    assert wrong[at + 10 : at + 3000].max() > 20 * before
+    assert 0.5 < np.mean(wrong[at + 10 : at + 3000] <= after) < 0.9
+    assert after[0] > 15 * before
+    assert found.quality[-1] < 2 * before
+
+
 WORDS = ("noise", "noises", "turn", 0, 1, 2, 3)  # what outlives a rest; numbers are those of offsets
 _SETTLED, _RIGHT, _END = 900, 1300, 2400  # counts until an upset, after which all is right again, that are played
 
