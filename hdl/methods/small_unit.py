@@ -4,7 +4,7 @@ from amaranth import Array, C, Cat, Module, Mux, Signal, Value, signed
 
 from tachometry.hdl.methods.track_unit import Unit
 from tachometry.spec.formats.tracking import CHANCE_BITS, LOG_BITS, RESULT_BITS, WIDTH
-from tachometry.spec.formats.tracking_code import BY_FACTOR
+from tachometry.spec.formats.tracking_code import BY_FACTOR, Program
 from tachometry.spec.formats.tracking_units import Small, Start
 
 
@@ -15,17 +15,20 @@ class SmallUnit(Unit):
     it goes to the right by an odd number of places; its bits inverted if its logarithm is meant and it is negative.
     """
 
+    def __init__(self, program: Program) -> None:
+        super().__init__(program)
+        self.operand, self.with_sum = Signal(signed(WIDTH), reset_less=True), self.start
+
     @property
     def factor_bits(self) -> int:
         return 2 * Small(self._program.form).digits
 
     def _work(self, m: Module) -> None:
-        bits, doing, table = self._bits, self.doing, self.table.data
+        bits, doing, table, operand = self._bits, self.doing, self.table.data, self.operand
         small = Small(self._program.form)
         low, width, end = small.low, small.low + WIDTH, small.log_end
         reads, adds, shifts = (Signal(name=name) for name in ("reads", "adds", "shifts"))  # else it rests
         work = Signal(signed(width), reset_less=True)
-        operand = Signal(signed(WIDTH), reset_less=True)
         steps = Signal(range(small.digits + 1), reset_less=True)
         pairs = Signal(signed(6), reset_less=True)  # of places that it went; below 0 those that it is still to go
         names = ("log", "factor", "product", "power", "read", "doubled", "extreme")
@@ -145,11 +148,16 @@ class SmallUnit(Unit):
                 is_read.eq((doing == Start.EXP) | (doing == Start.GAIN)),
                 extreme.eq((doing == Start.EXP) & (too_small | (~whole[-1] & whole[6:-1].any()))),
                 doubled.eq(odd),
-                operand.eq(self.sum),
             ]
+        # What is to be above what is read, as 0 where that is no logarithm: a reset takes no cells.
+        places = Signal(6, reset_less=True)
+        m.d.sync += places.eq(Cat(work[end + 1], pairs[:5]))
+        with m.If(~(ends & is_log)):
+            m.d.sync += places.eq(0)
+        with m.If(starts):
+            m.d.sync += operand.eq(self.sum)
         with m.If(reads & is_read):
-            read = Mux(is_log, Cat(table[:LOG_BITS], work[end + 1], pairs[:5]), table)
-            m.d.sync += [operand.eq(read << small.table_place), is_log.eq(0)]
+            m.d.sync += [operand.eq(Cat(C(0, small.table_place), table | (places << LOG_BITS))), is_log.eq(0)]
         with m.If(ends):
             m.d.sync += [is_read.eq(1), self.up.eq(both[CHANCE_BITS] & ~large)]
         with m.If(ends & is_factor):

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from functools import reduce
-from operator import and_
+from operator import and_, or_
 
 from amaranth import Array, C, Cat, Module, Mux, Shape, Signal, Value, signed
 from amaranth.lib import data, wiring
@@ -93,6 +93,10 @@ class TrackMachine(wiring.Component):
     stages, there is a register in front of the memory of words and one behind it. All wait while one needs the unit,
     and that is busy.
 
+    Where a word is read at a time, cells are saved: the sum is cleared where the next instruction does not take it, and
+    inputs are cleared where they are not read, as a reset of registers takes no cell. So the unit and the outputs take
+    what the adder gives, and not the sum a clock later.
+
     Parameters
     ----------
     program : Program
@@ -170,10 +174,11 @@ class TrackMachine(wiring.Component):
         place = Signal.like(pc)
         coming, valid = data.View(layout, fetch.data), fetched
         address, word = self._at(self._chosen(m, coming.word)), read.data
-        if program.times.stages > 1:
+        two = program.times.ports > 1
+        if not two:
             held = Signal.like(Value.cast(address), reset_less=True)
             word = Signal(signed(WIDTH), reset_less=True)
-            m.d.sync += [held.eq(Mux(hold, held, address)), word.eq(Mux(hold, word, read.data))]
+            m.d.sync += held.eq(Mux(hold, held, address))
             address = held
         m.d.comb += [
             place.eq(Mux(taken, Cat(now.how, now.store), pc)),
@@ -184,19 +189,21 @@ class TrackMachine(wiring.Component):
             go.eq(active & ~hold),
         ]
         added = C(0, signed(WIDTH))
-        two = program.times.ports > 1
         if two:
             second = words.read_port()
             m.d.comb += [second.addr.eq(self._at(coming.first)), second.en.eq(~hold)]
             added = second.data
+        earlier = coming
         for _ in range(program.times.stages - 1):
+            earlier = coming
             following = Signal(layout, reset_less=True)
             follows = Signal()
             with m.If(~hold):
                 m.d.sync += [following.eq(coming), follows.eq(valid & ~taken & ~stop)]
             coming, valid = following, follows
+        follows = valid & ~taken & ~stop
         with m.If(~hold):
-            m.d.sync += [now.eq(coming), active.eq(valid & ~taken & ~stop)]
+            m.d.sync += [now.eq(coming), active.eq(follows)]
         with m.If((fetched & ~hold) | self.begin):
             m.d.sync += pc.eq(state_after(place))
         with m.If(stop):
@@ -207,27 +214,38 @@ class TrackMachine(wiring.Component):
             m.d.sync += fetched.eq(1)
         # The adder.
         sum_ = Signal(signed(WIDTH), reset_less=True)
-        negative = sum_[-1]
+        negative = sum_[-1] if two else Signal()
         sign = Signal()
         left = Signal(signed(WIDTH))
         right = Signal(signed(WIDTH))
         total = Signal(signed(WIDTH))
         minus = Signal()
         carry = Signal()
-        least_or_sum, most_or_sum = Value.cast(now.left)
+        choice, below = (now.left, negative) if two else (coming.left, Mux(go, total[-1], negative))
+        least_or_sum, most_or_sum = Value.cast(choice)
         used = Signal(attrs={"keep": "true"})
-        m.d.comb += used.eq(Mux(negative, least_or_sum, most_or_sum))
+        m.d.comb += used.eq(Mux(below, least_or_sum, most_or_sum))
         # Where no word is meant one is read that is 0, and so is an input where none is; it is a first term.
         from_unit = Signal()
-        given = Signal(signed(WIDTH), reset_less=True)
-        with m.If(~hold):
-            m.d.sync += [from_unit.eq(coming.from_unit), given.eq(0)]
-            term = coming.first if two else coming.word
-            with m.If(term[3:] == FIRST_INPUT >> 3):
-                m.d.sync += given.eq(self._inputs()[term[:3]])
+        inputs = self._inputs()
+        if two:
+            given = Signal(signed(WIDTH), reset_less=True)
+            with m.If(~hold):
+                m.d.sync += [from_unit.eq(coming.from_unit), given.eq(0)]
+                with m.If(coming.first[3:] == FIRST_INPUT >> 3):
+                    m.d.sync += given.eq(Array((*inputs, C(0)))[coming.first[:3]])  # as many as its index tells
+        else:
+            given = [Signal.like(value, reset_less=True, name=name) for name, value in zip(INPUTS, inputs, strict=True)]
+            with m.If(~hold):
+                m.d.sync += [from_unit.eq(coming.from_unit), word.eq(reduce(or_, given, read.data))]
+                m.d.sync += Cat(given).eq(Cat(inputs))
+            for number, one in enumerate(given):
+                with m.If(~hold & (earlier.word != FIRST_INPUT + number)):
+                    m.d.sync += one.eq(0)
+            m.d.sync += negative.eq(below)
         flipped = (right ^ minus.replicate(WIDTH))[:WIDTH]
         m.d.comb += [
-            left.eq(Mux(used, sum_, 0) | given | added),
+            left.eq(Mux(used, sum_, 0) | given | added if two else sum_),
             right.eq(word | Mux(from_unit, unit.result, 0)),
             minus.eq(now.subtract ^ (now.by_sign & sign)),
             carry.eq(minus ^ (from_unit & unit.up)),
@@ -235,6 +253,9 @@ class TrackMachine(wiring.Component):
         ]
         with m.If(go):
             m.d.sync += sum_.eq(total)
+        if not two:
+            with m.If(~hold & follows & ~used):
+                m.d.sync += sum_.eq(0)
         with m.If(go & now.keep):
             m.d.sync += sign.eq(total[-1])
         m.d.comb += [
@@ -243,11 +264,13 @@ class TrackMachine(wiring.Component):
             write.data.eq(total),
         ]
         shows = Signal(3)
-        m.d.sync += shows.eq(Mux(go, now.output, 0))
+        domain = m.d.sync if two else m.d.comb
+        domain += shows.eq(Mux(go, now.output, 0))
+        made = sum_ if two else total
         for number, name in enumerate(OUTPUTS):
             if name:
                 with m.If(shows == number):
-                    m.d.sync += getattr(self, name).eq(sum_)
+                    m.d.sync += getattr(self, name).eq(made)
         # The unit.
         uses = from_unit | reduce(and_, (now.start != start for start in Start if not program.times.of(start)))
         m.d.comb += [
@@ -255,7 +278,7 @@ class TrackMachine(wiring.Component):
             unit.begin.eq(self.begin),
             unit.start.eq(Mux(go, now.start, Start.NONE)),
             unit.how.eq(now.how),
-            unit.sum.eq(sum_),
+            unit.sum.eq(made),
         ]
         # Jumps.
         empty, one = ~self.number.any(), self.number == 1
@@ -279,12 +302,11 @@ class TrackMachine(wiring.Component):
     def _is_last(self) -> Value:
         return self.axis == len(self._axes) - 1 if len(self._axes) > 1 else C(1, 1)
 
-    def _inputs(self) -> Array[Value]:
+    def _inputs(self) -> list[Value]:
         """Return the inputs of the tick as words."""
         t = self._program.form.time_bits
         shifts = {"counts": PLACE_BITS, "places": _PLACES_BITS, "times": t, "last": t, "moved": PLACE_BITS, "length": t}
-        values = (getattr(self, "number" if name == "counts" else name) << shifts.get(name, 0) for name in INPUTS)
-        return Array((*values, C(0)))  # as many as its index tells
+        return [getattr(self, "number" if name == "counts" else name) << shifts.get(name, 0) for name in INPUTS]
 
     def _chosen(self, m: Module, word: Value) -> Value:
         """Return the address of a word, which may be one that the tick chooses among the offsets."""

@@ -48,7 +48,7 @@ class Unit(wiring.Component):
     how : In
         Number of the shift, or of the table of gains.
     sum : In(signed)
-        The operand, a clock later.
+        The operand: of the quick unit a clock later.
     busy : Out(1)
         The result is not there yet.
     result : Out(signed)
@@ -61,6 +61,7 @@ class Unit(wiring.Component):
         self._bits = program.form.factor_bits
         self.factor = Signal(self.factor_bits, reset_less=True)
         self.places = Signal(6, reset_less=True)
+        self.doing = Signal(Start)
         super().__init__(
             {
                 "begin": In(1),
@@ -72,28 +73,28 @@ class Unit(wiring.Component):
                 "up": Out(1),
             }
         )
+        self.operand, self.with_sum = self.sum, self.doing  # in the clock after the start; what begins with the sum
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        self.doing = Signal(Start)
         self.how_done = Signal(HOW_BITS)
         m.d.sync += [self.doing.eq(self.start), self.how_done.eq(self.how)]
         # The number of the event, its bits reversed.
         self.chance = Signal(CHANCE_BITS)
         with m.If(self.begin):
             m.d.sync += self.chance.eq(1 << CHANCE_BITS - 1)
-        with m.Elif(self.doing == Start.CHANCE):
+        with m.Elif(self.with_sum == Start.CHANCE):
             m.d.sync += self.chance.eq(Cat(reversed(self.sum[:CHANCE_BITS])))
         values = self._program.tables
         m.submodules.tables = tables = Memory(shape=TABLE_BITS, depth=1 << (len(values) - 1).bit_length(), init=values)
         self.table = tables.read_port()
         # The place in a table of gains: 16 an octave, from X = 1/4 on.
-        place = (~self.sum)[_GAIN_LOW : _GAIN_LOW + 9]
+        place = (~self.operand)[_GAIN_LOW : _GAIN_LOW + 9]
         beyond = place[8] | (place[7] & place[5:7].any())  # beyond the last
         gain = Mux(beyond, GAINS_FROM - 1, place[: GAINS.bit_length() - 1])
         self.gain_address = Cat(gain, (self.how_done[:2] + (len(values) - 3 * GAINS) // GAINS)[:3])
-        self.power_address = self.sum[LOG_BITS - EXP_INDEX : LOG_BITS]
-        self.whole = self.sum[LOG_BITS : LOG_BITS + 9].as_signed()
+        self.power_address = self.operand[LOG_BITS - EXP_INDEX : LOG_BITS]
+        self.whole = self.operand[LOG_BITS : LOG_BITS + 9].as_signed()
         shifts = self._program.shifts
         self.shifts = (*shifts, *[(Start.OVER, 0)] * ((1 << HOW_BITS) - len(shifts)))
         self._work(m)

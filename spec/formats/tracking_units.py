@@ -41,8 +41,8 @@ class Times:
 
     @property
     def fetch_clocks(self) -> int:
-        """Clocks to fetch the first instruction, to read its word, and to hold the result twice."""
-        return self.stages + 3
+        """Clocks to fetch the first instruction, to read its word, and to hold the result; with two ports twice."""
+        return self.stages + 1 + self.ports
 
     def of(self, start: Start) -> int:
         """Return those of what begins; 0: nothing."""

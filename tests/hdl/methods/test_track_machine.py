@@ -69,8 +69,9 @@ def test_gains_end_with_their_table(name: str) -> None:
     for log_x in range(-2 * 4096 - 1, -13 * 4096, -1777):
         for number in range(3):
             how = program.number(Instruction(start=Start.GAIN, how=str(number)))
-            # The sum comes with the clock after the start.
-            rows += [{"start": Start.GAIN, "how": how}, *[{"start": Start.NONE, "sum": log_x}] * (clocks - 1)]
+            # The quick unit takes the sum in the clock after the start.
+            begins = {"start": Start.GAIN, "how": how, "sum": log_x}
+            rows += [begins, *[begins | {"start": Start.NONE}] * (clocks - 1)]
             state = Recursion(program.form, program.lead)
             state.log_share = log_x
             right.append(state._gain(number))
