@@ -25,7 +25,7 @@ def _sums(*sums: tuple[Value, Value, Value]) -> list[Value]:
 
 
 class TickCounts(wiring.Component):
-    """Adds up times and places of the counts of each tick; the outputs are valid two clocks after it, until the next.
+    """Adds up times and places of the counts of each tick; they are valid from two clocks after it until the next ends.
 
     Members
     -------
@@ -90,39 +90,44 @@ class TickCounts(wiring.Component):
         fresh = Signal()
         position = Signal(2)
         counts, backward = self.step.any(), self.step[-1]
-        before = Mux(fresh, 0, number)
-        way = Mux(fresh, 0, moved)
         takes = Signal()
-        m.d.comb += takes.eq(counts & (before != form.most_number))
+        m.d.comb += takes.eq(counts & (number != form.most_number))
         # A count backward has its place one below that of a count forward.
-        lower = Cat(bit ^ (backward & ~way[:number].any()) for number, bit in enumerate(way[: form.number_bits + 1]))
+        lower = Cat(bit ^ (backward & ~moved[:place].any()) for place, bit in enumerate(moved[: form.number_bits + 1]))
         place = Cat(C(0, 1), lower & takes.replicate(len(lower))).as_signed()  # and one more
         next_last, next_times, next_moved, next_places, waited = _sums(
             (last, C(0, 1), C(1, 1)),
             (times, number & ~1, number[0]),
-            (way, backward.replicate(len(way)), counts & ~backward),
-            (Mux(fresh, 0, places), place, takes),
+            (moved, backward.replicate(len(moved)), counts & ~backward),
+            (places, place, takes),
             (self.elapsed, C(0, 1), self.elapsed != self._max_ticks),
         )
         m.d.sync += [
             fresh.eq(self.tick),
             position.eq(position + self.step),
             last.eq(Mux(counts, 0, next_last)),
-            moved.eq(next_moved),
             times.eq(Mux(fresh, 0, next_times)),
-            number.eq(before + takes),
-            places.eq(next_places),
         ]
         with m.If(takes):
             m.d.sync += [kind.eq((position - backward)[:2]), down.eq(backward)]
-        counted = Signal()
-        m.d.comb += counted.eq(self.number.any())
-        with m.If(fresh):
-            values = (number, times, places, kind, down, last, moved)
-            m.d.sync += [getattr(self, name).eq(value) for name, value in zip(of_tick, values, strict=True)]
+        # These begin anew with the tick: as a reset of registers that takes no cells.
+        next_number = number + takes
+        m.d.sync += [number.eq(next_number), moved.eq(next_moved), places.eq(next_places)]
+        with m.If(self.tick):
             m.d.sync += [
+                *(value.eq(0) for value in (number, moved, places)),
+                self.number.eq(next_number),
+                self.moved.eq(next_moved),
+                self.places.eq(next_places),
+                self.elapsed.eq(Mux(self.number.any(), 1, waited)),
+            ]
+        with m.If(fresh):
+            m.d.sync += [
+                self.times.eq(times),
+                self.kind.eq(kind),
+                self.down.eq(down),
+                self.last.eq(last),
                 self.end.eq(position),
-                self.elapsed.eq(Mux(counted, 1, waited)),
             ]
         if form.external:
             length = Signal.like(self.length, name="open_length", init=1)

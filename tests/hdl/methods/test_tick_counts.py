@@ -56,7 +56,7 @@ def expected(counts: Mapping[int, int], lengths: list[int]) -> list[dict[str, in
 
 
 def run(form: Tracking, counts: Mapping[int, int], lengths: list[int]) -> list[dict[str, int]]:
-    """Return what is shown two clocks after each tick, and until the next."""
+    """Return what is shown two clocks after each tick, and until the next ends."""
     ends = (np.cumsum(lengths) - 1).tolist()
     rows = [{"tick": 0, "step": counts.get(clock, 0)} for clock in range(ends[-1] + 3)]
     for end in ends:
@@ -64,7 +64,7 @@ def run(form: Tracking, counts: Mapping[int, int], lengths: list[int]) -> list[d
     seen = clock_by_clock(tick_counts.TickCounts(form, MAX_TICKS), rows, [*NAMES, "elapsed"])
     for end, following in zip(ends, [*ends[1:], ends[-1] + 1], strict=True):
         held = [name for name in [*NAMES, "elapsed"] if name != "length"]
-        assert all(row[name] == seen[end + 2][name] for row in seen[end + 2 : following + 2] for name in held)
+        assert all(row[name] == seen[end + 2][name] for row in seen[end + 2 : following + 1] for name in held)
     return [seen[end + 2] for end in ends]
 
 

@@ -69,6 +69,8 @@ module tick_counts #(
   wire [A-1:0] before = fresh ? 0 : total;
   wire signed [S-1:0] way_before = fresh ? 0 : way_, spots_before = fresh ? 0 : spots;
   wire taken = count && before < MOST;
+  wire [A-1:0] after = before + taken;
+  wire signed [S-1:0] way_after = way_before + step, spots_after = spots_before + (taken ? 2 * way_before + step : 0);
   always @(posedge clk)
     if (rst) begin
       {fresh, any, backward, through, total, since, ages, spots, way_, at, of_last, clocks} <= 0;
@@ -80,19 +82,22 @@ module tick_counts #(
       fresh <= tick;
       through <= fresh ? 1 : through + 1;
       at <= at + step;
-      way_ <= way_before + step;
-      total <= taken ? before + 1 : before;
+      way_ <= way_after;
+      total <= after;
       ages <= taken ? {older, {A{1'b0}}} : older;
       any <= count || (any && !fresh);
       since <= count ? 0 : since + 1;
-      spots <= taken ? spots_before + 2 * way_before + step : spots_before;
+      spots <= spots_after;
       if (taken) {of_last, backward} <= {step == 1 ? at : at - 2'd1, step != 1};
-      if (tick) length_ <= clocks + 1;
-      if (fresh) begin
-        {number_, times_, places_, moved_, at_end} <= {total, sum_ages, spots, way_, at};
-        if (any) {kind_, down_, last_} <= {of_last, backward, since};
+      if (tick) begin
+        length_ <= clocks + 1;
+        {number_, places_, moved_} <= {after, spots_after, way_after};
         elapsed_ <= silent >= MAX_TICKS ? MAX_TICKS : silent + 1;
-        silent <= total != 0 ? 0 : silent >= MAX_TICKS ? MAX_TICKS : silent + 1;
+        silent <= after != 0 ? 0 : silent >= MAX_TICKS ? MAX_TICKS : silent + 1;
+      end
+      if (fresh) begin
+        {times_, at_end} <= {sum_ages, at};
+        if (any) {kind_, down_, last_} <= {of_last, backward, since};
       end
     end
 
@@ -109,12 +114,13 @@ module tick_counts #(
     pk_times: assert (times == times_);
     pk_places: assert (places == places_);
     pk_moved: assert (moved == moved_ && end_ == at_end);
-    pk_of_count: assert (number == 0 || (kind == kind_ && down == down_ && last == last_));
+    pk_of_count: assert (fresh || number == 0 || (kind == kind_ && down == down_ && last == last_));
     pk_elapsed: assert (elapsed == elapsed_);
     pk_length: assert (length_ == 0 || length == length_);
-    lemma_number: assert (core_number == total && total <= MOST && any == (total != 0));
+    lemma_number: assert (core_number == before && total <= MOST && any == (total != 0));
+    lemma_shown: assert (!fresh || number == total);
     lemma_times: assert (core_times == sum_ages);
-    lemma_places: assert (core_places == spots && core_moved == way_);
+    lemma_places: assert (core_places == spots_before && core_moved == way_before);
     lemma_of_count: assert (!any || (core_kind == of_last && core_down == backward && core_last == since));
     lemma_since: assert (!any || since < through);
     lemma_position: assert (core_position == at && core_fresh == fresh);
