@@ -1,6 +1,6 @@
 """The machine of the tracking method: one adder, one accumulator, a memory, a program, and a unit."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import reduce
 from operator import and_, or_
 
@@ -260,7 +260,7 @@ class TrackMachine(wiring.Component):
             m.d.sync += sign.eq(total[-1])
         m.d.comb += [
             write.en.eq(go & now.writes),
-            write.addr.eq(self._at(Mux(now.store[3:ADDRESS_BITS].all(), self.kind, now.store[:ADDRESS_BITS]))),
+            write.addr.eq(self._at(self._stored(now.store))),
             write.data.eq(total),
         ]
         shows = Signal(3)
@@ -308,14 +308,29 @@ class TrackMachine(wiring.Component):
         shifts = {"counts": PLACE_BITS, "places": _PLACES_BITS, "times": t, "last": t, "moved": PLACE_BITS, "length": t}
         return [getattr(self, "number" if name == "counts" else name) << shifts.get(name, 0) for name in INPUTS]
 
+    def _stored(self, word: Value) -> Value:
+        """Return the address of a word that is stored, which may be the offset of the last count's edge."""
+        return self._offset(word, Cat(self.kind, word[2]))
+
     def _chosen(self, m: Module, word: Value) -> Value:
-        """Return the address of a word, which may be one that the tick chooses among the offsets."""
+        """Return the address of a word that is read, which may be one that the tick chooses among the offsets."""
         chosen = Signal(ADDRESS_BITS)
-        special = word[3:].all()
-        offsets = {"o@last": self.kind, "o@up": self.end, "o@down": (self.end - 1)[:2]}
-        for number, name in enumerate(("o@m1", "o@m2", "o@m3")):
-            kind = Mux(self.down, self.kind + number, self.kind - number)[:2]
-            offsets[name] = Mux(self.number[:2] > number, kind, self._program.addresses["zero"])
-        which = Array((*(offsets[name] for name in CHOSEN), *(8 - len(CHOSEN)) * [C(0)]))[word[:3]]
-        m.d.comb += chosen.eq(Mux(special, which, word))
+        back = Cat(C(1, 1), ~self.down)  # −1; 1 if it went backward
+        ways = {"o@down": C(-1, 2), "o@m2": back, "o@m3": C(2, 2)}
+        least = {"o@m1": 1, "o@m2": 2, "o@m3": 3}  # of n mod 4
+        names = (*CHOSEN, *[""] * (8 - len(CHOSEN)))
+
+        def of_name(choices: Iterable[Value]) -> Value:
+            return Array(choices)[word[:3]]
+
+        of_end = of_name(C(name in ("o@up", "o@down"), 1) for name in names)
+        kind = Mux(of_end, self.end, self.kind) + of_name(ways.get(name, C(0, 2)) for name in names)
+        none = of_name(self.number[:2] < least.get(name, 0) for name in names)
+        m.d.comb += chosen.eq(self._offset(word, Mux(none, 4, kind[:2])))
         return chosen
+
+    @staticmethod
+    def _offset(word: Value, place: Value) -> Value:
+        """Return the address of a word, or that of the one at a place among the offsets, and the zero behind them."""
+        special = word[3:ADDRESS_BITS].all()
+        return Cat(Mux(special, place, word[:3]), word[3 : ADDRESS_BITS - 1], word[ADDRESS_BITS - 1] & ~special)

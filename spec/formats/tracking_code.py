@@ -44,6 +44,7 @@ CHOSEN = ("o@last", "o@up", "o@down", "o@m1", "o@m2", "o@m3")  # an offset that 
 OUTPUTS = ("", "velocity", "position_fine", "quality", "acceleration")
 ADDRESS_BITS = 7
 FIRST_CHOSEN = (1 << ADDRESS_BITS) - 8  # address of what the tick chooses
+FIRST_OFFSET = FIRST_CHOSEN - (1 << ADDRESS_BITS - 1)  # another bit, so that few cells choose
 FIRST_INPUT = FIRST_CHOSEN - 8  # of inputs: the words there are 0
 _LEFTS = {"lo+": Left.LEAST, "hi+": Left.MOST}
 
@@ -318,12 +319,13 @@ class Program:
 
     @cached_property
     def words(self) -> dict[str, int]:
-        """First contents of all words by name: offsets, what changes, constants."""
+        """First contents of all words by name: what changes, constants; before those from half on the offsets."""
         used = [name for one in self.code.instructions for name in (*one.reads, one.store)]
         names = dict.fromkeys(name for name in used if name and name not in CHOSEN)
-        changing = [name for name in names if name not in self.constants and name not in OFFSETS]
-        fixed = [name for name in self.constants if name in names or name == "zero"]  # in the place of no offset
-        return {name: self.constants.get(name, 0) for name in (*OFFSETS, "zero", *changing, *fixed)}
+        chosen = (*OFFSETS, "zero")  # which is in the place of no offset
+        others = [name for name in names if name not in self.constants and name not in chosen]
+        others += [name for name in self.constants if name in names and name not in chosen]
+        return {name: self.constants.get(name, 0) for name in (*others[:FIRST_OFFSET], *chosen, *others[FIRST_OFFSET:])}
 
     @cached_property
     def addresses(self) -> dict[str, int]:
