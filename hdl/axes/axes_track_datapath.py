@@ -26,6 +26,13 @@ def tick_layout(axis: TrackAxis) -> data.StructLayout:
     return data.StructLayout({**shapes, "overflow": 1, "stalled": 1})
 
 
+def kept_layout(axis: TrackAxis) -> data.StructLayout:
+    """Return what is kept of an axis from turn to turn: its position, and how long it has been silent."""
+    most = axis.timing.max_ticks
+    shapes = {"position": signed(axis.position_width), "elapsed": range(most + 1), "counted": 1}
+    return data.StructLayout({**shapes, "silent": range(most + 2)})
+
+
 class AxesTrackDatapath(wiring.Component):
     """Tracking datapath that the axes have in turn; as many machines as all turns of a tick need.
 
@@ -109,24 +116,11 @@ class AxesTrackDatapath(wiring.Component):
         return m
 
     def _shown(self, m: Module) -> tuple[Signal, Signal, data.View, data.View]:
-        """Return a strobe, whose turn is shown with it, and what is new: it is added up once for all machines.
-
-        The position and the silence of every axis are in a memory.
-        """
-        axis, most = self._axis, self._axis.timing.max_ticks
-        kept = data.StructLayout(
-            {
-                "position": signed(axis.position_width),
-                "elapsed": range(most + 1),
-                "counted": 1,
-                "silent": range(most + 2),
-            }
-        )
-        m.submodules.state = state = Memory(shape=kept, depth=max(self._spec.axes, 2), init=[], attrs=BLOCK)
+        """Return a strobe, whose turn is shown with it, and what is new: it is added up once for all machines."""
+        layout = kept_layout(self._axis)
+        m.submodules.state = state = Memory(shape=layout, depth=max(self._spec.axes, 2), init=[], attrs=BLOCK)
         read = state.read_port()
         write = state.write_port()
-        before = Signal(kept)
-        after = Signal(kept)
         # Strobes of every machine in four clocks of its turn; no two machines have the same one at once.
         comes = [turns.comes for turns in self.machines]
         reads = delay(m, *comes)
@@ -134,11 +128,19 @@ class AxesTrackDatapath(wiring.Component):
         shows = delay(m, *adds)
         m.d.comb += read.addr.eq(self._of(comes, "axis"))
         (of_axis,) = delay(m, read.addr, clocks=SHOWN_AFTER - 1)
-        layout = turn_layout(axis)
-        known = Signal(layout)
-        found = Signal(layout)
+        known = Signal(turn_layout(self._axis))
+        found = Signal(turn_layout(self._axis))
         m.d.comb += [known.eq(self._of(reads, "turn")), found.eq(self._of(shows, "turn"))]
-        m.d.sync += before.eq(read.data)
+        after, counts = self._added(m, read.data, known)
+        m.d.comb += [write.addr.eq(of_axis), write.data.eq(after), write.en.eq(reduce(or_, shows))]
+        return self._held(m, write.en, of_axis, after, counts, found)
+
+    def _added(self, m: Module, kept: data.View, known: data.View) -> tuple[data.View, Sequence[Value]]:
+        """Return what is kept of an axis from this turn on, and its counts of the tick with their overflow."""
+        axis, most = self._axis, self._axis.timing.max_ticks
+        before = Signal(kept_layout(axis))
+        after = Signal(kept_layout(axis))
+        m.d.sync += before.eq(kept)
         with m.If(known.first):
             m.d.sync += [before.position.eq(0), before.elapsed.eq(most), before.counted.eq(0), before.silent.eq(1)]
         moved, counted = delay(m, known.moved, known.counted)
@@ -155,21 +157,26 @@ class AxesTrackDatapath(wiring.Component):
             after.counted.eq(counted),
             after.silent.eq(Mux(moved.any(), 0, before.silent + ~long)),
         ]
-        pulses, overflow = delay(m, pulses, overflow)
+        return after, delay(m, pulses, overflow)
+
+    def _held(
+        self, m: Module, now: Value, of_axis: Signal, after: data.View, counts: Sequence[Value], found: data.View
+    ) -> tuple[Signal, Signal, data.View, data.View]:
+        """Return a strobe a clock after `now`, and what holds with it from then on."""
+        axis = self._axis
         valid = Signal()
         whose = Signal.like(self.axis)
         ticks = Signal(tick_layout(axis))
         new = Signal(update_layout(axis))
-        m.d.comb += [write.addr.eq(of_axis), write.data.eq(after), write.en.eq(reduce(or_, shows))]
-        m.d.sync += valid.eq(write.en)
+        m.d.sync += valid.eq(now)
         rounded = (after.position << axis.fine_bits) + (found.place >> 1) + found.place[0]
-        with m.If(write.en):
+        with m.If(now):
             m.d.sync += [
                 whose.eq(of_axis),
                 ticks.position.eq(after.position),
-                ticks.stalled.eq(after.silent == most + 1),
-                ticks.pulse_count.eq(pulses),
-                ticks.overflow.eq(overflow),
+                ticks.stalled.eq(after.silent == axis.timing.max_ticks + 1),
+                ticks.pulse_count.eq(counts[0]),
+                ticks.overflow.eq(counts[1]),
                 *(new[name].eq(found[name]) for name in ("velocity", "acceleration", "quality")),
                 new.position_fine.eq(rounded),
                 new.interval.eq(after.elapsed),
