@@ -20,9 +20,10 @@ def axes_rows(spec: AxesSpec) -> list[tuple[str, str]]:
         **{name: plural(clocks, "clock") for name, clocks in latencies.items()},
         "tick_to_velocity": "0 clocks: velocity_valid comes together with tick",
     }
+    on = f", on {spec.plan.machines} machines" if spec.plan.machines > 1 else ""
     turns = (
         f"{spec.axes}, each looked at every {plural(spec.slots, 'clock')} and computed in "
-        f"{plural(spec.turn_cycles, 'clock')} of a tick"
+        f"{plural(spec.turn_cycles, 'clock')} of a tick{on}"
     )
     rows = [(name, own.get(name, value)) for name, value in configuration(alone) if name != "note"]
     late = f"{short_time(spec.times.seconds(spec.latency.tick))} from the end of a tick to the last axis' velocity"

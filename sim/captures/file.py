@@ -98,7 +98,7 @@ def choose_channels(
     others : mapping of str to str or int
         Likewise, of further lines by their names.
     vectors : mapping from number to name
-        Channels that are numbers: `name[1]` is bit 1.
+        Channels that are numbers: `name[1]`, or `name1` if there is no such channel, is bit 1.
 
     Raises
     ------
@@ -119,9 +119,9 @@ def choose_channels(
             return Line(wanted) if wanted is not None and wanted in channels else None
         if (number := _named(channels, wanted)) is not None:
             return Line(number)
-        if match := re.fullmatch(r"(.+)\[([0-9]{1,7})\]", wanted):
-            number = _named(vectors, match[1])
-            return None if number is None else Line(number, int(match[2]))
+        bit = re.fullmatch(r"(.+?)\[?([0-9]{1,7})\]?", wanted)  # a0 of one axis is a[0] of many in a waveform
+        if bit and (number := _named(vectors, bit[1])) is not None:
+            return Line(number, int(bit[2]))
         return find(int(wanted)) if wanted.isascii() and wanted.isdigit() else None
 
     one_line = b == SAME

@@ -19,6 +19,7 @@ from tachometry.spec.language.units import (
     plural,
     read_exactly,
     read_quantity,
+    written_time,
 )
 
 MAX_CLOCK_HZ = 10**11
@@ -50,7 +51,7 @@ def _of_frequency(what: str, text: str, timing: Mapping[str, Any]) -> int:
     hertz = read_exactly(what, text, FREQUENCY)
     if hertz <= 0:
         raise ParameterError(what, f"must be greater than 0, not {text}")
-    return _check_tick(_whole(what, text, 1 / hertz, Fraction(1, timing["clock_hz"]), "clock"))
+    return _check_tick(_whole(what, text, 1 / hertz, Fraction(1, timing["clock_hz"]), "clock", instead="--tick "))
 
 
 def _check_clock(hertz: int) -> None:
@@ -157,6 +158,10 @@ class Timing:
         texts = {"clock": None if clock is None else str(clock), **given}
         return cls(**read_options(cls, {name: text for name, text in texts.items() if text is not None}))
 
+    def time_of(self, ticks: int) -> str:
+        """Return so many ticks as a text that is read as them."""
+        return written_time(ticks * self.tick_cycles, self.clock_hz)
+
     @property
     def tick_seconds(self) -> Fraction:
         """T_s in seconds, exactly."""
@@ -176,15 +181,17 @@ def time_or_clocks(what: str, given: str, clock_hz: int) -> Fraction:
     return value / clock_hz if unit == CLOCKS else value * TIME[unit].exact
 
 
-def _whole(what: str, given: str, seconds: Fraction, period: Fraction, name: str, least: int = 1) -> int:
-    """Return seconds as a whole number of periods, of which `least` are needed."""
+def _whole(
+    what: str, given: str, seconds: Fraction, period: Fraction, name: str, least: int = 1, instead: str = ""
+) -> int:
+    """Return seconds as a whole number of periods, of which `least` are needed; `instead` is an option that has it."""
     if seconds <= 0:
         raise ParameterError(what, f"must be longer than 0, not {given}")
     periods = seconds / period
     if periods.denominator == 1:
         return int(periods)
     possible = sorted({max(int(periods) + more, least) for more in (0, 1)})
-    typed = (f"{n}{CLOCKS}" if name == "clock" else plural(n, name) for n in possible)
+    typed = (f"{instead}{n}{CLOCKS}" if name == "clock" else plural(n, name) for n in possible)
     nearest = " and ".join(f"{text} ({format_time(n * period)})" for text, n in zip(typed, possible, strict=True))
     raise ParameterError(
         what, f"must be a whole number of {name}s, not {given} ({float(periods):.9g}); nearest: {nearest}"

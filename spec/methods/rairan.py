@@ -270,7 +270,9 @@ class RairanTachometer(TachometerSpec):
             raise ParameterError("bounds", "must not be given with paper_exact, whose estimate leaves them")
         if self.timing.max_ticks >= MAX_TABLE:
             raise ParameterError(
-                "max_ticks", f"must be from 2 to {MAX_TABLE - 1} with method {self.method}, not {self.timing.max_ticks}"
+                "max_ticks",
+                f"must be from 2 to {MAX_TABLE - 1} with method {self.method}, not {self.timing.max_ticks}: "
+                f"try --max-time {self.timing.time_of(MAX_TABLE - 1)}",
             )
         if (self.estimate == "n3" or self.bounds) and self.widths.max_count > MAX_TABLE:
             why = "estimate n3" if self.estimate == "n3" else "bounds"

@@ -28,7 +28,9 @@ class SAxis(OneAxis, STachometer):
         """Return the core that each axis is if a round has so many slots; ParameterError if it cannot be."""
         if spec.timing.max_ticks > MAX_TABLE:
             raise ParameterError(
-                "max_ticks", f"must be at most {MAX_TABLE} with --axes, not {spec.timing.max_ticks}: 1/m_s is looked up"
+                "max_ticks",
+                f"must be at most {MAX_TABLE} with --axes, where 1/m_s is looked up, not {spec.timing.max_ticks}: "
+                f"try --max-time {spec.timing.time_of(MAX_TABLE)}",
             )
         return cls(**own_options(spec, slots), axes_of_tick=axes, slots=slots)
 

@@ -6,21 +6,29 @@ from pathlib import Path
 import pytest
 
 from tachometry.spec import AUTO, ParameterError, methods_with, of_manifest, of_options, of_texts
+from tachometry.spec.core.timing import whole_clocks
+from tachometry.spec.language.units import next_written_time
 from tachometry.spec.registers.manifest import manifest
 from tachometry.spec.registers.map import RegisterMap
 
 PPR = {"ppr": "500", "max-speed": "400rad/s"}
 # Clocks of its program, serial and with multipliers of the FPGA.
 SERIAL, QUICK = (of_texts("track", PPR | {"multiplier": kind}).latency.busy for kind in ("serial", "block"))
+# A tick for four turns of the quick program, a clock longer than that, and a round; and one for a turn of each machine.
+FOUR, ONE = (next_written_time(clocks, 48_000_000) for clocks in (4 * (QUICK + 1) + 4, QUICK + 1 + 3 * 2 + 4))
 CHOICES = [
     ({}, "track", f"as its {SERIAL} clocks fit the tick of 960 clocks"),
     ({"tick": "10us"}, "track", f"as its {QUICK} clocks fit the tick of 480 clocks"),
     ({"tick": "10us", "external-tick": "yes"}, "track", f"as its {QUICK} clocks fit the tick of 480 clocks"),
     ({"tick": "5us"}, "mt", f"as track needs a tick of {QUICK} clocks"),
     ({"tick": "250ns"}, "s", f"as track needs a tick of {QUICK} clocks and mt needs a tick of 20 clocks"),
-    ({"axes": "4"}, "s", "as track needs 2 machines or --tick 21us and mt is of one axis"),
-    ({"axes": "4", "tick": "21us"}, "track", "as the turns of 4 axes fit the tick of 1008 clocks"),
-    ({"axes": "4", "tick": "5us"}, "s", "as track needs --tick 5.5us and mt is of one axis"),
+    ({"axes": "4"}, "s", f"as track needs 2 machines or --tick {FOUR} and mt is of one axis"),
+    (
+        {"axes": "4", "tick": FOUR},
+        "track",
+        f"as the turns of 4 axes fit the tick of {whole_clocks('tick', FOUR, 48_000_000)} clocks",
+    ),
+    ({"axes": "4", "tick": "5us"}, "s", f"as track needs --tick {ONE} and mt is of one axis"),
     ({"bounds": "yes"}, "mt", "as it has --bounds"),
     ({"bounds": "yes", "tick": "250ns"}, "s", "as mt needs a tick of 23 clocks"),
     ({"max-memory": "5ms"}, "track", "as it has --max-memory"),
@@ -141,7 +149,7 @@ def test_other_names_of_one_thing(texts: dict[str, str], same: dict[str, str]) -
         ({"ppr": "500", "cpr": "2000"}, "cpr must not be given together with --ppr"),
         ({}, "ppr must be given, or --lines, or --cpr"),
         ({"ppr": "5", "pwm": "0Hz"}, "pwm must be greater than 0, not 0Hz"),
-        ({"ppr": "5", "pwm": "7kHz"}, "pwm must be a whole number of clocks, not 7kHz .* nearest: 6857clk .*"),
+        ({"ppr": "5", "pwm": "7kHz"}, "pwm must be a whole number of clocks, not 7kHz .* nearest: --tick 6857clk .*"),
         ({"ppr": "5", "pwm": "10kHz", "tick": "100us"}, "pwm must not be given together with --tick"),
     ],
 )

@@ -149,7 +149,11 @@ def test_after_an_upset_an_axis_is_right_as_late_as_a_core_of_its_own() -> None:
         (8, {"age": True}, "age must be left out with --axes: what counts the ticks is for one axis"),
         (8, {"bounds": True}, "bounds must be left out with --axes: "),
         (8, {"lowpass": Fraction(100)}, "lowpass must be left out with --axes: "),
-        (8, {"max_ticks": 4096}, "max_ticks must be at most 2048 with --axes, not 4096: 1/m_s is looked up"),
+        (
+            8,
+            {"max_ticks": 4096},
+            "max_ticks must be at most 2048 with --axes, where 1/m_s is looked up, not 4096: try --max-time 40.96ms",
+        ),
         (8, {"max_ticks": 2048}, ""),
         (8, {"tick": 67 * 16}, ""),
         (8, {"tick": 997}, "tick_cycles must be a multiple of a number from 8 to 64, and long enough for a turn of "),

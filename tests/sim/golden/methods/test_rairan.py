@@ -297,7 +297,7 @@ def test_a_burst_after_standstill() -> None:
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"max_ticks": 2048}, "max_ticks must be from 2 to 2047 with method rairan, not 2048"),
+        ({"max_ticks": 2048}, "max_ticks must be from 2 to 2047 with method rairan, not 2048: try --max-time 81.88ms"),
         ({"dt": 4096}, "max_speed must be at most 2048 counts per tick with estimate n3, not 4096"),
         (
             {"dt": 4096, "estimate": "n1", "bounds": True},
