@@ -1,6 +1,6 @@
 // Plays a trace, and at some clocks those that follow once more with a flip-flop upset, and collects what is then shown.
-// It is compiled behind sim/engines/driver.h and `State`: all flip-flops and memories that can be written, which `save`, `load`
-// and `flip` are for.
+// It is compiled behind sim/engines/driver.h and `State`: all flip-flops and memories that can be written, which `save`,
+// `load`, `same` and `flip` are for.
 
 #include <cstring>
 
@@ -9,47 +9,74 @@ struct Upsets {
   const int64_t *at;  // clock of each change of the pins
   const void *level;  // as the model plays them
   int64_t n_changes;
-  const int64_t *clock;  // of each upset, none before another
+  const int64_t *clock;  // of each upset
   const int64_t *bit;
   int64_t n_upsets, length;  // clocks that are played with it
   int64_t *rows;  // number of the upset, clocks since, outputs: where they are others than in the clock before
   int64_t n_rows, capacity;
 };
 
-static inline void play(Model &model, const Upsets &job, int64_t &next, int64_t clock) {
-  while (next < job.n_changes && job.at[next] <= clock) model.play(job.level, next++);
-  model.settle();
-}
+constexpr int OUTPUTS = N_COLUMNS - 1;
+constexpr int64_t KEPT = 1000;  // clocks from a state of the core without an upset that is kept to the next
+
+struct Row {
+  int64_t clock, shown[OUTPUTS];
+};
+
+// Plays from a clock on, and keeps rows.
+struct Playing {
+  const Upsets &job;
+  int64_t clock = 0, next = 0;
+  Model model{};
+  std::vector<Row> rows{};
+
+  // Go to a state that was kept.
+  void go(const State &state, int64_t when) {
+    load(model, state);
+    clock = when;
+    next = std::upper_bound(job.at, job.at + job.n_changes, clock) - job.at;
+    if (next) model.play(job.level, next - 1);
+    rows.clear();
+  }
+
+  void one() {
+    while (next < job.n_changes && job.at[next] <= clock) model.play(job.level, next++);
+    model.settle();
+    Row row{clock++};
+    model.outputs(row.shown);
+    if (rows.empty() || std::memcmp(row.shown, rows.back().shown, sizeof row.shown)) rows.push_back(row);
+    model.edge();
+  }
+};
 
 // How many upsets have been played: fewer if there is no more room.
 ENTRY __attribute__((flatten)) int64_t upsets_run(Upsets *job) {
-  constexpr int OUTPUTS = N_COLUMNS - 1;
-  Model model;
-  State before;
-  int64_t next = 0, n = 0;
-  for (int64_t clock = 0; clock < job->n_clocks && n < job->n_upsets; clock++) {
-    for (; n < job->n_upsets && job->clock[n] == clock; n++) {
-      if (job->capacity - job->n_rows < job->length) return n;
-      int64_t later = next, shown[OUTPUTS];
-      save(model, before);
-      flip(model, job->bit[n]);
-      for (int64_t k = 0; k < job->length; k++) {
-        play(model, *job, later, clock + k);
-        int64_t *row = job->rows + job->n_rows * (2 + OUTPUTS);
-        model.outputs(row + 2);
-        if (k == 0 || std::memcmp(row + 2, shown, sizeof shown)) {
-          row[0] = n;
-          row[1] = k;
-          std::memcpy(shown, row + 2, sizeof shown);
-          job->n_rows++;
-        }
-        model.edge();
-      }
-      load(model, before);
-      if (next) model.play(job->level, next - 1);
+  Playing right{*job}, wrong{*job};
+  std::vector<State> kept;
+  for (int64_t n = 0; n < job->n_upsets; n++) {
+    if (job->capacity - job->n_rows < job->length) return n;
+    const int64_t begin = job->clock[n], end = begin + job->length;
+    for (; right.clock < end; right.one()) {
+      if (right.clock % KEPT) continue;
+      kept.emplace_back();
+      save(right.model, kept.back());
     }
-    play(model, *job, next, clock);
-    model.edge();
+    wrong.go(kept[begin / KEPT], begin / KEPT * KEPT);
+    while (wrong.clock < begin) wrong.one();
+    wrong.rows.clear();
+    flip(wrong.model, job->bit[n]);
+    while (wrong.clock < end && (wrong.clock % KEPT || !same(wrong.model, kept[wrong.clock / KEPT]))) wrong.one();
+    // What is as if nothing had been upset stays so.
+    auto since = [](int64_t clock, const Row &row) { return clock < row.clock; };
+    auto later = std::upper_bound(right.rows.begin(), right.rows.end(), wrong.clock, since) - 1;
+    for (int64_t from = wrong.clock; from < end && later != right.rows.end() && later->clock < end; later++)
+      wrong.rows.push_back(*later), wrong.rows.back().clock = std::max(from, later->clock);
+    for (const Row &row : wrong.rows) {
+      int64_t *found = job->rows + job->n_rows++ * (2 + OUTPUTS);
+      found[0] = n;
+      found[1] = row.clock - begin;
+      std::copy(row.shown, row.shown + OUTPUTS, found + 2);
+    }
   }
-  return n;
+  return job->n_upsets;
 }

@@ -23,6 +23,7 @@ _STATE = """
 struct State {{ {members} }};
 static inline void save(const Model &model, State &state) {{ {save} }}
 static inline void load(Model &model, const State &state) {{ {load} }}
+static inline bool same(const Model &model, const State &state) {{ return {same}; }}
 static inline void flip(Model &model, int64_t bit) {{ {flip} }}
 """
 _OPTIONS = ("-DNDEBUG",)  # an address may lie beyond the end of a memory
@@ -94,7 +95,7 @@ class Upsettable:
         Parameters
         ----------
         clock, bit : int64 arrays, shape (n,)
-            Before which clock edge which bit is flipped; clocks in order.
+            Before which clock edge which bit is flipped.
         length : int
             Clocks that are played.
         """
@@ -148,6 +149,13 @@ def _state(wires: list[tuple[str, int]], memories: list[tuple[str, int, int]]) -
             [f"model.top.{name}.curr = model.top.{name}.next = state.{name};" for name, _ in wires]
             + [
                 f"std::copy(state.{name}.begin(), state.{name}.end(), &model.top.{name}.data[0]);"
+                for name, _, _ in memories
+            ]
+        ),
+        same=" && ".join(
+            [f"model.top.{name}.curr == state.{name}" for name, _ in wires]
+            + [
+                f"std::equal(state.{name}.begin(), state.{name}.end(), &model.top.{name}.data[0])"
                 for name, _, _ in memories
             ]
         ),
