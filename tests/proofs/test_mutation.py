@@ -11,6 +11,7 @@ import proofs.mutation.equivalent
 import proofs.mutation.score
 import pytest
 from proofs.mutation.cases import CASES
+from proofs.mutation.cones import alike
 from proofs.mutation.equivalent import equivalent
 from proofs.mutation.loops import LOOPS, Commanded
 from proofs.mutation.netlist import GROUP, exported, mutants
@@ -69,10 +70,14 @@ def test_what_is_killed_is_not_proven_equivalent(monkeypatch: pytest.MonkeyPatch
     played = stimulus(CASE.spec, CLOCKS)
     # As many as are played at once: among forty, none may be noticed late.
     flat, found = mutants(exported(CASE.component), GROUP, tmp_path)
-    clocks, _ = run(library(CASE.pins, flat, found), len(found), len(CASE.pins.outputs), played.pins)
+    clocks = np.full(len(found), -1, dtype=np.int64)
+    run(library(CASE.pins, flat, found), clocks, len(CASE.pins.outputs), played.pins)
     # Those that are the last to be noticed are the most like the core.
     latest = [found[number] for number in np.argsort(clocks)[-4:]]
     assert clocks.max() > CLOCKS // 25
+    proven = alike(CASE, flat, found, tmp_path)
+    assert any(proven)
+    assert not (proven & (clocks >= 0)).any()
     with ThreadPoolExecutor(2) as pool:
         assert not any(equivalent(CASE, flat, latest, played.pins, tmp_path, pool))
 
@@ -86,7 +91,8 @@ def test_registers_power_up_as_in_the_core(tmp_path: Path) -> None:
     with patch("tachometry.spec.methods.s.MAX_TABLE", case.max_table):
         flat, found = mutants(exported(case.component), 500, tmp_path, "t:$*dff*")
         found = [mutant for mutant in found if mutant.option("port") == "Q"][:GROUP]
-        _, rows = run(library(case.pins, flat, found), len(found), len(case.pins.outputs), played.pins, 3000)
+        killed = np.full(len(found), -1, dtype=np.int64)
+        rows = run(library(case.pins, flat, found), killed, len(case.pins.outputs), played.pins, 3000)
         hold(case, played, rows)
 
 

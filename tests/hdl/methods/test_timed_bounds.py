@@ -51,10 +51,9 @@ def check(method: str, timer: str, seed: int = 1) -> None:
     golden = golden.rows(golden.clock < n_clocks)
     rows = []
     for clock in range(n_clocks):
-        row = {"coming": int(clock < CLOCKS and clock % TICK == TICK - 2)}
+        row = {"tick": int(clock < CLOCKS and clock % TICK == TICK - 1)}
         if spec.form.on_lattice:
-            window = min(clock, CLOCKS - 1) // TICK
-            row |= {"next_count": int(m_e[window]), "pulse_count": int(m_e[window])}
+            row["pulse_count"] = int(m_e[min(clock, CLOCKS - 1) // TICK])
         else:
             row["step_before"] = int(step[clock + 1]) if clock + 1 < CLOCKS else 0
         rows.append(row)

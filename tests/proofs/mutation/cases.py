@@ -119,6 +119,7 @@ def _case(
     max_count: int | None,
     mutants: int = 510,
     max_table: int = 2048,
+    ppr: int = 1,
     decoding: int = 4,
     **options: Any,
 ) -> Case:
@@ -128,8 +129,8 @@ def _case(
     """
     # One revolution a second is a count a tick.
     spec = METHODS[method](
-        encoder=Encoder(1, decoding),
-        timing=Timing(decoding * tick_cycles, tick_cycles, max_ticks),
+        encoder=Encoder(ppr, decoding),
+        timing=Timing(ppr * decoding * tick_cycles, tick_cycles, max_ticks),
         max_speed=None if max_count is None else Speed.parse(f"{max_count}rev/s"),
         position_width=8,
         **{"frac_bits": 4} | options,
@@ -169,8 +170,20 @@ CASES = [
     _case("rairan", "adaptive", 3, 8, 2, 340, adaptive=Fraction(1, 4), bounds=True, age=True),
     _case("rairan", "n2", 5, 6, 2, 340, estimate="n2", **_FRONT),
     _case("rairan", "to the letter", 3, 6, 2, 340, estimate="n1", paper_exact=True),
-    _case("track", "age", 900, 6, 2, 100, multiplier="serial", age=True, fine_bits=1),
+    # A tenth of a second, after which they forget, is 26 ticks, and their longest memory 1024.
+    _case("track", "serial", 900, 13, 2, 500, ppr=64, frac_bits=None, multiplier="serial", age=True),
     _case(
-        "track", "external tick", 900, 6, 2, 100, multiplier="block", external_tick=True, max_tick_cycles=940, **_FRONT
+        "track",
+        "block, external tick",
+        280,
+        13,
+        5,
+        500,
+        ppr=64,
+        frac_bits=None,
+        multiplier="block",
+        external_tick=True,
+        max_tick_cycles=320,
+        **_FRONT,
     ),
 ]

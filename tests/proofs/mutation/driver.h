@@ -10,14 +10,17 @@ struct Job {
   int64_t n_clocks;
   const uint64_t *pins;  // of each clock, in N_WORDS words; the lowest bit is the reset
   int64_t n_mutants;  // their selectors are 1 … n_mutants
-  int64_t *killed;  // clock in which an output differed, or NEVER
+  int64_t *killed;  // clock in which an output differed, or NEVER; who is not NEVER at first is not played
   int64_t *rows;  // clock and outputs of the core without a mutant, in every clock with a strobe
   int64_t n_rows, capacity;
 };
 
 static void settle(Top &top) {
   top.p_clk = value<1>{0u};
-  for (int k = 0; k < 20 && !top.eval(); k++) top.commit();
+  for (int k = 0; k < 20; k++) {
+    bool once = top.eval();
+    if (!top.commit() || once) break;
+  }
 }
 
 static void edge(Top &top) {
@@ -34,8 +37,7 @@ ENTRY void mutation_run(Job *job) {
   for (int k = 0; k <= job->n_mutants; k++) {
     tops.emplace_back(new Top);
     select(*tops[k], k);
-    if (k) alive.push_back(k);
-    if (k) job->killed[k - 1] = NEVER;
+    if (k && job->killed[k - 1] == NEVER) alive.push_back(k);
   }
   for (int64_t clock = 0; clock < job->n_clocks; clock++) {
     int64_t right[N_OUTPUTS], wrong[N_OUTPUTS];

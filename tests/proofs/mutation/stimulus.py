@@ -3,17 +3,18 @@
 The first begins as the core powers up, without a reset.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from support.tracking import motions
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.signals.recording import PinTrace, packed, quadrature
-from tachometry.spec import STachometer, TachometerSpec
+from tachometry.spec import STachometer, TachometerSpec, TrackTachometer
 from tachometry.spec.formats.reciprocal import Reciprocal
 
 _LINES = ("a", "b", "z", "tick_in")  # of the cores that are mutated
@@ -22,6 +23,8 @@ _LONG = 100  # clocks of a tick with which motions have fewer edges, and lines c
 _RATTLE = 40_000  # clocks
 _STEPS = 1000  # of the counts in a tick
 _HARD = 16  # quotients of each m_s
+_TICKS = 300  # of a motion of the tracking method; a settled one has many more counts
+_SETTLED = 1500
 _RATES = (0.5, 0.2, 0.05)  # changes of a line in a clock
 
 
@@ -169,6 +172,78 @@ def rattle(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
     return _trace(spec, (np.cumsum(changes, axis=1) % 2).astype(np.uint8))
 
 
+def hostile(spec: TrackTachometer, rng: np.random.Generator, n_ticks: int) -> PinTrace:
+    """Return motions of all kinds, as hostile as the pins allow."""
+    found, last = motions(spec, rng, n_ticks)
+    return _ticked(spec, rng, found.clock, np.cumsum(found.step), last)
+
+
+def settled(spec: TrackTachometer, rng: np.random.Generator) -> PinTrace:
+    """Return a constant speed on a disc with errors until the memory is long and all is learned; then the speed changes
+    evenly, a count is lost or is there twice, and the shaft stops.
+    """
+    n = _SETTLED
+    noise = rng.choice([0, 1e-3, 0.02]) * rng.standard_normal(n)
+    place = np.arange(1, n + 1) + np.resize(0.05 * rng.standard_normal(4), n) + noise
+    gap = spec.timing.tick_cycles / rng.choice([0.3, 0.9, 1.1, 2.5], p=[0.1, 0.5, 0.2, 0.2])
+    clock = gap * (place + rng.choice([0, 0, 1e-5, -1e-5]) * np.maximum(place - n * 2 // 3, 0) ** 2)
+    clock = np.cumsum(np.maximum(np.diff(np.rint(clock), prepend=0), 1 + spec.filter_clocks)).astype(np.int64)
+    step = np.full(n, rng.choice([-1, 1]))
+    at = int(rng.integers(n - 100, n - 10))
+    step[at : at + int(rng.integers(1, 4))] *= rng.choice([0, 2, -1])
+    length = spec.timing.tick_cycles
+    last = np.arange(clock[-1] // length + int(rng.choice([3, 40]))) * length + length - 1
+    if spec.external_tick:
+        last += rng.integers(-9, 10, len(last))
+    return _ticked(spec, rng, clock, np.cumsum(step), last)
+
+
+def sudden(spec: TrackTachometer, rng: np.random.Generator) -> PinTrace:
+    """Return a few counts that begin at rest, as close as the filter lets them, at the end of a tick; then silence: no
+    velocity is greater, and no acceleration.
+    """
+    length, least = spec.timing.tick_cycles, 1 + spec.filter_clocks
+    last = np.arange(1, 8 * 40) * length - 1
+    clock, step = [], []
+    for part in range(8):
+        gaps = rng.choice([least, least, 2 * least, 10 * least, length], int(rng.integers(2, 9)))
+        clock += [last[40 * part + int(rng.choice([1, 20, 30]))] - int(rng.integers(0, 20)) + np.cumsum(gaps)]
+        step += [np.full(len(gaps), rng.choice([-1, 1]))]
+    order = np.unique(np.concatenate(clock), return_index=True)
+    return _ticked(spec, rng, order[0], np.cumsum(np.concatenate(step)[order[1]]), last)
+
+
+def tracked(spec: TrackTachometer, rng: np.random.Generator) -> Iterator[PinTrace]:
+    """Yield what a tracking core is played: first short motions, which end in the middle of a tick or of a program."""
+    ticks = spec.times.longest_tick
+    for _ in range(60):
+        yield hostile(spec, rng, 6).until(int(rng.integers(1, 3 * ticks)))
+    yield from ending(spec, rng)
+    yield rattle(spec, rng)
+    for number in range(12):
+        yield (stress(spec, int(rng.integers(1 << 30)), 10), bursts(spec, rng), hostile(spec, rng, _TICKS))[number % 3]
+    for _ in range(4):
+        yield sudden(spec, rng)
+    for _ in range(3):
+        yield settled(spec, rng)
+        yield hostile(spec, rng, 2 * _TICKS)
+
+
+def _ticked(
+    spec: TrackTachometer,
+    rng: np.random.Generator,
+    clock: NDArray[np.int64],
+    quarter: NDArray[np.int64],
+    last: NDArray[np.int64],
+) -> PinTrace:
+    """Return quarters of a period that begin in some clocks, and ticks that end with others."""
+    n_clocks = int(last[-1]) + 1
+    level = _levels(clock, quarter, n_clocks)
+    (z,) = noise_lines(rng, n_clocks, 1)
+    tick = np.isin(np.arange(n_clocks), last)
+    return _trace(spec, np.array([level & 1, level >> 1, z, tick], dtype=np.uint8))
+
+
 def ending(spec: TachometerSpec, rng: np.random.Generator) -> list[PinTrace]:
     """Return motions that end in each of the clocks about the end of a tick, and about an update, and a whole one."""
     found = []
@@ -208,11 +283,6 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
     starts: list[int] = []
     done = 0
     shaken = False
-    long = spec.timing.tick_cycles > _LONG
-    n_clocks *= 10 if long else 1
-    period = 64 if long else 8  # with more resets between
-    longest = spec.times.longest_tick * spec.timing.max_ticks
-    n_silences = 10 if long else 40
 
     def add(trace: PinTrace, resets: int) -> None:
         """A motion, and clocks of reset before it."""
@@ -229,35 +299,28 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
         traces.append(trace)
         done += len(reset) + trace.n_clocks
 
-    while done < n_clocks:
+    while done < n_clocks and not isinstance(spec, TrackTachometer):
         if done > n_clocks // 4 and not shaken:
             trace, shaken = rattle(spec, rng), True
-        elif len(traces) % period in (0, 4):
-            trace = stress(spec, int(rng.integers(1 << 30)), _EDGES // 2 if long else _EDGES)
-        elif len(traces) % period in ((1, 3, 6) if long else (1,)):
-            trace = noise(spec, rng, n_silences * longest)
-        elif len(traces) % period == 2:
+        elif len(traces) % 8 in (0, 4):
+            trace = stress(spec, int(rng.integers(1 << 30)), _EDGES)
+        elif len(traces) % 8 == 1:
+            trace = noise(spec, rng, 40 * spec.times.longest_tick * spec.timing.max_ticks)
+        elif len(traces) % 8 == 2:
             trace = bursts(spec, rng)
-        elif len(traces) % period == 6 and not long:
+        elif len(traces) % 8 == 6:
             trace = steps(spec, rng)
             n_clocks += trace.n_clocks  # the others are as many as without them
-        elif len(traces) % period in (5, 13, 21, 29, 37) and long:
-            trace = steady(spec, rng)
-        elif long and len(traces) % 2:  # within a tick
-            trace = noise(spec, rng, int(rng.integers(4, 60)), 2)
         else:  # soon after a reset
-            trace = noise(spec, rng, int(rng.integers(4, 3 * longest)), 2)
-            if long:  # until about when an update comes; some without a count
-                trace = noise(spec, rng, trace.n_clocks, 2, still=rng.random() < 0.5)
-                updates = golden.run(spec, trace).updates.clock
-                if len(updates):
-                    trace = trace.until(min(int(rng.choice(updates) + rng.integers(-6, 4)), trace.n_clocks))
+            trace = noise(spec, rng, int(rng.integers(4, 3 * spec.times.longest_tick * spec.timing.max_ticks)), 2)
         # Some end early: the next reset comes in the middle.
         early = rng.random() < 0.5 and trace.n_clocks < _RATTLE
         trace = trace.until(int(rng.integers(1, trace.n_clocks)) if early else trace.n_clocks)
         add(trace, int(rng.choice([1, 1, 2, 5])))
-    last = ending(spec, rng) if long else []
-    if isinstance(spec, STachometer) and isinstance(spec.form.reciprocal, Reciprocal):
+    last: Iterable[PinTrace] = ()
+    if isinstance(spec, TrackTachometer):
+        last = tracked(spec, rng)
+    elif isinstance(spec, STachometer) and isinstance(spec.form.reciprocal, Reciprocal):
         last = [*ending(spec, rng), hard(spec, spec.form.reciprocal)]
     for trace in last:
         add(trace, 1)

@@ -1,0 +1,280 @@
+"""Which mutants are equivalent by what a clock does alone: proven by SAT, cone by cone, in milliseconds.
+
+The netlist is cut at its flip-flops, and at its large memories. Core and mutant are asked for what they set their
+flip-flops and outputs to, and write to memories, from the same values in all flip-flops, pins and words that are read.
+What differs may only be flip-flops of which the mutant has its own: these then have any value in the mutant, and what
+it does to others, and to outputs, must be the same whatever that is. So nothing is ever seen.
+
+Most gates of a mutant have the same inputs as in the core, and are the same one here; the solver is asked for the rest.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from proofs.mutation.cases import Case
+from proofs.mutation.netlist import SELECTOR, WIDTH, Mutant, yosys
+from proofs.mutation.opened import Opened, opened
+from pysat.solvers import Solver
+
+_AIG = """\
+read_rtlil cut.il
+setundef -zero
+opt_expr
+opt_clean
+techmap
+opt_expr
+opt_clean
+aigmap
+opt_clean
+write_aiger -ascii -symbols cut.aag
+"""
+_CONFLICTS = 2000  # of the solver, for a question
+_CLOCKS = (1, 2, 4)  # over which an induction is tried
+Bits = dict[str, list[int]]  # literals of each port, the lowest bit first
+Place = tuple[str, int]  # port and bit
+Levels = dict[Place, int]  # literals
+
+
+class Gates:
+    """And-gates with a number for each, of which none is there twice.
+
+    A literal is twice the number of a gate or an input, and one more if it is inverted; 0 and 1 are constants.
+    """
+
+    def __init__(self) -> None:
+        self._solver = Solver("glucose4")
+        self._made: dict[tuple[int, int], int] = {}
+        self._terms: list[tuple[int, int] | None] = [None]
+        self._known = {0}
+        self._solver.add_clause([-1])
+
+    def new(self) -> int:
+        """Return an input."""
+        self._terms.append(None)
+        return 2 * len(self._terms) - 2
+
+    def all_of(self, one: int, other: int) -> int:
+        """Return whether both are 1."""
+        if one > other:
+            one, other = other, one
+        if one < 2 or one == other:
+            return other if one else 0
+        if one ^ other == 1:
+            return 0
+        if (one, other) not in self._made:
+            self._terms.append((one, other))
+            self._made[one, other] = 2 * len(self._terms) - 2
+        return self._made[one, other]
+
+    def any_of(self, one: int, other: int) -> int:
+        """Return whether one is 1."""
+        return self.all_of(one ^ 1, other ^ 1) ^ 1
+
+    def differ(self, one: int, other: int) -> int:
+        """Return whether they differ."""
+        return self.any_of(self.all_of(one, other ^ 1), self.all_of(one ^ 1, other))
+
+    def unequal(self, some: list[int], others: list[int]) -> int:
+        """Return whether any bits of two words differ."""
+        found = 0
+        for one, other in zip(some, others, strict=True):
+            found = self.any_of(found, self.differ(one, other))
+        return found
+
+    def _variable(self, literal: int) -> int:
+        """Return a literal for the solver, which is told of the gates behind it."""
+        told = [literal >> 1]
+        while told:
+            number = told.pop()
+            terms = self._terms[number]
+            if number in self._known:
+                continue
+            self._known.add(number)
+            if terms:
+                one, other = (self._signed(term) for term in terms)
+                here = number + 1
+                self._solver.append_formula([[-here, one], [-here, other], [here, -one, -other]])
+                told += [term >> 1 for term in terms]
+        return self._signed(literal)
+
+    @staticmethod
+    def _signed(literal: int) -> int:
+        number = (literal >> 1) + 1
+        return -number if literal & 1 else number
+
+    def may_be(self, literal: int, given: list[int]) -> bool:
+        """Tell whether a literal may be 1 while those given are; also if the solver does not know."""
+        if literal < 2:
+            return bool(literal)
+        self._solver.conf_budget(_CONFLICTS)
+        asked = [self._variable(one) for one in (literal, *given)]
+        return self._solver.solve_limited(assumptions=asked) is not False
+
+
+class Cones:
+    """Tells what a clock does: literals of all outputs from those of all inputs."""
+
+    def __init__(self, aiger: str) -> None:
+        lines = aiger.splitlines()
+        _, inputs, _, outputs, ands = map(int, lines[0].split()[1:])
+        head = 1 + inputs
+        self._inputs = [int(line) for line in lines[1:head]]
+        self._outputs = [int(line) for line in lines[head : head + outputs]]
+        self._ands = [tuple(map(int, line.split())) for line in lines[head + outputs : head + outputs + ands]]
+        names = dict(line.split(maxsplit=1) for line in lines[head + outputs + ands :] if line[0] in "io")
+        self._names = [
+            [_place(names[f"{kind}{n}"]) for n in range(count)] for kind, count in (("i", inputs), ("o", outputs))
+        ]
+
+    @property
+    def inputs(self) -> list[Place]:
+        """Port and bit of each input."""
+        return self._names[0]
+
+    def of(self, gates: Gates, given: Mapping[Place, int]) -> Bits:
+        """Return what is set."""
+        values = [0] * (2 + 2 * (len(self._inputs) + len(self._ands)))
+
+        def put(literal: int, value: int) -> None:
+            values[literal], values[literal ^ 1] = value, value ^ 1
+
+        put(0, 0)
+        for literal, name in zip(self._inputs, self.inputs, strict=True):
+            put(literal, given[name])
+        for to, one, other in self._ands:
+            put(to, gates.all_of(values[one], values[other]))
+        found: Bits = {}
+        for (port, bit), literal in zip(self._names[1], self._outputs, strict=True):
+            bits = found.setdefault(port, [])
+            assert len(bits) == bit
+            bits.append(values[literal])
+        return found
+
+
+def _selected(number: int) -> Levels:
+    return {(SELECTOR, bit): number >> bit & 1 for bit in range(WIDTH)}
+
+
+def _next(place: Place) -> str:
+    """Return the port with what a flip-flop takes."""
+    return f"d_{place[0].removeprefix('q_')}"
+
+
+def _place(name: str) -> Place:
+    """Return port and bit of a symbol."""
+    port, _, bit = name.partition("[")
+    return port, int(bit.rstrip("]") or 0)
+
+
+class Cut:
+    """A group of mutants, cut, and the core beside them."""
+
+    def __init__(self, cut: Opened, cones: Cones, ports: frozenset[str]) -> None:
+        self._cut, self._cones, self._ports = cut, cones, ports
+        self._gates = gates = Gates()
+        inner = [place for place in cones.inputs if place[0].startswith("q_")]
+        outer = [place for place in cones.inputs if not place[0].startswith("q_")]
+        self._outer = [{place: gates.new() for place in outer} for _ in range(max(_CLOCKS))]
+        self._other = {place: gates.new() for place in inner}
+        anything = {place: gates.new() for place in inner}
+        level = {
+            (f"q_{k}", bit): level for k, one in enumerate(cut.registers) for bit, level in enumerate(one.init[::-1])
+        }
+        begun = {place: literal if level[place] == "x" else int(level[place]) for place, literal in anything.items()}
+        self._after = {False: self._core(anything), True: self._core(begun)}
+
+    def _core(self, inner: Levels) -> list[tuple[Levels, Bits]]:
+        """Return of each clock what is in the flip-flops of the core, and what it sets."""
+        found = []
+        for outer in self._outer:
+            bits = self._cones.of(self._gates, {**outer, **inner, **_selected(0)})
+            found.append((inner, bits))
+            inner = {place: bits[_next(place)][place[1]] for place in inner}
+        return found
+
+    def same(self, number: int) -> bool:
+        """Tell whether a mutant is proven to be equivalent."""
+        return any(self._follows(number, clocks) for clocks in _CLOCKS)
+
+    def _follows(self, number: int, clocks: int) -> bool:
+        """Tell whether that is so by induction over some clocks: in the last of any, and in all but the last of the
+        first.
+        """
+        own: set[Place] = set()
+        while True:
+            more: set[Place] = set()
+            for begins, clock in ((False, clocks - 1), *((True, clock) for clock in range(clocks - 1))):
+                found = self._differing(number, own, begins, clock)
+                if found is None:
+                    return False
+                more |= found
+            if not more:
+                return True
+            own |= more
+
+    def _differing(self, number: int, own: set[Place], begins: bool, last: int) -> set[Place] | None:
+        """Return further flip-flops that the mutant may set otherwise in a clock; None if more may differ than these.
+
+        In the clocks until then all that is not its own is as in the core.
+        """
+        gates, given = self._gates, list[int]()
+        shared, core = self._after[begins][0]
+        values = {place: shared[place] if begins else self._other[place] for place in own}
+        found: Bits = {}
+        for outer, (shared, core) in zip(self._outer[: last + 1], self._after[begins], strict=False):
+            inner = {**outer, **shared, **values, **_selected(number)}
+            found = self._cones.of(gates, inner)
+            if words := self._read(core, found, outer, given):
+                found = self._cones.of(gates, inner | words)
+            values = {place: found[_next(place)][place[1]] for place in own}
+        if any(gates.may_be(wrong, given) for wrong in self._seen(core, found)):
+            return None
+        return {
+            place
+            for place in shared.keys() - own
+            if gates.may_be(gates.differ(core[_next(place)][place[1]], found[_next(place)][place[1]]), given)
+        }
+
+    def _read(self, core: Bits, found: Bits, outer: Levels, given: list[int]) -> Levels:
+        """Return words that the mutant reads where its address may be another; they are those of the core else."""
+        words: Levels = {}
+        for k, memory in enumerate(self._cut.memories):
+            for read in range(memory.reads):
+                part = slice(read * memory.address_width, (read + 1) * memory.address_width)
+                apart = self._gates.unequal(core[f"address_{k}"][part], found[f"address_{k}"][part])
+                if not self._gates.may_be(apart, given):
+                    continue
+                for bit in range(read * memory.width, (read + 1) * memory.width):
+                    place = (f"word_{k}", bit)
+                    words[place] = self._gates.new()
+                    wrong = self._gates.differ(words[place], outer[place])
+                    given.append(self._gates.all_of(wrong, apart ^ 1) ^ 1)
+        return words
+
+    def _seen(self, core: Bits, found: Bits) -> list[int]:
+        """Return what must not be: that an output or something written differs."""
+        gates = self._gates
+        wrong = [gates.unequal(core[port], bits) for port, bits in found.items() if port in self._ports]
+        for k, memory in enumerate(self._cut.memories):
+            if not memory.written:
+                continue
+            mask, place, data = (f"{name}_{k}" for name in ("mask", "place", "data"))
+            placed = gates.unequal(core[place], found[place])
+            for bit in range(memory.width):
+                other = gates.any_of(placed, gates.differ(core[data][bit], found[data][bit]))
+                wrong += [
+                    gates.differ(core[mask][bit], found[mask][bit]),
+                    gates.all_of(core[mask][bit], other),
+                ]
+        return wrong
+
+
+def alike(case: Case, flat: str, group: list[Mutant], folder: Path) -> list[bool]:
+    """Tell of each mutant whether it is proven to be equivalent so."""
+    if not group:
+        return []
+    cut = opened(flat, group, folder, "r:SIZE>0")
+    (folder / "cut.il").write_text(cut.text)
+    yosys(_AIG, folder)
+    found = Cut(cut, Cones((folder / "cut.aag").read_text()), frozenset(port.name for port in case.pins.outputs))
+    return [found.same(number) for number in range(1, len(group) + 1)]
