@@ -43,13 +43,12 @@ tick:
     quiet = $last
     turn = turn + one
     quick $number by
-    moved = $moved
-    quick tau = ~ product time
     small tau = ~
     small $number by
-    room = $counts + almost_half
+    moved = $moved
+    quick tau = ~ product time
     small tau product time
-    dt = since - tau max clock
+    dt = since - clock - tau hi+ clock
     left = $times - ~
     t over 6
     quick dt by
@@ -68,13 +67,12 @@ known:
     near = raw - edge keep
     share = log_dt - log_T
     w = sum lo+ growing
-    quick step = zero
+    step = zero
     quick t = v + ~ product place
     quick $number by
     quick V = t - v + t
     small t = v + ~
     small V = sum + ~
-    small step = zero
     small t product place
     minus_sixteenth s+ near
     if pos goto event
@@ -102,10 +100,10 @@ grown:
     P = P - moved
     t s+ ~ keep log
     log_64 + minus_log_n + ~ exp
-    e = zero s+ ~ keep log
     edge = raw - moved
+    e = zero s+ ~ keep log
 heard:
-    room s- e
+    $counts + almost_half s- e
     if neg goto slip
     log_e = ~
     e - mu over 2
@@ -135,10 +133,9 @@ few:
     v = V s+ ~
     log_X gain 2
     of_v + log_X - log_dt + ~ exp
-    quick t = log_T + log_T
+    t = log_T + log_T
     after = one
-    quick t = t + t - w
-    small t = log_T + log_T + log_T + log_T - w
+    t = t + t - w
     a = a s+ ~ keep log
     log_X + log_64                      # order one, where the acceleration is not seen
     if pos goto curved
@@ -265,7 +262,6 @@ single:
     turn = turn + one chance
     moved = $moved
     quick dt by
-    room = $counts + almost_half
     phase
     goto known
 offsets:
@@ -336,6 +332,8 @@ begin:
     log_X = log_quarter
     after = zero
     quality = of_curve
+    if one goto show
+    slow_T = dt + dt                    # means of many counts are by logarithms: they are forgotten
     goto show
 same:
     edge = edge - moved

@@ -73,7 +73,7 @@ class Tracker:
         way = (self.v + h / 2) * dt
         e = c - self.p - way
         if self.phase == 1:
-            self._begin(raw, c, t, dt)
+            self._begin(n, raw, c, t, dt)
             return
         if raw == self.edge and abs(way) < 1 / 4:
             return
@@ -83,7 +83,7 @@ class Tracker:
             if self.slips < 3 and 4 * dt <= self.memory:
                 self.p, self.at = c, t
             else:
-                self._begin(raw, c, t, dt)
+                self._begin(n, raw, c, t, dt)
             return
         self.slips = 0
         share = self._remember(e, dt)
@@ -98,9 +98,10 @@ class Tracker:
         straight = share <= 1 / 64 and (self.a * self.memory**2) ** 2 <= 4096 * self.expected
         self.shown = (self.v - self.a * self.memory / 2, 0) if straight else (self.v, self.a)
 
-    def _begin(self, raw: float, c: float, t: float, dt: float) -> None:
+    def _begin(self, n: int, raw: float, c: float, t: float, dt: float) -> None:
         self.v, self.a, self.p, self.at, self.edge, self.memory = (c - self.p) / dt, 0, c, t, raw, dt
-        self.slow_until = self.before = self.mean = self.lag = 0.0
+        self.slow_until = 2 * dt if n > 1 else 0.0
+        self.before = self.mean = self.lag = 0.0
         self.shown, self.slips, self.phase, self.long = (self.v, 0), 0, 2, False
         self.expected = self.noise**2 / 4
 

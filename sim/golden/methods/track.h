@@ -91,7 +91,7 @@ struct Recursion : Tables {
       return nothing();
     }
     int64_t dt = std::max(since - tau, k.clock), log_dt = log2(dt);
-    if (phase == 1) return begin(at, raw, tau, dt, log_dt);
+    if (phase == 1) return begin(n, at, raw, tau, dt, log_dt);
     int64_t h = product(a, dt, k.half_velocity), V = v + h + h, way = product(v + h, dt, k.place);
     if (std::abs(raw - edge) < k.sixteenth && std::abs(way) < k.quarter) {
       edge -= moved, p -= moved;
@@ -111,7 +111,7 @@ struct Recursion : Tables {
     if (std::abs(e) >= k.half + n * k.count) {
       slips = std::max<int64_t>(slips, 0) + 1;
       offsets[kind] = std::max(-k.quarter, std::min(offsets[kind], k.quarter));
-      if (slips >= 3 || log_dt + k.log_4 - log_memory - 1 >= 0) return begin(at, raw, tau, dt, log_dt);
+      if (slips >= 3 || log_dt + k.log_4 - log_memory - 1 >= 0) return begin(n, at, raw, tau, dt, log_dt);
       p = at - moved;
       return emit(ahead(), place());
     }
@@ -161,13 +161,13 @@ struct Recursion : Tables {
       if (trouble - k.log_4 >= 0) slow_until = 2 * memory;
     } else if (memory < slow_until) log_growth = k.log_eighth;
   }
-  void begin(int64_t at, int64_t raw, int64_t tau, int64_t dt, int64_t log_dt) {
+  void begin(int64_t n, int64_t at, int64_t raw, int64_t tau, int64_t dt, int64_t log_dt) {
     int64_t e = at - p;
     phase = 2, slips = k.none;
     v = shown_v = power(log2(e) + k.of_velocity - log_dt, sign_of(e));
     p = at - moved, edge = raw - moved;
     since = tau, memory = dt, log_memory = log_dt, log_share = k.log_quarter;
-    a = shown_a = mean = lag = error = slow_until = 0, quality = k.of_curve;
+    a = shown_a = mean = lag = error = 0, slow_until = n > 1 ? 2 * dt : 0, quality = k.of_curve;
     emit(ahead(), place());
     ready();
   }

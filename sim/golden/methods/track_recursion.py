@@ -123,7 +123,7 @@ class Recursion:
         dt = max(self.since - tau, k["clock"])
         log_dt = log2(dt)
         if self.phase == ONE:
-            return self._begin(at, raw, tau, dt, log_dt)
+            return self._begin(n, at, raw, tau, dt, log_dt)
         h = self._product(self.a, dt, "half_velocity")
         v = self.v + h + h
         way = self._product(self.v + h, dt, "place")
@@ -151,7 +151,7 @@ class Recursion:
             self.slips = max(self.slips, 0) + 1
             self.offsets[kind] = max(-k["quarter"], min(self.offsets[kind], k["quarter"]))
             if self.slips >= 3 or log_dt + k["log_4"] - self.log_memory - 1 >= 0:
-                return self._begin(at, raw, tau, dt, log_dt)
+                return self._begin(n, at, raw, tau, dt, log_dt)
             self.p = at - self._moved
             return self._emit(self._ahead())
         # A change of the speed leaves 8 or 32 events.
@@ -237,7 +237,7 @@ class Recursion:
         self.p, self.edge = at - self._moved, raw - self._moved
         return self._nothing()
 
-    def _begin(self, at: int, raw: int, tau: int, dt: int, log_dt: int) -> Row:
+    def _begin(self, n: int, at: int, raw: int, tau: int, dt: int, log_dt: int) -> Row:
         """Take the speed from the event before to this one."""
         k = self._k
         e = at - self.p
@@ -245,7 +245,8 @@ class Recursion:
         self.v = self.shown_v = self._power(log2(e) + k["of_velocity"] - log_dt, -1 if e < 0 else 1)
         self.p, self.edge = at - self._moved, raw - self._moved
         self.since, self.memory, self.log_memory, self.log_share = tau, dt, log_dt, k["log_quarter"]
-        self.a = self.shown_a = self.mean = self.lag = self.error = self.slow_until = 0
+        self.a = self.shown_a = self.mean = self.lag = self.error = 0
+        self.slow_until = 2 * dt if n > 1 else 0
         self.quality = k["of_curve"]
         row = self._emit(self._ahead())
         self._ready()
