@@ -47,7 +47,7 @@ class TimedDatapath(wiring.Component):
         """Counters that a simulation may skip: `IdleCounter`."""
         if self._spec.form.on_lattice:  # which counts with the tick
             return ()
-        return (IdleCounter("gap_timer.age", 1, (self._spec.form.max_periods - 1,)),)
+        return (IdleCounter("gap_timer.age", 1, (self._spec.form.max_periods - 2,)),)
 
     @property
     def _size(self) -> Signal:
