@@ -108,6 +108,11 @@ AXES_BARS: dict[int, Mapping[str, Mapping[str, float]]] = {
     8: {"ECP5": {"COMB": 8 * 60, "FF": 8 * 65, "MULT": 0, "Fmax": 140}},
     32: {"ECP5": {"COMB": 32 * 26, "FF": 32 * 22, "MULT": 0, "Fmax": 140}},
 }
+TRACK_AXES: tuple[tuple[int, str, Mapping[str, Mapping[str, float]]], ...] = (
+    (8, "100us", {"ECP5": {"COMB": 1500, "Fmax": 48}}),
+    (32, "100us", {"ECP5": {"COMB": 32 * 90}}),
+    (64, "200us", {"ECP5": {"COMB": 64 * 60}}),
+)
 LOOP_BARS = {
     "ECP5": {"COMB": 1150, "FF": 700, "DP16KD": 2, "MULT": 0, "Fmax": 100},
     "UP5K": {"Fmax": 36},
@@ -339,18 +344,18 @@ CONFIGURATIONS = (
     *(
         Configuration(
             f"axes-track-{axes}",
-            f"axes of the core track, 100 us: {axes}",
+            f"axes of the core track, {tick}: {axes}",
             AxesSpec(
                 tachometer=TrackTachometer(
-                    encoder=Encoder(500, 4), timing=Timing.parse("48MHz", "100us", "10ms"), max_speed=MAX_SPEED
+                    encoder=Encoder(500, 4), timing=Timing.parse("48MHz", tick, "10ms"), max_speed=MAX_SPEED
                 ),
                 axes=axes,
             ),
-            {"ECP5": {"COMB": most}},
+            bars,
             is_option=False,
             targets=("ECP5",),
         )
-        for axes, most in ((8, 1500), (32, 2880))
+        for axes, tick, bars in TRACK_AXES
     ),
     *(
         Configuration(
