@@ -94,7 +94,7 @@ TICKS = [
     ({"clock": "48MHz"}, "track", 960),
     ({"clock": "12MHz"}, "track", 300),  # 25 µs: 250 clocks with multipliers
     ({"clock": "12.288MHz"}, "track", 1536),  # of 20 µs no whole number
-    ({"clock": "1MHz"}, "track", 250),
+    ({"clock": "1.2MHz"}, "track", 300),  # 250 µs
     ({"clock": "200kHz"}, "s", 4),  # track would need 2 ms
     ({"clock": "12MHz", "method": "s"}, "s", 240),
     ({"clock": "12MHz", "method": "track", "multiplier": "serial"}, "track", 1200),
