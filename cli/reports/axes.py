@@ -14,7 +14,7 @@ def axes_rows(spec: AxesSpec) -> list[tuple[str, str]]:
     latencies = manifest(spec)["latency_cycles"]
     own = {
         "greatest speed": f"{speed_text(alone, greatest)} ({axis.widths.max_velocity} counts per tick)",
-        "full scale": full_scale_text(alone, axis.scale.full_scale),
+        "full scale": full_scale_text(alone, axis),
         "widths": ", ".join(f"{port.name} {port.width}" for port in axis.ports.outputs if port.width > 1),
         **_reciprocal(spec),
         **{name: plural(clocks, "clock") for name, clocks in latencies.items()},

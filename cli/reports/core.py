@@ -36,7 +36,7 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
         ("maximum time", f"{short_time(timing.max_ticks * timing.tick_seconds)} ({timing.max_ticks} ticks)"),
         ("unit velocity", f"{speed_text(spec, spec.scale.unit_velocity)} (1 count per tick)"),
         ("greatest speed", greatest),
-        ("full scale", _full_scale(spec)),
+        ("full scale", full_scale_text(spec, spec)),
         (
             "one LSB of velocity",
             f"2^{-spec.widths.frac_bits} {spec.unit} = {speed_text(spec, spec.scale.rad_per_s_per_lsb)}; "
@@ -56,21 +56,18 @@ def choice(spec: TachometerSpec) -> list[tuple[str, str]]:
     return [("method", spec.words.method)] if spec.chosen else []
 
 
-def full_scale_text(spec: TachometerSpec, full_scale: int) -> str:
-    """Return a greatest velocity in LSB, in the unit of a core, and in that of speeds where it has none."""
+def full_scale_text(spec: TachometerSpec, axis: TachometerSpec) -> str:
+    """Return the greatest velocity of a core, or of an axis of it, in its unit, and as a speed if that is none."""
+    full_scale = axis.scale.full_scale
     value = f"{full_scale * 2.0**-spec.widths.frac_bits:.9g} {spec.unit}"
     if spec.unit == NATIVE:
         value += f" = {speed_text(spec, full_scale * spec.scale.rad_per_s_per_lsb)}"
-    return f"{value}, either way"
-
-
-def _full_scale(spec: TachometerSpec) -> str:
-    value = full_scale_text(spec, spec.scale.full_scale)
-    if not spec.scale.narrow:
-        return value
-    counted = spec.scale.shown_unit.of(spec.widths.max_velocity * spec.scale.unit_velocity)
-    held = f"{value}; that is what {spec.widths.velocity} bits hold"
-    return f"{held}, counted is up to {counted:.6g} {spec.scale.shown_unit.name}"
+    value += ", either way"
+    if axis.scale.narrow:
+        counted = speed_text(spec, axis.widths.max_velocity * spec.scale.unit_velocity)
+        value += f"; that is what {spec.widths.velocity} bits hold, counted is up to {counted}"
+        value += "; --max-speed makes an LSB with which it fits" * (spec.max_speed is None)
+    return value
 
 
 def measured(spec: TachometerSpec, plans: Plans, late: str = "") -> list[tuple[str, str]]:

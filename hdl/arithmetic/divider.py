@@ -1,6 +1,6 @@
 """A divider finds a quotient bit by bit."""
 
-from amaranth import Array, Cat, Const, Module, Signal, Value, signed
+from amaranth import Array, Cat, Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -11,10 +11,13 @@ class Divider(wiring.Component):
     In each step the divisor is taken from the doubled remainder, or added if that is negative; so it stays within
     −divisor … divisor − 1. The signs that it passes through, inverted but for the first, are the digits of the quotient
     in two's complement: Σ ±2^i is their weighted sum, and the last one is the correction to a remainder that is not
-    negative. The digits follow the dividend in its register, from which a bit goes to the remainder in each step. The
-    nearest integer is ⌊(2^s · dividend + ⌊divisor/2⌋) / divisor⌋, whose dividend has the divisor's bits at its end: so
-    nothing is to be added to the quotient. A counter shows when the last digit has come. It ends from any state, unlike
-    a marker among the digits.
+    negative. The digits follow the dividend in its register, from which a bit goes to the remainder in each step. A
+    counter shows when the last digit has come. It ends from any state, unlike a marker among the digits.
+
+    The nearest integer is ⌊(2^s · dividend + ⌊divisor/2⌋) / divisor⌋, whose dividend has the divisor's bits at its end:
+    so nothing is to be added to the quotient. These bits are read where they are, and no register takes the digits.
+
+    The dividend is a sum. The adder of the steps makes it, so that none stands before it.
 
     Latency: `done` is high as many clocks after `start` as the quotient has bits, and one; a `start` before `done`, or
     together with it, begins the next division.
@@ -28,22 +31,25 @@ class Divider(wiring.Component):
     nearest : bool
         Round to the nearest integer, a tie up.
     zeros : int
-        Bits at the end of each dividend that are 0.
+        Bits at the end of each part of the dividend that are 0.
 
     Members
     -------
     start : In(1)
-    dividend : In(signed(divisor_width + integer_bits + 1))
+    dividend, addend : In(signed(divisor_width + integer_bits + 1))
+        Two numbers whose sum is divided.
     divisor : In(divisor_width)
-        Positive; both are valid with `start`.
+        Positive; all three are valid with `start`.
     running : Out(1)
         A digit is found in this clock.
     digit : Out(1)
         The digits of the quotient in two's complement, the first ones first; the very first one is inverted.
+    last : Out(1)
+        If `running`, no digit follows this one.
     done : Out(1)
         One clock: the quotient is new.
     quotient : Out(signed(integer_bits + scale_bits + 1))
-        Held until the next start.
+        Held until the next start; not if `nearest`.
     by : Out(divisor_width)
         The divisor, held until the next start.
     """
@@ -51,6 +57,7 @@ class Divider(wiring.Component):
     def __init__(
         self, *, divisor_width: int, integer_bits: int, scale_bits: int, nearest: bool = False, zeros: int = 0
     ) -> None:
+        self._integer_bits = integer_bits
         self._steps = integer_bits + scale_bits
         self._scale_bits = scale_bits
         self._nearest = nearest
@@ -59,16 +66,25 @@ class Divider(wiring.Component):
             {
                 "start": In(1),
                 "dividend": In(signed(divisor_width + integer_bits + 1)),
+                "addend": In(signed(divisor_width + integer_bits + 1)),
                 "divisor": In(divisor_width),
                 "running": Out(1),
                 "digit": Out(1),
+                "last": Out(1),
                 "done": Out(1),
-                "quotient": Out(signed(self._steps + 1)),
+                **({} if nearest else {"quotient": Out(signed(self._steps + 1))}),
                 "by": Out(divisor_width),
             }
         )
         # Counts down to −1.
         self._left = Signal(signed((self._steps - 1).bit_length() + 1), name="left", reset_less=True)
+
+    @property
+    def dividend_digits(self) -> int:
+        """Digits of the dividend that a register holds; the others, of half the divisor, are those of `by`."""
+        if not self._nearest:
+            return self._steps + 1
+        return max(self._integer_bits - self._halved, 1)
 
     def next_digit_of(self, number: int) -> Value:
         """Return what `digit` would be in the clock after this one if the quotient were this number."""
@@ -86,38 +102,52 @@ class Divider(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         # Only the flags of work in progress need a reset; all else is loaded before it is used.
-        left, running = self._left, self.running
+        left, running, start = self._left, self.running, self.start
         remainder = Signal(signed(len(self.by) + 1), reset_less=True)
-        digits = Signal(self._steps + 1, reset_less=True)
         by = Signal.like(self.by, reset_less=True)
-        negative = remainder[-1]
-        m.d.comb += [self.by.eq(by), self.digit.eq(~negative), self.quotient.eq(Cat(digits[:-1], ~digits[-1]))]
-        # 2·remainder ± by with one adder: −by is ~by + 1, and the 1 comes from an additional bit at the adder's end.
-        term = Cat(by, Const(0)) ^ (~negative).replicate(len(by) + 1)
-        total = Cat(1, digits[-1], remainder).as_signed() + Cat(~negative, term).as_signed()
-        m.d.sync += self.done.eq(running & left[-1] & ~self.start)
+        halved, dividend = self._halved, self._dividend
+        own = self._integer_bits - halved
+        digits = Signal(self.dividend_digits, reset_less=True)
+        m.d.comb += [self.by.eq(by), self.digit.eq(~remainder[-1]), self.last.eq(left[-1])]
+        # 2·remainder ± by with one adder: −by is ~by + 1, and the 1 comes from an additional bit at the adder's end. At
+        # the start the same adder has the two parts of the dividend.
+        whole = slice(halved, halved + own + len(remainder))
+        term = Cat(Const(0, own), by, Const(0)) ^ self.digit.replicate(own + len(by) + 1)
+        one = Mux(start, dividend[whole], Cat(Const(0, own), digits[-1], remainder[:-1]))
+        other = Mux(start, self.addend[whole], term)
+        total = (Cat(1, one) + Cat(self.digit & ~start, other))[1:]
+        coming: Value = self.digit
+        if self._nearest:
+            # Of half the divisor, as far behind as there are digits.
+            coming = Cat(Const(0, len(digits)), by[1:]).bit_select(left[:-1], 1)
+        else:
+            m.d.comb += self.quotient.eq(Cat(digits[:-1], ~digits[-1]))
+        m.d.sync += self.done.eq(running & left[-1] & ~start)
+        with m.If(running | start):
+            m.d.sync += remainder.eq(total[own:])
         with m.If(running):
-            m.d.sync += [remainder.eq(total >> 1), digits.eq(Cat(self.digit, digits)), left.eq(left - 1)]
+            m.d.sync += [digits.eq(Cat(coming, digits)), left.eq(left - 1)]
         with m.If(left[-1]):
             m.d.sync += running.eq(0)
-        with m.If(self.start):
-            m.d.sync += [
-                running.eq(1),
-                Cat(digits[1:], remainder).eq(self._scaled),
-                left.eq(self._steps - 1),
-                by.eq(self.divisor),
-            ]
+        with m.If(start):
+            first = Cat(Const(0, len(digits) - own), total[:own]) if own else self.divisor >> self._steps
+            m.d.sync += [running.eq(1), digits.eq(first), left.eq(self._steps - 1), by.eq(self.divisor)]
         return m
 
     @property
-    def _scaled(self) -> Value:
-        """The dividend."""
-        scale, zeros = self._scale_bits, self._zeros
+    def _above(self) -> Value:
+        """Return the bits of half the divisor that do not lie below the dividend."""
+        return self.divisor[1 + self._scale_bits :]
+
+    @property
+    def _halved(self) -> int:
+        """Return how many of the dividend's lowest integer bits are those of half the divisor."""
+        return min(self._zeros, self._integer_bits) if self._nearest and len(self._above) <= self._zeros else 0
+
+    @property
+    def _dividend(self) -> Value:
+        """Return what is divided, but for `addend` and what lies below."""
+        above = self._above
         if not self._nearest:
-            return self.dividend << scale
-        half = Cat(self.divisor[1:], Const(0, scale))
-        above = half[scale : max(scale, len(self.divisor) - 1)]
-        whole: Value = self.dividend + above
-        if len(above) <= zeros:
-            whole = Cat(above, Const(0, zeros - len(above)), self.dividend[zeros:])
-        return Cat(half[:scale], whole)
+            return self.dividend
+        return Cat(above, self.dividend[len(above) :]) if len(above) <= self._zeros else self.dividend + above

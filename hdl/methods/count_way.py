@@ -1,6 +1,6 @@
 """Which way a count leads."""
 
-from amaranth import Module, Mux, Signal, signed
+from amaranth import Module, Mux, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -8,35 +8,41 @@ from amaranth.lib.wiring import In, Out
 class CountWay(wiring.Component):
     """The way from the edge of the last count to that of a count; two counts of opposite sign are from one edge.
 
-    It looks a clock ahead, so that all comes from registers, and distances can be added at once.
+    It looks a clock ahead, so that all comes from registers, and distances can be added at once. Where the velocity
+    decays, the way is that of a count and a half.
 
     Parameters
     ----------
-    reversals : bool
-        Whether a count of the other sign leads nowhere.
+    half : int
+        Of a count.
+    decays, reversals : bool
+        Whether there are decays, and whether a count of the other sign leads nowhere.
 
     Members
     -------
     step_before : In(signed(2))
         The step of the next clock.
-    was_negative : In(1)
-        The sign of the last count before this clock.
-    step : Out(signed(2))
-        −1, 0 or +1.
-    moves, forward, backward : Out(1)
-        This step leads to another edge; in this direction.
+    decays_before, negative_before : In(1)
+        In the next clock, without a step, the velocity may decay; this is its sign.
+    moves_before : Out(1)
+        The step of the next clock leads to another edge.
+    way : Out(signed)
+    negative : Out(1)
+        The sign of the last count up to this clock.
     """
 
-    def __init__(self, *, reversals: bool) -> None:
+    def __init__(self, half: int, *, decays: bool, reversals: bool) -> None:
+        self._half = half
+        self._decays = decays
         self._reversals = reversals
         super().__init__(
             {
                 "step_before": In(signed(2)),
-                "was_negative": In(1),
-                "step": Out(signed(2)),
-                "moves": Out(1),
-                "forward": Out(1),
-                "backward": Out(1),
+                "decays_before": In(1),
+                "negative_before": In(1),
+                "moves_before": Out(1),
+                "way": Out(signed((3 * half).bit_length() + 1)),
+                "negative": Out(1),
             }
         )
 
@@ -44,13 +50,11 @@ class CountWay(wiring.Component):
         m = Module()
         # Bit 0 of a step tells that it is one, bit 1 its sign.
         counts, negative = self.step_before
-        last = Mux(self.step[0], self.step[1], self.was_negative)
-        leads = Signal()
-        m.d.comb += leads.eq(counts & (negative == last if self._reversals else 1))
-        m.d.sync += [
-            self.step.eq(self.step_before),
-            self.moves.eq(leads),
-            self.forward.eq(leads & ~negative),
-            self.backward.eq(leads & negative),
-        ]
+        m.d.comb += self.moves_before.eq(counts & (negative == self.negative if self._reversals else 1))
+        m.d.sync += self.way.eq(Mux(self.moves_before, Mux(negative, -2 * self._half, 2 * self._half), 0))
+        if self._decays:
+            with m.If(self.decays_before):
+                m.d.sync += self.way.eq(Mux(self.negative_before, -3 * self._half, 3 * self._half))
+        with m.If(counts):
+            m.d.sync += self.negative.eq(negative)
         return m

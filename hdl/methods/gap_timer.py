@@ -1,6 +1,6 @@
 """A timer measures the time since the last count."""
 
-from amaranth import Cat, Module, Signal, Value
+from amaranth import Cat, Module, Mux, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -8,7 +8,8 @@ from amaranth.lib.wiring import In, Out
 class GapTimer(wiring.Component):
     """Counts timer periods from count to count, and reports when too many periods have had no count.
 
-    Reset is treated as a count in the period before the first one; this count opens no window. Without latency.
+    Reset is treated as a count in the period before the first one; this count opens no window. Without latency: it
+    looks a clock ahead, so that a division starts from registers.
 
     Parameters
     ----------
@@ -19,23 +20,22 @@ class GapTimer(wiring.Component):
 
     Members
     -------
-    tick : In(1)
-    period : In(1)
+    coming : In(1)
+        A tick ends in the next clock.
+    count_before : In(1)
+        There is a count in the next clock; on the lattice only if `coming`.
+    period : Out(1)
         A timer period ends; one does with every tick.
-    count : In(1)
+    count : Out(1)
         Something was counted in this period.
-    negative : In(1)
-        The sign of this count.
     age : Out(range(max_periods + 1), init=1)
-        Periods since the last count, this one included; as the flags valid with `period`.
+        Periods since the last count, this one included; valid with `period`.
     opened : Out(1)
-        There was a count in the last `max_periods`.
-    was_negative : Out(1)
-        The sign of the last count.
-    overdue : Out(1)
-        The last count was `max_periods` ago, and this period has none.
-    silent : Out(1)
-        A tick ends in which there was no count.
+        There was a count in the last `max_periods`; valid with `period`.
+    overdue, overdue_before : Out(1)
+        The last count was `max_periods` ago, and this period has none; the same a clock earlier.
+    silent_before : Out(1)
+        In the next clock a tick ends in which there was no count.
     """
 
     def __init__(self, max_periods: int, *, on_lattice: bool) -> None:
@@ -43,33 +43,47 @@ class GapTimer(wiring.Component):
         self._on_lattice = on_lattice
         super().__init__(
             {
-                "tick": In(1),
-                "period": In(1),
-                "count": In(1),
-                "negative": In(1),
+                "coming": In(1),
+                "count_before": In(1),
+                "period": Out(1),
+                "count": Out(1),
                 "age": Out(range(max_periods + 1), init=1),
                 "opened": Out(1),
-                "was_negative": Out(1),
                 "overdue": Out(1),
-                "silent": Out(1),
+                "overdue_before": Out(1),
+                "silent_before": Out(1),
             }
         )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        longest = Signal()
-        m.d.comb += self.overdue.eq(self.period & longest & ~self.count)
-        earlier = Signal()  # a count in an earlier period of this tick
-        m.d.comb += self.silent.eq(self.tick & ~self.count & ~earlier)
-        if not self._on_lattice:
-            m.d.sync += earlier.eq(~self.tick & (self.count | earlier))
-        more = (self.age + 1)[: len(self.age)]
+        tick = Signal()
+        ends = self.count | self.overdue
         with m.If(self.period):
-            m.d.sync += [self.age.eq(more), longest.eq(has_reached(more, self._max_periods))]
-            with m.If(longest | self.count):
-                m.d.sync += [self.age.eq(1), longest.eq(0), self.opened.eq(self.count)]
-            with m.If(self.count):
-                m.d.sync += self.was_negative.eq(self.negative)
+            m.d.sync += self.age.eq(self.age + 1)
+            with m.If(ends):
+                m.d.sync += [self.age.eq(1), self.opened.eq(self.count)]
+        m.d.sync += [
+            tick.eq(self.coming),
+            self.count.eq(self.count_before),
+            self.overdue.eq(self.overdue_before),
+        ]
+        silent = self.coming & ~self.count_before
+        if self._on_lattice:
+            last = Signal()
+            later = Mux(tick, ~ends & has_reached(self.age + 1, self._max_periods), last)
+            longest = later & self.coming
+            m.d.comb += [self.period.eq(tick), self.silent_before.eq(silent)]
+            m.d.sync += last.eq(later)
+        else:
+            nearly = Signal()  # the next period may be the last one
+            longest = nearly & ~self.count
+            earlier = Signal()  # a count in an earlier period of this tick
+            counted = ~tick & (self.count | earlier)
+            m.d.comb += [self.period.eq(1), self.silent_before.eq(silent & ~counted)]
+            last_but_one = has_reached(self.age, self._max_periods - 2) & ~nearly
+            m.d.sync += [earlier.eq(counted), nearly.eq(last_but_one & ~ends)]
+        m.d.comb += self.overdue_before.eq(longest & ~self.count_before)
         return m
 
 

@@ -1,6 +1,6 @@
 """The M/T method."""
 
-from amaranth import Module, Mux, Signal, Value, ValueLike, signed
+from amaranth import Cat, Module, Mux, Signal, Value, ValueLike, signed
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
 from tachometry.hdl.methods.gap_timer import has_reached
@@ -31,57 +31,62 @@ class MTMethod(TimedDatapath):
     def idle(self) -> tuple[Idle, ...]:
         """Counters that a simulation may skip: `IdleCounter`."""
         counters = super().idle
-        stops = (self._min_periods, self._patient_periods)
-        return (*counters, IdleCounter("length", 1, stops)) if counters else ()
+        stops = (~self._min_periods, ~self._patient_periods)
+        return (*counters, IdleCounter("still", -1, stops)) if counters else ()
 
-    def _window(self, m: Module) -> tuple[Value, Value, Value]:
-        spec, timer = self._spec, self.gap_timer
-        length = Signal(spec.widths.interval, init=1)
+    def _window(self, m: Module) -> tuple[Value, Value, Value, Value]:
+        spec, timer, ends = self._spec, self.gap_timer, self.quotient_velocity.ends
+        # By how much a window is older than its last count has so few bits. So many of its length, inverted, are kept;
+        # the others follow from the age of the count.
+        bits = min((spec.form.max_interval - spec.form.max_periods).bit_length(), spec.widths.interval)
+        still = Signal(bits, init=(1 << bits) - 2)
+        length = Signal(spec.widths.interval)
         late = Signal()
+        late_next = Signal()
         travelled = Signal(signed(signed_width(self._most_travelled)), reset_less=True)
         total = Signal.like(travelled)
-        ends = Signal()
         opens = Signal()
-        may_end: ValueLike = self.quotient_velocity.free if spec.form.may_be_late else 1
-        if self._cycle_counts > 1:
-            may_end = ~self._waits(m, length, opens)
         m.d.comb += [
-            ends.eq(timer.count & timer.opened & late & may_end),
+            # The carry tells whether the low bits of the length are less than those of the age.
+            length.eq(Cat(~still, (timer.age + still)[bits:])),
+            late_next.eq(late),
             opens.eq(ends | ~timer.opened),
-            total.eq(travelled + self._distance),
+            total.eq(travelled + self._way),
         ]
         with m.If(timer.period):
-            m.d.sync += length.eq(length + 1)
-            with m.If(has_reached(length, self._min_periods)):
-                m.d.sync += late.eq(1)
+            m.d.sync += still.eq(still - 1)
+            with m.If(has_reached(~still, self._min_periods)):
+                m.d.comb += late_next.eq(1)
             with m.If(opens):
-                m.d.sync += [length.eq(1), late.eq(0)]
+                m.d.sync += still.eq(~1)
+                m.d.comb += late_next.eq(0)
+        m.d.sync += late.eq(late_next)
         with m.If(timer.count):
             m.d.sync += travelled.eq(Mux(opens, 0, total))
-        return ends, total, Mux(ends, length, timer.age)
+        may_end: ValueLike = self.quotient_velocity.free_before if spec.form.may_be_late else 1
+        if self._cycle_counts > 1:
+            may_end = ~self._waits(m, still, opens)
+        ends_before = timer.count_before & timer.opened & ~timer.overdue & late_next & may_end
+        return ends_before, travelled, total, Mux(ends, length, timer.age)
 
-    def _waits(self, m: Module, length: Signal, opens: Signal) -> Value:
-        """Tell whether this count lies within a cycle that the window is to complete."""
+    def _waits(self, m: Module, still: Signal, opens: Signal) -> Value:
+        """Tell whether the count of the next clock lies within a cycle that the window is to complete."""
         # Counts since the window opened: as long as none is against the one before, their sum but for the sign.
         counted = Signal(range(self._cycle_counts))
         number = Signal.like(counted)
-        cycled = Signal()
-        waived = Signal()
-        m.d.comb += number.eq(counted + 1)
-        with m.If(has_reached(length, self._patient_periods)):
-            m.d.sync += waived.eq(1)
-        with m.If(self.gap_timer.count):
-            m.d.sync += [counted.eq(number), cycled.eq(cycled | (number == 0))]
-            with m.If(~self._same):
-                m.d.sync += waived.eq(1)
-        with m.If(opens):
-            m.d.sync += [counted.eq(0), cycled.eq(0), waived.eq(0)]
-        return cycled & (number != 0) & ~waived & self._same
+        cycled, rounds, waived, waives = Signal(), Signal(), Signal(), Signal()
+        way, count = self.count_way, self.gap_timer.count
+        m.d.comb += [
+            number.eq(Mux(opens, 0, counted + count)),
+            rounds.eq(~opens & (cycled | (count & counted.all()))),
+            waives.eq(~opens & (waived | has_reached(~still, self._patient_periods) | (count & ~way.way.any()))),
+        ]
+        m.d.sync += [counted.eq(number), cycled.eq(rounds), waived.eq(waives)]
+        return rounds & ~number.all() & ~waives & way.moves_before
 
     @property
-    def _distance(self) -> Value:
-        """From the edge of the last count to that of this one; on the lattice, to the last edge of the tick."""
+    def _way(self) -> Value:
         if not self._spec.form.on_lattice:
-            return self._way
+            return super()._way
         # All counts of the tick, less the one that meets the same edge again.
-        return self._size + Mux(self._same, 0, Mux(self.gap_timer.negative, 1, -1))
+        return self.pulse_count + Mux(self._same, 0, Mux(self.pulse_count[-1], 1, -1))

@@ -15,26 +15,32 @@ from tachometry.spec.methods.timed import TimedTachometer
 class QuotientVelocity(wiring.Component):
     """Divides distance by time, rounds, and holds the result; between measurements the velocity may decay.
 
-    A measurement may begin when `free` is high. When `decay` is high and the divider is idle, it finds 1½ counts over
-    the time since the last count: an edge may lie half a count off. If that, rounded, is nearer to 0 than the velocity,
-    it becomes the velocity. A measurement that begins meanwhile takes the divider, and the velocity does not decay.
+    A measurement may begin when `free_before` is high. When `silent_before` is high and the divider is idle, it finds
+    1½ counts over the time since the last count: an edge may lie half a count off. If that, rounded, is nearer to 0
+    than the velocity, it becomes the velocity. A measurement that begins meanwhile takes the divider, and the velocity
+    does not decay. What begins is told a clock before, so that registers start the divider.
 
-    Latency: an update comes `spec.latency.datapath` clocks after `measure` or `decay`.
+    Latency: an update comes `spec.latency.datapath` clocks after `ends` or `decays`, or what would force a 0.
 
     Members
     -------
-    measure : In(1)
-        Only if `free`; `dividend` is valid.
-    decay : In(1)
-        `divisor` is the time since the last count.
-    dividend : In(signed)
-        Distance in counts, times the timer periods in a tick.
+    ends_before, overdue_before, silent_before : In(1)
+        In the next clock: a measurement ends with a count, only if `free_before`; a 0 is forced; a tick was silent.
+    free_before : Out(1)
+        In the next clock no measurement is being divided.
+    ends, decays : Out(1)
+        A measurement ends with a count; a division begins that lets the velocity decay.
+    decays_before, negative_before : Out(1)
+        The latter in the next clock, and the sign of the velocity then.
+    dividend, addend : In(signed)
+        Two distances in half counts, times the timer periods in a tick, whose sum is divided: of a measurement, of a
+        decay, or 0.
+    distance : In(signed)
+        With `ends`: their sum in counts, else 0.
     divisor : In(spec.widths.interval)
         Time in timer periods.
-    forced_in, beyond_in : In(1)
-        Valid with `measure` and `decay`, as `divisor`.
-    free : Out(1)
-        No measurement is being divided.
+    beyond_in : In(1)
+        Valid as `dividend`.
     stamp : In
         Only with an age: number of ticks so far.
     known, was_negative : In(1)
@@ -65,13 +71,13 @@ class QuotientVelocity(wiring.Component):
         }
         super().__init__(
             {
-                "measure": In(1),
-                "decay": In(1),
-                "dividend": In(signed(spec.form.distance_width)),
+                **{name: In(1) for name in ("ends_before", "overdue_before", "silent_before")},
+                **{name: Out(1) for name in ("free_before", "ends", "decays", "decays_before", "negative_before")},
+                "dividend": In(signed(spec.form.distance_width + 1)),
+                "addend": In(signed(spec.form.distance_width + 1)),
+                "distance": In(signed(spec.form.distance_width)),
                 "divisor": In(spec.widths.interval),
-                "forced_in": In(1),
                 "beyond_in": In(1),
-                "free": Out(1),
                 **{name: In(width) for name, width in stamped(spec).items()},
                 **({"known": In(1), "was_negative": In(1)} if spec.bounds else {}),
                 "updates": Out(update_stream(update_layout(spec))),
@@ -85,24 +91,28 @@ class QuotientVelocity(wiring.Component):
         m.d.comb += self.updates.p.eq(new)
         m.submodules.divider = divider = self.divider
         measuring = Signal()
-        # Not before the result of the last division is in `velocity`.
-        decays = Signal()
+        start = Signal()
         if spec.form.decays:
-            m.d.comb += decays.eq(self.decay & ~self.measure & ~divider.running & ~divider.done)
-        halves = self.dividend << 1
-        greatest = Mux(new.velocity[-1], -3 * spec.form.timer_periods, 3 * spec.form.timer_periods)
+            # Not before the result of the last division is in `velocity`.
+            idle = ~start & ~divider.running
+            m.d.comb += self.decays_before.eq(self.silent_before & ~self.overdue_before & idle)
         m.d.comb += [
-            self.free.eq(~(measuring & divider.running)),
-            divider.start.eq(self.measure | decays),
+            self.free_before.eq(~Mux(start, ~self.decays, measuring & divider.running & ~divider.last)),
+            divider.start.eq(start),
+            divider.dividend.eq(self.dividend),
+            divider.addend.eq(self.addend),
             divider.divisor.eq(self.divisor),
         ]
-        divided, too_far = self._taken(m, halves, Mux(self.measure, halves, greatest) if spec.form.decays else halves)
-        m.d.comb += divider.dividend.eq(divided)
+        m.d.sync += [
+            self.ends.eq(self.ends_before),
+            self.decays.eq(self.decays_before),
+            start.eq(self.ends_before | self.overdue_before | self.decays_before),
+        ]
         forced, beyond = (Signal(name=name, reset_less=True) for name in ("forced", "beyond"))
-        with m.If(divider.start):
-            m.d.sync += [measuring.eq(self.measure), forced.eq(self.forced_in), beyond.eq(self.beyond_in)]
+        with m.If(start):
+            m.d.sync += [measuring.eq(~self.decays), forced.eq(~self.ends), beyond.eq(self.beyond_in)]
 
-        nearer, beyond_most, velocity = self._bounded(m, measuring, new.velocity, measuring & too_far)
+        nearer, beyond_most, velocity = self._bounded(m, measuring, new.velocity, measuring & self._too_far(m))
         update = Signal()
         m.d.comb += update.eq(divider.done & (measuring | nearer if spec.form.decays else 1))
         m.d.sync += self.updates.valid.eq(update)
@@ -117,25 +127,23 @@ class QuotientVelocity(wiring.Component):
             with m.If(update):
                 m.d.sync += new.stamp.eq(stamp)
         if spec.bounds:
-            self._bounds(m, new, decays, update)
+            self._bounds(m, new, update)
         return m
 
-    def _taken(self, m: Module, way: Value, divided: Value) -> tuple[Value, Value]:
-        """Return what the divider takes of a number, and whether the way is more than it takes.
+    def _too_far(self, m: Module) -> Value:
+        """Tell, while a distance is divided, whether it is more than the divider takes.
 
-        The latter is known while the way is divided. Only with a greatest speed is the divider so narrow; a way that it
-        does not take is too fast in any time.
+        Only with a greatest speed is the divider so narrow; a way that it does not take is too fast in any time.
         """
-        taken = len(self.divider.dividend)
-        if len(way) <= taken:
-            return divided, Const(0)
+        if len(self.distance) < len(self.divider.dividend):
+            return Const(0)
         # One bit less than its register has, so that the first remainder can be doubled: then the second digit of a
         # quotient that is too great for all digits is always another one than that of the greatest speed.
-        kept = taken - 2  # and twice the sign
-        upper = Signal(len(way) - kept, reset_less=True)
+        way = self.distance[len(self.divider.dividend) - 3 :]
+        upper = Signal(len(way), reset_less=True)
         with m.If(self.divider.start):
-            m.d.sync += upper.eq(way[kept:])
-        return Cat(divided[:kept], divided[-1].replicate(2)), upper != upper[-1].replicate(len(upper))
+            m.d.sync += upper.eq(way)
+        return upper != upper[-1].replicate(len(upper))
 
     def _bounded(self, m: Module, measuring: Signal, velocity: Value, too_far: Value) -> tuple[Value, Value, Value]:
         """Return the quotient held within a bound: whether it was nearer to 0, or beyond, and what it is then.
@@ -146,9 +154,14 @@ class QuotientVelocity(wiring.Component):
         A copy of the velocity goes around in step with the digits of a decay, and takes up those of the result.
         """
         spec, divider = self._spec, self.divider
+        bits = spec.form.quotient_bits + 1
+        copy = Signal(bits, init=1 << (bits - 1))
+        result = Cat(copy[:-1], ~copy[-1]).as_signed()
+        m.d.comb += self.negative_before.eq(~copy[-1])
         if not (spec.form.decays or spec.form.saturates):
-            return Const(0), Const(0), divider.quotient
-        copy = Signal(len(divider.quotient), init=1 << (len(divider.quotient) - 1))
+            with m.If(divider.running):
+                m.d.sync += copy.eq(Cat(divider.digit, copy))
+            return Const(0), Const(0), result
         nearer = Signal(reset_less=True)
         farther = Signal(reset_less=True)
         comes_nearer = Signal()
@@ -161,8 +174,9 @@ class QuotientVelocity(wiring.Component):
             most = Signal(reset_less=True)
             limit = spec.widths.max_count << spec.widths.native_frac_bits
             m.d.sync += most.eq(Mux(negative, divider.next_digit_of(-limit), divider.next_digit_of(limit)))
+            sign = Mux(self.decays, self.negative_before, self.distance[-1])
             with m.If(divider.start):
-                m.d.sync += [negative.eq(divider.dividend[-1]), most.eq(~divider.dividend[-1])]
+                m.d.sync += [negative.eq(sign), most.eq(~sign)]
             bound = Mux(measuring, most, bound) if spec.form.decays else most
             bounded = Const(1)
         m.d.comb += [
@@ -176,9 +190,9 @@ class QuotientVelocity(wiring.Component):
             ]
         with m.If(divider.start):
             m.d.sync += Cat(nearer, farther).eq(0)
-        return nearer, farther if spec.form.saturates else Const(0), Cat(copy[:-1], ~copy[-1]).as_signed()
+        return nearer, farther if spec.form.saturates else Const(0), result
 
-    def _bounds(self, m: Module, new: data.View, decays: Value, update: Value) -> None:
+    def _bounds(self, m: Module, new: data.View, update: Value) -> None:
         """Add two more dividers, with the latency of the first, for the least and the greatest possible velocity."""
         counted = Signal()
         # Distances in 2^−finer counts, and by how much edges may be off.
@@ -186,7 +200,7 @@ class QuotientVelocity(wiring.Component):
         count = self._spec.form.timer_periods << finer
         off = int(self._spec.bound.edge_error * count)
         greatest = count + off
-        m.d.comb += counted.eq(self.measure & ~self.forced_in)
+        m.d.comb += counted.eq(self.ends)
         known = Signal(reset_less=True)
         with m.If(self.divider.start):
             m.d.sync += known.eq(self.known)
@@ -194,10 +208,10 @@ class QuotientVelocity(wiring.Component):
             m.submodules[f"divider_{name}"] = box
             upper = name == "velocity_upper"
             # The upper bound is rounded up: as the negative of what is rounded down.
-            distance = -self.dividend if upper else self.dividend
+            distance = -self.distance if upper else self.distance
             # While the velocity decays, the shaft is no farther back than its last edge.
             signs = new.velocity[-1], self.was_negative
-            still = decays & (signs[0] & signs[1] if upper else ~(signs[0] | signs[1]))
+            still = self.decays & (signs[0] & signs[1] if upper else ~(signs[0] | signs[1]))
             end = Signal.like(box.dividend)
             none = Signal(reset_less=True)
             m.d.comb += [

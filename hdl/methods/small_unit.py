@@ -167,7 +167,6 @@ class SmallUnit(Unit):
             ]
         with m.Elif(multiplies):
             m.d.sync += self.factor.eq(self.factor.rotate_right(2))
-        behind = Mux(work[end + 1], work[end - CHANCE_BITS + 1 :], work[end - CHANCE_BITS :])
         m.d.comb += [
             self.busy.eq(begins | ~rests),
             self.result.eq(work[CHANCE_BITS : CHANCE_BITS + WIDTH].as_signed()),
@@ -176,7 +175,11 @@ class SmallUnit(Unit):
                 Mux(
                     doing == Start.EXP,
                     self.power_address,
-                    Mux(doing == Start.GAIN, self.gain_address, self.log_address(behind)),
+                    Mux(
+                        doing == Start.GAIN,
+                        self.gain_address,
+                        self.log_address(work[end - CHANCE_BITS :], work[end + 1]),
+                    ),
                 )
             ),
         ]

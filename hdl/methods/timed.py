@@ -1,6 +1,6 @@
 """The datapaths of the methods that measure the time between counts share this."""
 
-from amaranth import Cat, Const, Module, Mux, Signal, Value, ValueLike, signed
+from amaranth import Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 
@@ -19,11 +19,14 @@ class TimedDatapath(wiring.Component):
 
     Members
     -------
-    tick : In(1)
     pulse_count : In(signed)
-        m_e, valid with `tick`.
+        m_e.
+    coming : In(1)
+        `pulse_count` is new in the next clock, and a tick has ended.
     step_before : In(signed(2))
-        The step of the next clock, steps being as late as `tick`; only if times are counted in clocks.
+        The step of the next clock, steps being as late as ticks; only if times are counted in clocks.
+    next_count : In(signed)
+        The next `pulse_count`, valid with `coming`; only if times are counted in ticks.
     updates : Out(stream)
         `interval` is in timer periods. `forced`: silence alone caused the update. `out_of_range`, only if that is
         possible: the velocity was too high to be measured, and is saturated.
@@ -34,8 +37,12 @@ class TimedDatapath(wiring.Component):
         self.gap_timer = GapTimer(spec.form.max_periods, on_lattice=spec.form.on_lattice)
         self.quotient_velocity = QuotientVelocity(spec)
         if not spec.form.on_lattice:
-            self.count_way = CountWay(reversals=not spec.paper_exact)
-        super().__init__({**datapath_members(spec), **({} if spec.form.on_lattice else {"step_before": In(signed(2))})})
+            self.count_way = CountWay(spec.form.timer_periods, decays=spec.form.decays, reversals=not spec.paper_exact)
+        ahead = ("next_count", spec.widths.count) if spec.form.on_lattice else ("step_before", 2)
+        members = datapath_members(spec) | {"coming": In(1), ahead[0]: In(signed(ahead[1]))}
+        super().__init__({name: member for name, member in members.items() if name != "tick"})
+        # On the lattice: the sign of the last count, and whether this count is from another edge than that.
+        self._was_negative, self._same = Signal(name="was_negative"), Signal(name="same")
 
     @property
     def probes(self) -> dict[str, Value]:
@@ -49,65 +56,55 @@ class TimedDatapath(wiring.Component):
             return ()
         return (IdleCounter("gap_timer.age", 1, (self._spec.form.max_periods - 2,)),)
 
-    @property
-    def _size(self) -> Signal:
-        """The count of a timer period."""
-        size: Signal = self.pulse_count if self._spec.form.on_lattice else self.count_way.step
-        return size
+    def _window(self, m: Module) -> tuple[Value, Value, Value, Value]:
+        """Tell if a measurement ends in the next clock, its distance before this count and with it, and its length.
 
-    @property
-    def _one(self) -> ValueLike:
-        """A count of this sign, times the timer periods in a tick."""
-        return Mux(self.gap_timer.negative, -self._spec.form.timer_periods, self._spec.form.timer_periods)
-
-    @property
-    def _same(self) -> Value:
-        """Whether this count is from another edge than the last count."""
-        if not self._spec.form.on_lattice:
-            return self.count_way.moves
-        if self._spec.paper_exact:
-            return Value.cast(1)
-        return self.gap_timer.was_negative == self.gap_timer.negative
-
-    @property
-    def _way(self) -> Value:
-        """From the edge of the last count to that of this one, times the timer periods in a tick; 0 without a count."""
-        periods = self._spec.form.timer_periods
-        # No bit is a gate: each is one of the registers.
-        way = self.count_way
-        bits = {(0, 0): Const(0), (1, 0): way.forward, (0, 1): way.backward, (1, 1): way.moves}
-        return Cat(bits[periods >> k & 1, -periods >> k & 1] for k in range(periods.bit_length() + 1)).as_signed()
-
-    def _window(self, m: Module) -> tuple[Value, Value, Value]:
-        """Tell whether a measurement ends with this count, its distance, and its length.
-
-        The distance is in counts, times the timer periods in a tick. Where nothing ends, the length is the age of the
+        Distances are in counts, times the timer periods in a tick. Where nothing ends, the length is the age of the
         last count.
         """
         raise NotImplementedError
+
+    @property
+    def _way(self) -> Value:
+        """The way of this count, times the timer periods in a tick."""
+        return self.count_way.way >> 1
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         spec = self._spec
         m.submodules.gap_timer = timer = self.gap_timer
         m.submodules.quotient_velocity = quotient = self.quotient_velocity
-        size = self._size
-        if not spec.form.on_lattice:
+        if spec.form.on_lattice:
+            negative, was_negative = self.pulse_count[-1], self._was_negative
+            m.d.comb += [
+                self._same.eq(1 if spec.paper_exact else negative == was_negative),
+                timer.count_before.eq(self.coming & self.next_count.any()),
+            ]
+            with m.If(timer.count):
+                m.d.sync += was_negative.eq(negative)
+            decay = Mux(quotient.decays, Mux(quotient.negative_before, -3, 3), 0)
+            addend = Mux(quotient.ends, self._way << 1, decay)
+        else:
             m.submodules.count_way = way = self.count_way
-            m.d.comb += [way.step_before.eq(self.step_before), way.was_negative.eq(timer.was_negative)]
-        ends, distance, time = self._window(m)
+            m.d.comb += [
+                way.step_before.eq(self.step_before),
+                way.decays_before.eq(quotient.decays_before),
+                way.negative_before.eq(quotient.negative_before),
+                # Bit 0 of a step tells that it is one.
+                timer.count_before.eq(self.step_before[0]),
+            ]
+            addend, was_negative = way.way, way.negative
+        ends_before, before, distance, time = self._window(m)
         wiring.connect(m, quotient.updates, wiring.flipped(self.updates))
         m.d.comb += [
-            timer.tick.eq(self.tick),
-            timer.period.eq(self.tick if spec.form.on_lattice else 1),
-            # Bit 0 of a step tells that it is one.
-            timer.count.eq(self.tick & size.any() if spec.form.on_lattice else size[0]),
-            timer.negative.eq(size[-1]),
-            quotient.measure.eq(timer.overdue | ends),
-            quotient.decay.eq(timer.silent),
-            quotient.dividend.eq(Mux(timer.overdue, 0, distance)),
+            timer.coming.eq(self.coming),
+            quotient.ends_before.eq(ends_before),
+            quotient.overdue_before.eq(timer.overdue_before),
+            quotient.silent_before.eq(timer.silent_before),
+            quotient.dividend.eq(Mux(quotient.ends, before << 1, 0)),
+            quotient.addend.eq(addend),
+            quotient.distance.eq(Mux(quotient.ends, distance, 0)),
             quotient.divisor.eq(time),
-            quotient.forced_in.eq(~timer.count),
         ]
         if spec.widths.stamp:
             m.d.comb += quotient.stamp.eq(self.stamp)
@@ -117,7 +114,7 @@ class TimedDatapath(wiring.Component):
             with m.If(timer.overdue):
                 m.d.sync += begun.eq(1)
             m.d.comb += [
-                quotient.was_negative.eq(timer.was_negative),
+                quotient.was_negative.eq(was_negative),
                 quotient.known.eq(~quotient.beyond_in & (begun | timer.opened)),
             ]
         return m

@@ -242,12 +242,16 @@ class TrackMachine(wiring.Component):
             for number, one in enumerate(given):
                 with m.If(~hold & (earlier.word != FIRST_INPUT + number)):
                     m.d.sync += one.eq(0)
+            kept = Mux(go & now.keep, total[-1], sign)
+            following_minus = Signal()
+            with m.If(~hold):
+                m.d.sync += following_minus.eq(coming.subtract ^ (coming.by_sign & kept))
             m.d.sync += negative.eq(below)
         flipped = (right ^ minus.replicate(WIDTH))[:WIDTH]
         m.d.comb += [
             left.eq(Mux(used, sum_, 0) | given | added if two else sum_),
             right.eq(word | Mux(from_unit, unit.result, 0)),
-            minus.eq(now.subtract ^ (now.by_sign & sign)),
+            minus.eq(now.subtract ^ (now.by_sign & sign) if two else following_minus),
             carry.eq(minus ^ (from_unit & unit.up)),
             total.eq((Cat(C(1, 1), left).as_signed() + Cat(carry, flipped).as_signed()) >> 1),
         ]

@@ -21,6 +21,7 @@ from tachometry.spec.formats.tracking import (
     LOG_BITS,
     LOG_INDEX,
     POWER_BITS,
+    POWERS,
     RESULT_BITS,
     WIDTH,
 )
@@ -92,7 +93,7 @@ class Unit(wiring.Component):
         place = (~self.operand)[_GAIN_LOW : _GAIN_LOW + 9]
         beyond = place[8] | (place[7] & place[5:7].any())  # beyond the last
         gain = Mux(beyond, GAINS_FROM - 1, place[: GAINS.bit_length() - 1])
-        self.gain_address = Cat(gain, (self.how_done[:2] + (len(values) - 3 * GAINS) // GAINS)[:3])
+        self.gain_address = Cat(gain, (self.how_done[:2] + len(POWERS) // GAINS)[:3])
         self.power_address = self.operand[LOG_BITS - EXP_INDEX : LOG_BITS]
         self.whole = self.operand[LOG_BITS : LOG_BITS + 9].as_signed()
         shifts = self._program.shifts
@@ -108,9 +109,10 @@ class Unit(wiring.Component):
     def _work(self, m: Module) -> None:
         raise NotImplementedError
 
-    def log_address(self, shifted: Value) -> Value:
-        """Return where the logarithm stands of what is behind the leading one at bit 8."""
-        return Cat(shifted[CHANCE_BITS - LOG_INDEX : CHANCE_BITS], C((1 << EXP_INDEX) >> LOG_INDEX, 10 - LOG_INDEX))
+    @staticmethod
+    def log_address(shifted: Value, above: Value) -> Value:
+        """Return where the logarithm stands of what is behind the leading one at bit 8, or at bit 9 if `above`."""
+        return Cat(shifted[CHANCE_BITS - LOG_INDEX : CHANCE_BITS], shifted[CHANCE_BITS] | ~above, above, C(1, 1))
 
     @staticmethod
     def too_large(product: Value) -> Value:
@@ -206,7 +208,11 @@ class QuickUnit(Unit):
         was_gain = Signal()
         m.d.sync += [log_whole.eq(whole), was_log.eq(is_log), was_gain.eq(doing == Start.GAIN)]
         m.d.comb += self.table.addr.eq(
-            Mux(is_log, self.log_address(shifted), Mux(doing == Start.GAIN, self.gain_address, self.power_address))
+            Mux(
+                is_log,
+                self.log_address(shifted, C(0, 1)),
+                Mux(doing == Start.GAIN, self.gain_address, self.power_address),
+            )
         )
         found, data = shifted[CHANCE_BITS : CHANCE_BITS + WIDTH], self.table.data
         looked_up = Signal()

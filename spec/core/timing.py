@@ -43,7 +43,7 @@ def _tick(what: str, text: str, timing: Mapping[str, Any]) -> int:
     _check_clock(timing["clock_hz"])
     if text.strip().lower().endswith("hz"):
         return _of_frequency(what, text, timing)
-    return _check_tick(parse_clocks(what, text, timing))
+    return _check_tick(parse_clocks(what, text, timing), timing["clock_hz"])
 
 
 def _of_frequency(what: str, text: str, timing: Mapping[str, Any]) -> int:
@@ -51,7 +51,8 @@ def _of_frequency(what: str, text: str, timing: Mapping[str, Any]) -> int:
     hertz = read_exactly(what, text, FREQUENCY)
     if hertz <= 0:
         raise ParameterError(what, f"must be greater than 0, not {text}")
-    return _check_tick(_whole(what, text, 1 / hertz, Fraction(1, timing["clock_hz"]), "clock", instead="--tick "))
+    clock_hz = timing["clock_hz"]
+    return _check_tick(_whole(what, text, 1 / hertz, Fraction(1, clock_hz), "clock", instead="--tick "), clock_hz)
 
 
 def _check_clock(hertz: int) -> None:
@@ -59,9 +60,10 @@ def _check_clock(hertz: int) -> None:
         raise ParameterError("clock", f"must be from 1 Hz to 100 GHz, not {float(hertz):.6g} Hz")
 
 
-def _check_tick(cycles: int) -> int:
+def _check_tick(cycles: int, clock_hz: int) -> int:
     if not 1 <= cycles <= MAX_TICK_CYCLES:
-        raise ParameterError("tick_cycles", f"must be from 1 to {MAX_TICK_CYCLES}, not {cycles}")
+        longest = format_time(Fraction(MAX_TICK_CYCLES, clock_hz))
+        raise ParameterError("tick_cycles", f"must be from 1 to {MAX_TICK_CYCLES}, {longest}, not {cycles}")
     return cycles
 
 
@@ -139,9 +141,10 @@ class Timing:
 
     def __post_init__(self) -> None:
         _check_clock(self.clock_hz)
-        _check_tick(self.tick_cycles)
+        _check_tick(self.tick_cycles, self.clock_hz)
         if not MIN_TICKS <= self.max_ticks <= MAX_TICKS:
-            raise ParameterError("max_ticks", f"must be from {MIN_TICKS} to {MAX_TICKS}, not {self.max_ticks}")
+            ticks = f"from {MIN_TICKS} to {MAX_TICKS}, {format_time(MAX_TICKS * self.tick_seconds)}"
+            raise ParameterError("max_ticks", f"must be {ticks}, not {self.max_ticks}")
 
     @classmethod
     def parse(

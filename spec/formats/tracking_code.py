@@ -352,11 +352,14 @@ class Program:
 
     @cached_property
     def tables(self) -> tuple[int, ...]:
-        """The tables of the unit: powers, logarithms, gains."""
+        """The tables of the unit: powers, gains, logarithms; those again, each twice.
+
+        The small unit has the leading one at a bit or one above. So in both cases all bits are an address.
+        """
         turned = (
             gains[-GAINS_FROM:] + gains[:-GAINS_FROM] for gains in self.form.gains
         )  # so their index is one of log2
-        return (*POWERS, *LOGS, *(gain for gains in turned for gain in gains))
+        return (*POWERS, *(gain for gains in turned for gain in gains), *LOGS, *(log for log in LOGS for _ in range(2)))
 
 
 HOW_BITS = 4

@@ -33,10 +33,9 @@ def run(spec: TimedTachometer, counts: Mapping[int, int], n_clocks: int) -> list
     tick = spec.timing.tick_cycles
     rows = []
     for clock in range(n_clocks + spec.latency.datapath):
-        last = clock % tick == tick - 1
-        row = {"tick": int(last)}
+        row = {"coming": int(clock % tick == tick - 2)}
         if spec.form.on_lattice:
-            row["pulse_count"] = counts.get(clock // tick, 0) if last else row.get("pulse_count", 0)
+            row |= {"next_count": counts.get(clock // tick, 0), "pulse_count": counts.get((clock + 1) // tick - 1, 0)}
         else:
             row["step_before"] = counts.get(clock + 1, 0)
         rows.append(row)

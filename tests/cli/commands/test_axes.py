@@ -133,6 +133,16 @@ def test_no_figure_of_many(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert "--plot must not be given together with --axes" in capsys.readouterr().err
 
 
+def test_plan_tells_of_machines_and_of_a_velocity_that_is_narrow(capsys: pytest.CaptureFixture[str]) -> None:
+    core = "--ppr 500 --tick 20us --method track --velocity-width 12 --axes 4".split()
+    for speed, narrow in (["--max-speed", "400rad/s"], False), ([], True):
+        assert run("plan", *core, *speed) == 0
+        told = rows(capsys)
+        assert any(re.match(r"axes 4, .* of a tick, on 2 machines$", line) for line in told)
+        full_scale = next(line for line in told if line.startswith("full scale "))
+        assert full_scale.endswith("; --max-speed makes an LSB with which it fits") == narrow
+
+
 def test_verify(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "configurations", lambda method: [])
     monkeypatch.setattr(study, "AXES", AXES[2:3])

@@ -8,7 +8,7 @@ from support.simulate import clock_by_clock
 
 from tachometry.hdl.arithmetic import divider
 
-OUTPUTS = ["done", "quotient", "by", "running", "digit"]
+OUTPUTS = ["done", "by", "running", "digit", "last"]
 
 
 def check(
@@ -16,7 +16,8 @@ def check(
 ) -> None:
     """Each case as soon as the last is done, the first of all with the last digit of one that comes to nothing.
 
-    `zeros`: bits at the end of each dividend that are 0, where quotients are rounded to the nearest integer.
+    `zeros`: bits at the end of each dividend that are 0, where quotients are rounded to the nearest integer. Of each
+    dividend a part comes as its addend.
     """
     dut = divider.Divider(
         divisor_width=divisor_width,
@@ -29,18 +30,22 @@ def check(
     clocks = digits + 1
     rows = [{"start": 1, "dividend": 0, "divisor": 1}, *[{"start": 0}] * (digits - 1)]
     first = len(rows)
+    rng = np.random.default_rng(1)
     for dividend, by in cases:
-        rows += [{"start": 1, "dividend": dividend, "divisor": by}, *[{"start": 0}] * (clocks - 1)]
-    seen = clock_by_clock(dut, [*rows, {"start": 0}, {}], OUTPUTS)
+        addend = int(rng.integers(-abs(dividend), abs(dividend) + 1)) >> (zeros or 0) << (zeros or 0)
+        parts = {"dividend": dividend - addend, "addend": addend, "divisor": by}
+        rows += [{"start": 1, **parts}, *[{"start": 0}] * (clocks - 1)]
+    outputs = OUTPUTS if zeros is not None else [*OUTPUTS, "quotient"]
+    seen = clock_by_clock(dut, [*rows, {"start": 0}, {}], outputs)
     done = [clock for clock, row in enumerate(seen) if row["done"]]
     assert done == [first + (k + 1) * clocks for k in range(len(cases))]
     running = [clock for clock, row in enumerate(seen) if row["running"]]
     assert running == [*range(1, first + 1), *(clock - digits + k for clock in done for k in range(digits))]
     expected = [((dividend << scale_bits) + (by // 2 if zeros is not None else 0)) // by for dividend, by in cases]
-    assert [(seen[clock]["quotient"], seen[clock]["by"]) for clock in done] == [
-        (quotient, by) for quotient, (_, by) in zip(expected, cases, strict=True)
-    ]
-    assert seen[done[-1] + 1]["quotient"] == expected[-1]  # it is held
+    assert [clock for clock in running if seen[clock]["last"]] == [first, *(clock - 1 for clock in done)]
+    assert [seen[clock]["by"] for clock in done] == [by for _, by in cases]
+    if zeros is None:
+        assert [seen[clock]["quotient"] for clock in (*done, done[-1] + 1)] == [*expected, expected[-1]]  # it is held
     found = [sum(seen[clock - 1 - k]["digit"] << k for k in range(digits)) for clock in done]
     assert found == [quotient + (1 << (digits - 1)) for quotient in expected]
 

@@ -51,9 +51,10 @@ def check(method: str, timer: str, seed: int = 1) -> None:
     golden = golden.rows(golden.clock < n_clocks)
     rows = []
     for clock in range(n_clocks):
-        row = {"tick": int(clock < CLOCKS and clock % TICK == TICK - 1)}
+        row = {"coming": int(clock < CLOCKS and clock % TICK == TICK - 2)}
         if spec.form.on_lattice:
-            row["pulse_count"] = int(m_e[min(clock, CLOCKS - 1) // TICK])
+            window = min(clock, CLOCKS - 1) // TICK
+            row |= {"next_count": int(m_e[window]), "pulse_count": int(m_e[window])}
         else:
             row["step_before"] = int(step[clock + 1]) if clock + 1 < CLOCKS else 0
         rows.append(row)

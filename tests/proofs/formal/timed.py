@@ -6,15 +6,20 @@ from typing import Any
 from proofs.formal.probes import STANDSTILL_PROBES, counting, within
 from proofs.formal.prove import Proof
 
+from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
 from tachometry.spec import MTTachometer, TTachometer
 from tachometry.spec.language.units import signed_width
 
 _TIMED_PROBES = {
     "core_step": "decoder.step",
     "core_age": "datapath.gap_timer.age",
-    "core_longest": "datapath.gap_timer.longest",
     "core_opened": "datapath.gap_timer.opened",
-    "core_negative": "datapath.gap_timer.was_negative",
+    "core_ticked": "datapath.gap_timer.tick",
+    "core_count": "datapath.gap_timer.count",
+    "core_overdue": "datapath.gap_timer.overdue",
+    "core_ends": "datapath.quotient_velocity.ends",
+    "core_decays": "datapath.quotient_velocity.decays",
+    "core_start": "datapath.quotient_velocity.start",
     "core_measuring": "datapath.quotient_velocity.measuring",
     "core_done": "datapath.quotient_velocity.divider.done",
     "core_forced": "datapath.quotient_velocity.forced",
@@ -29,13 +34,12 @@ _TIMED_PROBES = {
 }
 _CLOCKED_PROBES = {
     "core_came": "datapath.gap_timer.earlier",
-    "core_counted_step": "datapath.count_way.step",
-    "core_moves": "datapath.count_way.moves",
-    "core_forward": "datapath.count_way.forward",
-    "core_backward": "datapath.count_way.backward",
+    "core_nearly": "datapath.gap_timer.nearly",
+    "core_way": "datapath.count_way.way",
 }
 _WINDOW_OF_MT_PROBES = {
     "core_length": "datapath.length",
+    "core_still": "datapath.still",
     "core_late": "datapath.late",
     "core_travelled": "datapath.travelled",
 }
@@ -75,6 +79,7 @@ def timed(
         "FLAGS": int(spec.form.flags_range),
         "INTEGER_BITS": spec.form.max_quotient.bit_length() + 1,
         "QUOTIENT_BITS": spec.form.quotient_bits,
+        "DIVIDEND_DIGITS": QuotientVelocity(spec).divider.dividend_digits,
         "TRAVELLED_WIDTH": signed_width(spec.form.most_travelled) if isinstance(spec, MTTachometer) else 1,
         "INTERVAL_WIDTH": spec.widths.interval,
         "FRAC_BITS": spec.widths.frac_bits,
@@ -83,7 +88,9 @@ def timed(
     probes = _TIMED_PROBES | STANDSTILL_PROBES | within("mt", _WINDOW_OF_MT_PROBES, mt)
     probes |= within("cycles", _CYCLES_OF_MT_PROBES, parameters["CYCLE"] > 1)
     probes |= within("clocked", _CLOCKED_PROBES, not spec.form.on_lattice)
-    probes |= within("lattice", {"core_window": "sampling_clock.left"}, spec.form.on_lattice)
+    lattice = {"core_window": "sampling_clock.left", "core_last": "datapath.gap_timer.last"}
+    probes |= within("lattice", lattice, spec.form.on_lattice)
+    probes["core_negative"] = "datapath.was_negative" if spec.form.on_lattice else "datapath.count_way.negative"
     probes |= within("flagged", {"out_of_range": "out_of_range"}, spec.form.flags_range)
     held = {"core_back": "negative", "core_most": "most"}
     probes |= within(

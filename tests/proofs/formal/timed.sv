@@ -18,6 +18,7 @@ module timed #(
     parameter SATURATES = 1,
     parameter FLAGS = 1,          // there is an out_of_range
     parameter INTEGER_BITS = 3,   // of any quotient of half counts
+    parameter DIVIDEND_DIGITS = 1,  // of the dividend, in a register of their own
     parameter TRAVELLED_WIDTH = 8,  // bits of the way of an M/T window
     parameter QUOTIENT_BITS = 6,  // that the divider makes after the sign
     parameter INTERVAL_WIDTH = 5,
@@ -42,11 +43,12 @@ module timed #(
   wire core_running, core_done, core_measuring, core_forced, core_opened, core_nearer;
   wire signed [$clog2(MAX_TICKS - 1):0] core_empty;
   wire core_rests, core_silent;
-  wire core_negative, core_longest;
+  wire core_negative, core_ticked, core_count, core_overdue, core_ends, core_decays, core_start;
   wire signed [1:0] core_step;
   wire [$clog2(MAX_PERIODS+1)-1:0] core_age;
   wire signed [I:0] core_remainder;
-  wire [N:0] core_digits, core_copy;
+  wire [DIVIDEND_DIGITS-1:0] core_digits;
+  wire [N:0] core_copy;
   wire signed [$clog2(N):0] core_steps;
   wire [I-1:0] core_by;
 
@@ -76,7 +78,10 @@ module timed #(
   wire [W-1:0] waited = UPSET ? core_age : age;
   wire late;
   reg was_negative = 0;
-  wire last_negative = UPSET ? core_negative : was_negative;
+  // The core's sign is that of this count already, where times are counted in clocks.
+  reg core_before = 0;
+  always @(posedge clk) core_before <= core_negative;
+  wire last_negative = UPSET ? (LATTICE ? core_negative : core_before) : was_negative;
   wire opened = idle < LONG;
   wire overdue = period && !count && waited == MAX_PERIODS;
   always @(posedge clk)
@@ -200,7 +205,7 @@ module timed #(
   wire fits = !SATURATES || (wanted < divisor * (LIMIT + 1) && wanted >= -divisor * LIMIT);
 
   // Lemmas: what the induction needs to know of the state. Of a division: what is divided, shifted, is the remainder and
-  // the divisor times the digits so far, 1 or -1 each; behind the digits is what is left of it.
+  // the divisor times the digits so far, 1 or -1 each; what is left of it is in a register, as far as it is no divisor.
   wire [4:0] j = since - 1;
   localparam A = Q + FRAC_BITS - 1;  // bits of any quotient
   wire signed [A+I+1:0] all = (distance <<< FRAC_BITS - 1) + $signed({1'b0, times[I-1:1]});
@@ -210,16 +215,22 @@ module timed #(
   wire signed [A+I+1:0] end_of_digits = $signed({1'b0, times}) <<< N;
   wire far = N < A && measuring && (distance >= FARTHEST || distance < -FARTHEST);
   wire over = far || (N < A && (all >= end_of_digits || all < -end_of_digits));
-  wire [N:0] found_digits = core_digits & ((1 << j) - 1);
+  reg [N:0] all_digits = 0;
+  always @(posedge clk) if (core_running) all_digits <= {all_digits, core_remainder >= 0};
+  wire [N:0] found_digits = all_digits & ((1 << j) - 1);
   wire signed [N+1:0] digits = $signed({1'b0, found_digits, 1'b0}) - (1 <<< j) + 1;
   wire signed [N+I+1:0] passed = $signed({1'b0, times}) * digits;
   wire signed [N+I+2:0] asked = (distance <<< FRAC_BITS) + $signed({1'b0, times}), twice = $signed({1'b0, times, 1'b0});
-  wire signed [N:0] quotient = $signed({!core_digits[N], core_digits[N-1:0]});
+  wire signed [N:0] quotient = $signed({!all_digits[N], all_digits[N-1:0]});
   wire signed [N+I+2:0] found = twice * quotient;
   // The bound, its first digits, and the velocity, signs inverted.
   wire minus = distance < 0;
   wire signed [N:0] bound = !measuring ? velocity : minus ? -LIMIT : LIMIT;
-  wire [N:0] bound_digits = {!bound[N], bound[N-1:0]} >> (N + 1 - j), more_digits = core_digits >> (j + 1);
+  wire [N:0] bound_digits = {!bound[N], bound[N-1:0]} >> (N + 1 - j);
+  // The digits that are left, the first of which are held.
+  localparam D = DIVIDEND_DIGITS;
+  wire [N-1:0] left_digits = all & ((1 << (N - j)) - 1);
+  wire [D-1:0] next_digits = N - j >= D ? left_digits >> (N - j - D) : left_digits << (D - (N - j));
   wire signed [N:0] long_velocity = velocity;
   wire [N:0] velocity_digits = {!long_velocity[N], long_velocity[N-1:0]};
   wire core_passes;
@@ -230,8 +241,10 @@ module timed #(
   always @* begin
     lemma_idle: assert (idle <= LONG + B && age >= 1 && age <= MAX_PERIODS);
     lemma_age: assert (!opened || (LATTICE ? idle + 1 == (age - 1) * T + phase : age == idle + 1));
-    lemma_timer: assert (core_age == age && core_longest == (age == MAX_PERIODS) && core_opened == opened
-        && core_negative == was_negative);
+    lemma_timer: assert (core_age == age && core_opened == opened
+        && core_negative == (!LATTICE && count ? negative : was_negative));
+    lemma_starts: assert (core_ticked == tick && core_count == count && core_overdue == overdue && core_ends == measured
+        && core_decays == decays && core_start == (overdue || measured || decays));
     lemma_since: assert (since <= B && since <= spacing + !velocity_valid && spacing <= B);
     lemma_free: assert (since == 0 || !measuring || since >= (age - 1) * PHASES + phase);
     lemma_running: assert (core_running == (since >= 1 && since <= N + 1) && core_done == (since == B));
@@ -241,7 +254,7 @@ module timed #(
     lemma_times: assert (!fresh_division || since == 0 || times <= MAX_PERIODS + (MT ? PATIENCE : 0));
     lemma_silent: assert (since == 0 || !silent || !measuring || distance == 0);
     lemma_many: assert (since == 0 || !many_now || (measuring && !silent && times == 1));
-    lemma_left: assert (!fresh_division || !core_running || far || more_digits == (all & ((1 << (N - j)) - 1)));
+    lemma_left: assert (!fresh_division || !core_running || far || N == j || (core_digits ^ next_digits) >> (N - j >= D ? 0 : D - (N - j)) == 0);
     lemma_steps: assert (!core_running || core_steps == N - 1 - $signed({1'b0, j}));
     lemma_remainder: assert (!fresh_division || !core_running || over || (core_remainder < $signed({1'b0, times})
         && core_remainder >= -$signed({1'b0, times})));
@@ -284,18 +297,19 @@ module timed #(
       always @* lemma_beyond: assert (since == 0 || core_beyond == many_now);
     end
     if (!LATTICE) begin : clocked
-      wire core_came, core_moves, core_forward, core_backward;
-      wire signed [1:0] core_counted_step;
+      wire core_came, core_nearly;
+      wire signed [$clog2(3 * T + 1):0] core_way;
+      wire leads = moved && back == last_negative;
       assign shown_came = core_came;
       always @* begin
         lemma_came: assert (came == core_came);
-        lemma_way: assert (core_counted_step == (!moved ? 0 : back ? -1 : 1)
-            && core_moves == (moved && back == last_negative)
-            && core_forward == (core_moves && !back) && core_backward == (core_moves && back));
+        lemma_nearly: assert (core_nearly == (age == MAX_PERIODS - 1));
+        lemma_way: assert (core_way == (decays ? (velocity < 0 ? -3 * T : 3 * T) : !leads ? 0 : back ? -2 * T : 2 * T));
       end
     end else assign shown_came = 0;
     if (LATTICE) begin : lattice
       wire signed [$clog2(T-1):0] core_window;
+      wire core_last;
       reg [$clog2(T):0] clock = 0;
       reg ticked = 0;
       wire signed [$clog2(T)+1:0] shown_clock = T - 2 - core_window;
@@ -305,6 +319,7 @@ module timed #(
         ticked <= !rst && (ticked || tick);
       end
       always @* begin
+        lemma_last: assert (core_last == (age == MAX_PERIODS));
         lemma_window: assert (clock < T && core_window == T - 2 - $signed({1'b0, clock}));
         lemma_phase: assert (phase >= 1 && phase <= T && (!tick || phase == T) && (ticked || !opened)
             && (!ticked || (phase == (clock + T - 2) % T + 1 && tick == (phase == T))));
@@ -312,6 +327,7 @@ module timed #(
     end
     if (MT) begin : mt
       wire [I-1:0] core_length;
+      wire [$clog2(PATIENCE+1)-1:0] core_still;
       wire core_late;
       wire signed [TRAVELLED_WIDTH-1:0] core_travelled;
       assign late = UPSET && CYCLE > 1 ? core_late : (UPSET ? core_length : length) > MIN_PERIODS;
@@ -319,7 +335,7 @@ module timed #(
         lemma_length: assert (length >= 1 && (!opened || (length <= PATIENCE + age && core_length == length
             && core_late == (length > MIN_PERIODS))));
         lemma_unopened: assert (opened || length == 1);
-        lemma_core_length: assert (opened || age == 1 || (core_length == 1 && !core_late));
+        lemma_core_length: assert (opened || age == 1 || (core_still == {{$clog2(PATIENCE + 1) - 1{1'b1}}, 1'b0} && !core_late));
         lemma_travelled: assert (!opened || (core_travelled == P * travelled && travelled <= farthest && -travelled <= farthest));
         lemma_window_free: assert (since == 0 || !measuring || since >= (length - 1) * PHASES + phase);
       end

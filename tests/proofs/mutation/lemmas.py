@@ -51,6 +51,7 @@ def _gap(spec: TimedTachometer) -> list[str]:
     """Return the last count's age, and its sign, which counts for nothing if it is too old."""
     longest = spec.form.max_periods
     return [
-        f"{{gap_timer.age}} >= 1 && {{gap_timer.age}} <= {longest} && {{longest}} == ({{gap_timer.age}} == {longest})",
-        "!{gap_timer.opened} || {was_negative} == [was_negative]",
+        f"{{gap_timer.age}} >= 1 && {{gap_timer.age}} <= {longest}",
+        f"{{nearly}} == ({{gap_timer.age}} == {longest - 1})",
+        "!{gap_timer.opened} || {count_way.negative} == [count_way.negative]",
     ]

@@ -47,9 +47,9 @@ ERRORS = [
         lambda: Timing.parse("1MHz", "20us", "45us"),
         "max_time must be a whole number of ticks, not 45us (2.25); nearest: 2 ticks (40us) and 3 ticks (60us)",
     ),
-    (lambda: Timing(1, 0, 2), "tick_cycles must be from 1 to 1048576, not 0"),
-    (lambda: Timing(1, 2, 1), "max_ticks must be from 2 to 1048576, not 1"),
-    (lambda: Timing(1, 2, 1048577), "max_ticks must be from 2 to 1048576, not 1048577"),
+    (lambda: Timing(1, 0, 2), "tick_cycles must be from 1 to 1048576, 1048576s, not 0"),
+    (lambda: Timing(1, 2, 1), "max_ticks must be from 2 to 1048576, 2097152s, not 1"),
+    (lambda: Timing(1, 2, 1048577), "max_ticks must be from 2 to 1048576, 2097152s, not 1048577"),
     (
         lambda: Timing.parse("48 m", "20us", "10ms"),
         "clock must be a number with one of the units Hz, kHz, MHz, GHz, not '48 m'",

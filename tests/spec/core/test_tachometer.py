@@ -56,9 +56,9 @@ def test_ends_of_timing() -> None:
     assert Timing(1, 1, 2).tick_seconds == 1
     for given, message in (
         ((10**11 + 1, 1, 2), "clock must be from 1 Hz to 100 GHz, not 1e+11 Hz"),
-        ((1, (1 << 20) + 1, 2), "tick_cycles must be from 1 to 1048576, not 1048577"),
-        ((1, 1, (1 << 20) + 1), "max_ticks must be from 2 to 1048576, not 1048577"),
-        ((1, 1, 1), "max_ticks must be from 2 to 1048576, not 1"),
+        ((1, (1 << 20) + 1, 2), "tick_cycles must be from 1 to 1048576, 1048576s, not 1048577"),
+        ((1, 1, (1 << 20) + 1), "max_ticks must be from 2 to 1048576, 1048576s, not 1048577"),
+        ((1, 1, 1), "max_ticks must be from 2 to 1048576, 1048576s, not 1"),
     ):
         with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
             Timing(*given)
