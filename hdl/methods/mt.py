@@ -74,7 +74,10 @@ class MTMethod(TimedDatapath):
         # Counts since the window opened: as long as none is against the one before, their sum but for the sign.
         counted = Signal(range(self._cycle_counts))
         number = Signal.like(counted)
-        cycled, rounds, waived, waives = Signal(), Signal(), Signal(), Signal()
+        cycled = Signal()
+        rounds = Signal()
+        waived = Signal()
+        waives = Signal()
         way, count = self.count_way, self.gap_timer.count
         m.d.comb += [
             number.eq(Mux(opens, 0, counted + count)),
