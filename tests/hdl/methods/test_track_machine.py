@@ -10,9 +10,9 @@ from support.simulate import Player, clock_by_clock
 from support.tracking import Interpreter, core, windows
 
 from tachometry.hdl.methods import track_machine
-from tachometry.sim.golden.methods.track_recursion import Recursion
+from tachometry.sim.golden.methods.track_recursion import Recursion, log2
 from tachometry.spec import TrackTachometer
-from tachometry.spec.formats.tracking_code import OUTPUTS, Instruction
+from tachometry.spec.formats.tracking_code import OUTPUTS, Instruction, Program
 from tachometry.spec.formats.tracking_units import Start
 
 CORES = {
@@ -59,22 +59,35 @@ def test_machine(name: str) -> None:
     assert met > 0.9 * len(spec.program.code.instructions)
 
 
+def results(program: Program, operations: Sequence[tuple[Instruction, int]], clocks: int) -> list[int]:
+    """Return what the unit gives for instructions and operands, so many clocks apart."""
+    rows: list[dict[str, int]] = []
+    for one, operand in operations:
+        # The quick unit takes the sum in the clock after the start.
+        begins = {"start": one.start, "how": program.number(one), "sum": operand}
+        rows += [begins, *[begins | {"start": Start.NONE}] * (clocks - 1)]
+    seen = clock_by_clock(track_machine.TrackMachine(program).unit, rows, ["result", "busy"])[clocks - 1 :: clocks]
+    assert not any(row["busy"] for row in seen)
+    return [row["result"] for row in seen]
+
+
 @pytest.mark.parametrize("name", CORES)
 def test_gains_end_with_their_table(name: str) -> None:
     """From X = 1/4 down to 2^-13, beyond the last entry, which then stands for all."""
     program = CORES[name].program
-    unit = track_machine.TrackMachine(program).unit
-    rows: list[dict[str, int]] = []
-    right, clocks = [], 12
+    operations, right = [], []
     for log_x in range(-2 * 4096 - 1, -13 * 4096, -1777):
         for number in range(3):
-            how = program.number(Instruction(start=Start.GAIN, how=str(number)))
-            # The quick unit takes the sum in the clock after the start.
-            begins = {"start": Start.GAIN, "how": how, "sum": log_x}
-            rows += [begins, *[begins | {"start": Start.NONE}] * (clocks - 1)]
+            operations.append((Instruction(start=Start.GAIN, how=str(number)), log_x))
             state = Recursion(program.form, program.lead)
             state.log_share = log_x
             right.append(state._gain(number))
-    seen = clock_by_clock(unit, rows, ["result", "busy"])[clocks - 1 :: clocks]
-    assert [row["result"] for row in seen] == right
-    assert not any(row["busy"] for row in seen)
+    assert results(program, operations, 12) == right
+
+
+@pytest.mark.parametrize("name", CORES)
+def test_logarithms(name: str) -> None:
+    """Of 0, of a power of two and what is below it, and of negative numbers."""
+    values = [0, -1, 1, *(sign * ((1 << k) - less) for k in range(1, 38, 5) for less in (0, 1) for sign in (1, -1))]
+    operations = [(Instruction(start=Start.LOG), value) for value in values]
+    assert results(CORES[name].program, operations, 48) == [log2(value) for value in values]

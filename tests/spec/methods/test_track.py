@@ -7,7 +7,7 @@ from support.tracking import core
 
 from tachometry.spec import ParameterError, TrackTachometer, of_options, with_loop
 from tachometry.spec.formats.tracking import GREATEST_ACCELERATION, WIDTH
-from tachometry.spec.formats.tracking_code import FIRST_CHOSEN
+from tachometry.spec.formats.tracking_code import FIRST_INPUT, FIRST_OFFSET, OFFSETS
 from tachometry.spec.formats.tracking_units import QUICK, Small
 from tachometry.spec.methods.track import in_loop
 
@@ -81,4 +81,6 @@ def test_words_hold_the_greatest_speed_and_acceleration(options: dict[str, str],
     assert all(Small(form).pairs(*shift) <= 32 for shift in spec.program.shifts)  # six bits, signed
     assert len(spec.program.shifts) < 15  # each has a number of four bits, the last of which is another
     assert all(abs(value) < 1 << WIDTH - 1 for value in spec.program.words.values())
-    assert len(spec.program.words) <= FIRST_CHOSEN
+    assert len(spec.program.words) <= FIRST_INPUT
+    places = [spec.program.addresses[name] for name in (*OFFSETS, "zero")]
+    assert places == [*range(FIRST_OFFSET, FIRST_OFFSET + 5)]  # hardware adds which one is meant
