@@ -97,7 +97,7 @@ EVERY_CLOCK_BARS = {
     "HX8K": {"Fmax": 100},
 }
 TRACK_BARS = {
-    "ECP5": {"COMB": 880, "FF": 920, "MULT": 0, "Fmax": 90},
+    "ECP5": {"COMB": 820, "FF": 920, "MULT": 0, "Fmax": 90},
     "UP5K": {"Fmax": 24},
 }
 # The reference core, and 250 COMB and 100 FF for the bank.
@@ -299,7 +299,7 @@ CONFIGURATIONS = (
         "track-block",
         "tracking, 1000 rad/s, multiplier of the FPGA",
         TrackTachometer(**COMMON, max_speed=MAX_SPEED, multiplier="block"),
-        {"ECP5": {"COMB": 1320, "FF": 900, "MULT": 2, "Fmax": 70}, "UP5K": {"Fmax": 24}},
+        {"ECP5": {"COMB": 1280, "FF": 900, "MULT": 2, "Fmax": 70}, "UP5K": {"Fmax": 24}},
         is_option=False,
         targets=("ECP5", "UP5K"),
     ),
