@@ -102,9 +102,9 @@ def timed(
 
 # What can be said of M/T without what is divided; "travelled" takes as long as all the others.
 _MT_GIVEN = {
-    "given": "lemma_idle lemma_age lemma_timer lemma_came lemma_way lemma_since lemma_free lemma_running lemma_silent "
-    "lemma_many lemma_steps lemma_rest lemma_rests lemma_rested lemma_size lemma_length lemma_unopened "
-    "lemma_core_length lemma_window_free pt_update pt_held pt_spacing pt_rest",
+    "given": "lemma_idle lemma_age lemma_timer lemma_starts lemma_nearly lemma_came lemma_way lemma_since lemma_free "
+    "lemma_running lemma_silent lemma_many lemma_steps lemma_rest lemma_rests lemma_rested lemma_size lemma_length "
+    "lemma_unopened lemma_core_length lemma_window_free pt_update pt_held pt_spacing pt_rest",
     "travelled": "lemma_travelled",
 }
 _CYCLES_GIVEN = {"cycles": "lemma_waived lemma_counted lemma_one_way"}

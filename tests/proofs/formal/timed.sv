@@ -80,7 +80,7 @@ module timed #(
   reg was_negative = 0;
   // The core's sign is that of this count already, where times are counted in clocks.
   reg core_before = 0;
-  always @(posedge clk) core_before <= core_negative;
+  always @(posedge clk) core_before <= !rst && core_negative;
   wire last_negative = UPSET ? (LATTICE ? core_negative : core_before) : was_negative;
   wire opened = idle < LONG;
   wire overdue = period && !count && waited == MAX_PERIODS;
