@@ -27,8 +27,7 @@ reset:                                  # before the first tick
     o3 = zero
     p = zero
     phase = minus_two
-    quiet = zero
-    since = zero
+    limit = zero
     doubt = log_8
     after = minus_one
 tick:

@@ -71,6 +71,18 @@ def results(program: Program, operations: Sequence[tuple[Instruction, int]], clo
     return [row["result"] for row in seen]
 
 
+@pytest.mark.parametrize("name", ["serial", "block"])
+def test_a_reset_forgets_all_words(name: str) -> None:
+    """A motion leaves nothing in them that is shown, even if the next one has a speed from its second tick on."""
+    spec = CORES[name]
+    fresh, other = Interpreter(spec.program), Interpreter(spec.program)
+    for row in rows_of(spec, 1, 100):
+        other.tick(*row)
+    other.met.clear()
+    rows = [row for row in rows_of(spec, 2, 100) if row[0]]
+    assert [fresh.tick(*row) for row in rows] == [other.tick(*row) for row in rows]
+
+
 @pytest.mark.parametrize("name", CORES)
 def test_gains_end_with_their_table(name: str) -> None:
     """From X = 1/4 down to 2^-13, beyond the last entry, which then stands for all."""
