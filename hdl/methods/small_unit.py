@@ -17,7 +17,8 @@ class SmallUnit(Unit):
 
     def __init__(self, program: Program) -> None:
         super().__init__(program)
-        self.operand, self.with_sum = Signal(signed(WIDTH), reset_less=True), self.start
+        self.operand = Signal(signed(WIDTH), reset_less=True)
+        self.with_sum = self.start
 
     @property
     def factor_bits(self) -> int:

@@ -214,7 +214,7 @@ class TrackMachine(wiring.Component):
             m.d.sync += fetched.eq(1)
         # The adder.
         sum_ = Signal(signed(WIDTH), reset_less=True)
-        negative = sum_[-1] if two else Signal()
+        negative = sum_[-1] if two else Signal(name="negative")
         sign = Signal()
         left = Signal(signed(WIDTH))
         right = Signal(signed(WIDTH))
@@ -329,7 +329,7 @@ class TrackMachine(wiring.Component):
 
         of_end = of_name(C(name in ("o@up", "o@down"), 1) for name in names)
         kind = Mux(of_end, self.end, self.kind) + of_name(ways.get(name, C(0, 2)) for name in names)
-        none = of_name(self.number[:2] < least.get(name, 0) for name in names)
+        none = of_name(self.number[:2] < least[name] if name in least else C(0, 1) for name in names)
         m.d.comb += chosen.eq(self._offset(word, Mux(none, 4, kind[:2])))
         return chosen
 
