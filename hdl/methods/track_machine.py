@@ -329,7 +329,7 @@ class TrackMachine(wiring.Component):
 
         of_end = of_name(C(name in ("o@up", "o@down"), 1) for name in names)
         kind = Mux(of_end, self.end, self.kind) + of_name(ways.get(name, C(0, 2)) for name in names)
-        none = of_name(self.number[:2] < least[name] if name in least else C(0, 1) for name in names)
+        none = self.number[:2] < of_name(C(least.get(name, 0), 2) for name in names)
         m.d.comb += chosen.eq(self._offset(word, Mux(none, 4, kind[:2])))
         return chosen
 
