@@ -105,10 +105,11 @@ def of_texts(
         try:
             spec = made(name)
             core = spec if within is None else within(spec)
-            plan = core.plan if isinstance(core, AxesSpec) else None
+            of_axes = core if isinstance(core, AxesSpec) else None
             if name != methods[-1]:
                 _check_division(spec)
-                _check_machines(core)
+                if of_axes is not None:
+                    _check_machines(of_axes)
         except ParameterError as error:
             if name == methods[-1]:
                 raise
@@ -119,7 +120,7 @@ def of_texts(
     if not why and asked:
         why = f"it has --{asked[0]}"
     elif not why:
-        fits = f"its {spec.latency.busy} clocks fit" if plan is None else f"the turns of {plan.axes} axes fit"
+        fits = f"its {spec.latency.busy} clocks fit" if of_axes is None else f"the turns of {of_axes.axes} axes fit"
         why = f"{fits} the tick of {spec.timing.tick_cycles} clocks"
     return replace(spec, chosen=f"as {why}")
 
@@ -175,9 +176,9 @@ def _able(given: Mapping[str, str]) -> tuple[list[str], list[str]]:
     return [name for name in _PREFERRED if name in able] or able, asked
 
 
-def _check_machines(core: object) -> None:
+def _check_machines(core: AxesSpec) -> None:
     """Refuse tracking of many axes with a ParameterError where one machine has no time for all turns of a tick."""
-    if isinstance(core, AxesSpec) and (machines := core.plan.machines) > 1:
+    if (machines := core.plan.machines) > 1:
         other = f"--tick {core.words.tick_of_one_machine}"
         raise ParameterError("tick_cycles", f"must be longer: try {other}", f"needs {machines} machines or {other}")
 
