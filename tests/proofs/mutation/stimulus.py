@@ -25,6 +25,7 @@ _STEPS = 1000  # of the counts in a tick
 _HARD = 16  # quotients of each m_s
 _TICKS = 300  # of a motion of the tracking method; a settled one has many more counts
 _SETTLED = 1500
+_STOPPING = 50  # further counts, with stops between some
 _RATES = (0.5, 0.2, 0.05)  # changes of a line in a clock
 
 
@@ -180,18 +181,19 @@ def hostile(spec: TrackTachometer, rng: np.random.Generator, n_ticks: int) -> Pi
 
 def settled(spec: TrackTachometer, rng: np.random.Generator) -> PinTrace:
     """Return a constant speed on a disc with errors until the memory is long and all is learned; then the speed changes
-    evenly, a count is lost or is there twice, and the shaft stops.
+    evenly, a count is lost or is there twice, and the shaft stops, again and again after a few counts.
     """
-    n = _SETTLED
+    n = _SETTLED + _STOPPING
     noise = rng.choice([0, 1e-3, 0.02]) * rng.standard_normal(n)
     place = np.arange(1, n + 1) + np.resize(0.05 * rng.standard_normal(4), n) + noise
     gap = spec.timing.tick_cycles / rng.choice([0.3, 0.9, 1.1, 2.5], p=[0.1, 0.5, 0.2, 0.2])
     clock = gap * (place + rng.choice([0, 0, 1e-5, -1e-5]) * np.maximum(place - n * 2 // 3, 0) ** 2)
     clock = np.cumsum(np.maximum(np.diff(np.rint(clock), prepend=0), 1 + spec.filter_clocks)).astype(np.int64)
-    step = np.full(n, rng.choice([-1, 1]))
-    at = int(rng.integers(n - 100, n - 10))
-    step[at : at + int(rng.integers(1, 4))] *= rng.choice([0, 2, -1])
     length = spec.timing.tick_cycles
+    clock[_SETTLED:] += np.cumsum(length * rng.choice([0, 3, 9, 14, 30], _STOPPING, p=[0.6, 0.1, 0.1, 0.1, 0.1]))
+    step = np.full(n, rng.choice([-1, 1]))
+    at = int(rng.integers(_SETTLED - 100, _SETTLED - 10))
+    step[at : at + int(rng.integers(1, 4))] *= rng.choice([0, 2, -1])
     last = np.arange(clock[-1] // length + int(rng.choice([3, 40]))) * length + length - 1
     if spec.external_tick:
         last += rng.integers(-9, 10, len(last))
