@@ -208,7 +208,7 @@ def sudden(spec: TrackTachometer, rng: np.random.Generator) -> PinTrace:
     last = np.arange(1, 8 * 40) * length - 1
     clock, step = [], []
     for part in range(8):
-        gaps = rng.choice([least, least, 2 * least, 10 * least, length], int(rng.integers(2, 9)))
+        gaps = rng.choice([*least * np.array([1, 1, 2, 3, 4, 5, 6, 10]), length], int(rng.integers(2, 9)))
         clock += [last[40 * part + int(rng.choice([1, 20, 30]))] - int(rng.integers(0, 20)) + np.cumsum(gaps)]
         step += [np.full(len(gaps), rng.choice([-1, 1]))]
     order = np.unique(np.concatenate(clock), return_index=True)
