@@ -158,6 +158,7 @@ class Tracking:
             **{name: fixed_log(value) for name, value in logs.items()},
             "past_4": fixed_log(2) + 1, "log_quarter": -fixed_log(2) - 1,
             "order": order, "order_lag": order - fixed_log(math.log2(3.5)),
+            "limit_first": order + 2 * fixed_log(PLACE_BITS - 2),  # of a noise of 1/4
             "zero": 0, "one": 1, "three": 3, "minus_one": -1, "minus_two": -2, "fade": -5,
             "count": one, "half": one // 2, "almost_half": one // 2 - 1,
             "quarter": one // 4, "minus_quarter": -one // 4,

@@ -27,7 +27,7 @@ reset:                                  # before the first tick
     o3 = zero
     p = zero
     phase = minus_two
-    limit = zero
+    limit = limit_first
     doubt = log_8
     after = minus_one
 tick:
@@ -332,7 +332,8 @@ begin:
     after = zero
     quality = of_curve
     if one goto show
-    slow_T = dt + dt                    # means of many counts are by logarithms: they are forgotten
+    log_T = log_dt - log_32 exp         # means of many counts are by logarithms: they are forgotten
+    T = ~
     goto show
 same:
     edge = edge - moved

@@ -99,9 +99,9 @@ class Tracker:
         self.shown = (self.v - self.a * self.memory / 2, 0) if straight else (self.v, self.a)
 
     def _begin(self, n: int, raw: float, c: float, t: float, dt: float) -> None:
-        self.v, self.a, self.p, self.at, self.edge, self.memory = (c - self.p) / dt, 0, c, t, raw, dt
-        self.slow_until = 2 * dt if n > 1 else 0.0
-        self.before = self.mean = self.lag = 0.0
+        self.v, self.a, self.p, self.at, self.edge = (c - self.p) / dt, 0, c, t, raw
+        self.memory = dt / 32 if n > 1 else dt
+        self.slow_until = self.before = self.mean = self.lag = 0.0
         self.shown, self.slips, self.phase, self.long = (self.v, 0), 0, 2, False
         self.expected = self.noise**2 / 4
 

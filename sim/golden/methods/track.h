@@ -12,7 +12,7 @@ struct Recursion : Tables {
   int64_t reversed[1 << CHANCE_BITS] = {};
   int64_t phase = 0, turn = 0, noises, p = 0, v = 0, a = 0, shown_v = 0, shown_a = 0, memory = 0, log_memory = 0;
   int64_t slow_until = 0, since = 0, quiet = 0, noise, sure, alarm, error = 0, mean = 0, lag = 0, edge = 0, slips = 0;
-  int64_t log_share, offsets[4] = {0, 0, 0, 0}, grows = 1, log_growth = 0, log_limit = 0, trouble = 0, chance, moved = 0, quality = 0;
+  int64_t log_share, offsets[4] = {0, 0, 0, 0}, grows = 1, log_growth = 0, log_limit, trouble = 0, chance, moved = 0, quality = 0;
   int64_t *row = nullptr;
 
   Recursion(const Constants &k, const Tables &tables) : Tables(tables), k(k) {
@@ -20,7 +20,7 @@ struct Recursion : Tables {
       for (int bit = 0; bit < CHANCE_BITS; bit++) reversed[i] |= (int64_t)(i >> bit & 1) << (CHANCE_BITS - 1 - bit);
     noises = k.noises_first;
     noise = sure = k.quarter, alarm = 4 * sure;
-    log_share = -k.log_4, trouble = -k.log_9_4;
+    log_share = -k.log_4, trouble = -k.log_9_4, log_limit = k.limit_first;
   }
 
   int64_t log2(int64_t x) const {
@@ -166,8 +166,8 @@ struct Recursion : Tables {
     phase = 2, slips = k.none;
     v = shown_v = power(log2(e) + k.of_velocity - log_dt, sign_of(e));
     p = at - moved, edge = raw - moved;
-    since = tau, memory = dt, log_memory = log_dt, log_share = k.log_quarter;
-    a = shown_a = mean = lag = error = 0, slow_until = n > 1 ? 2 * dt : 0, quality = k.of_curve;
+    since = tau, log_memory = n > 1 ? log_dt - k.log_32 : log_dt, memory = n > 1 ? power(log_memory, 1) : dt, log_share = k.log_quarter;
+    a = shown_a = mean = lag = error = slow_until = 0, quality = k.of_curve;
     emit(ahead(), place());
     ready();
   }

@@ -54,7 +54,7 @@ class Recursion:
         self.log_share = -k["log_4"]
         self.offsets = [0] * 4
         self.grows, self.log_growth = 1, 0
-        self.log_limit, self.trouble = 0, -k["log_9_4"]
+        self.log_limit, self.trouble = k["limit_first"], -k["log_9_4"]
         self._chance, self.quality = _HALF, 0
 
     # The arithmetic.
@@ -245,8 +245,10 @@ class Recursion:
         self.v = self.shown_v = self._power(log2(e) + k["of_velocity"] - log_dt, -1 if e < 0 else 1)
         self.p, self.edge = at - self._moved, raw - self._moved
         self.since, self.memory, self.log_memory, self.log_share = tau, dt, log_dt, k["log_quarter"]
-        self.a = self.shown_a = self.mean = self.lag = self.error = 0
-        self.slow_until = 2 * dt if n > 1 else 0
+        if n > 1:
+            self.log_memory -= k["log_32"]
+            self.memory = self._power(self.log_memory)
+        self.a = self.shown_a = self.mean = self.lag = self.error = self.slow_until = 0
         self.quality = k["of_curve"]
         row = self._emit(self._ahead())
         self._ready()

@@ -163,6 +163,15 @@ def test_a_ramp_has_its_acceleration() -> None:
     assert shown == pytest.approx(np.full(100, right), rel=1e-4)
 
 
+def test_quality_of_the_first_velocity_is_more_than_all_of_it() -> None:
+    """After a reset nothing is known of the noise, so an edge may be off by a quarter of a count."""
+    spec = core()
+    found = golden.run(spec, trace_of(np.arange(1, 500) * 10 * spec.timing.tick_cycles, np.arange(1, 500))).updates
+    first = np.flatnonzero(found.velocity)[0]
+    assert found.velocity[first] < found.quality[first] < 2 * found.velocity[first]
+    assert found.quality[-1] == 1
+
+
 def test_quality_is_the_velocity_at_least_while_the_shaft_has_stopped() -> None:
     """An LSB before, until the next edge is overdue; all of the velocity then; 0 when it is forgotten."""
     spec = core(unit="rpm", max_time="50ms")
