@@ -12,9 +12,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from proofs.mutation.cases import Case
+from proofs.mutation.corresponding import corresponding
+from proofs.mutation.gates import Gates, Levels, Place
 from proofs.mutation.netlist import SELECTOR, WIDTH, Mutant, yosys
 from proofs.mutation.opened import Opened, opened
-from pysat.solvers import Solver
 
 _AIG = """\
 read_rtlil cut.il
@@ -28,87 +29,9 @@ aigmap
 opt_clean
 write_aiger -ascii -symbols cut.aag
 """
-_CONFLICTS = 2000  # of the solver, for a question
 _CLOCKS = (1, 2, 4)  # over which an induction is tried
+_FIRST = 4  # clocks after which no flip-flop has what memories gave at power-up
 Bits = dict[str, list[int]]  # literals of each port, the lowest bit first
-Place = tuple[str, int]  # port and bit
-Levels = dict[Place, int]  # literals
-
-
-class Gates:
-    """And-gates with a number for each, of which none is there twice.
-
-    A literal is twice the number of a gate or an input, and one more if it is inverted; 0 and 1 are constants.
-    """
-
-    def __init__(self) -> None:
-        self._solver = Solver("glucose4")
-        self._made: dict[tuple[int, int], int] = {}
-        self._terms: list[tuple[int, int] | None] = [None]
-        self._known = {0}
-        self._solver.add_clause([-1])
-
-    def new(self) -> int:
-        """Return an input."""
-        self._terms.append(None)
-        return 2 * len(self._terms) - 2
-
-    def all_of(self, one: int, other: int) -> int:
-        """Return whether both are 1."""
-        if one > other:
-            one, other = other, one
-        if one < 2 or one == other:
-            return other if one else 0
-        if one ^ other == 1:
-            return 0
-        if (one, other) not in self._made:
-            self._terms.append((one, other))
-            self._made[one, other] = 2 * len(self._terms) - 2
-        return self._made[one, other]
-
-    def any_of(self, one: int, other: int) -> int:
-        """Return whether one is 1."""
-        return self.all_of(one ^ 1, other ^ 1) ^ 1
-
-    def differ(self, one: int, other: int) -> int:
-        """Return whether they differ."""
-        return self.any_of(self.all_of(one, other ^ 1), self.all_of(one ^ 1, other))
-
-    def unequal(self, some: list[int], others: list[int]) -> int:
-        """Return whether any bits of two words differ."""
-        found = 0
-        for one, other in zip(some, others, strict=True):
-            found = self.any_of(found, self.differ(one, other))
-        return found
-
-    def _variable(self, literal: int) -> int:
-        """Return a literal for the solver, which is told of the gates behind it."""
-        told = [literal >> 1]
-        while told:
-            number = told.pop()
-            terms = self._terms[number]
-            if number in self._known:
-                continue
-            self._known.add(number)
-            if terms:
-                one, other = (self._signed(term) for term in terms)
-                here = number + 1
-                self._solver.append_formula([[-here, one], [-here, other], [here, -one, -other]])
-                told += [term >> 1 for term in terms]
-        return self._signed(literal)
-
-    @staticmethod
-    def _signed(literal: int) -> int:
-        number = (literal >> 1) + 1
-        return -number if literal & 1 else number
-
-    def may_be(self, literal: int, given: list[int]) -> bool:
-        """Tell whether a literal may be 1 while those given are; also if the solver does not know."""
-        if literal < 2:
-            return bool(literal)
-        self._solver.conf_budget(_CONFLICTS)
-        asked = [self._variable(one) for one in (literal, *given)]
-        return self._solver.solve_limited(assumptions=asked) is not False
 
 
 class Cones:
@@ -174,19 +97,21 @@ class Cut:
         self._gates = gates = Gates()
         inner = [place for place in cones.inputs if place[0].startswith("q_")]
         outer = [place for place in cones.inputs if not place[0].startswith("q_")]
-        self._outer = [{place: gates.new() for place in outer} for _ in range(max(_CLOCKS))]
+        self._outer = [{place: gates.new() for place in outer} for _ in range(_FIRST + max(_CLOCKS))]
         self._other = {place: gates.new() for place in inner}
         anything = {place: gates.new() for place in inner}
         level = {
             (f"q_{k}", bit): level for k, one in enumerate(cut.registers) for bit, level in enumerate(one.init[::-1])
         }
         begun = {place: literal if level[place] == "x" else int(level[place]) for place, literal in anything.items()}
-        self._after = {False: self._core(anything), True: self._core(begun)}
+        after = self._core(begun, len(self._outer))
+        kept = corresponding(gates, anything, after[_FIRST][0], lambda inner: self._core(inner, 2)[1][0])
+        self._after = {False: self._core(kept, max(_CLOCKS)), True: after}
 
-    def _core(self, inner: Levels) -> list[tuple[Levels, Bits]]:
+    def _core(self, inner: Levels, clocks: int) -> list[tuple[Levels, Bits]]:
         """Return of each clock what is in the flip-flops of the core, and what it sets."""
         found = []
-        for outer in self._outer:
+        for outer in self._outer[:clocks]:
             bits = self._cones.of(self._gates, {**outer, **inner, **_selected(0)})
             found.append((inner, bits))
             inner = {place: bits[_next(place)][place[1]] for place in inner}
@@ -198,13 +123,13 @@ class Cut:
 
     def _follows(self, number: int, clocks: int) -> bool:
         """Tell whether that is so by induction over some clocks: in the last of any, and in all but the last of the
-        first.
+        first ones.
         """
         own: set[Place] = set()
         while True:
             more: set[Place] = set()
-            for begins, clock in ((False, clocks - 1), *((True, clock) for clock in range(clocks - 1))):
-                found = self._differing(number, own, begins, clock)
+            for begins, last in ((False, clocks - 1), (True, _FIRST + clocks - 2)):
+                found = self._differing(number, own, begins, last)
                 if found is None:
                     return False
                 more |= found
@@ -213,27 +138,30 @@ class Cut:
             own |= more
 
     def _differing(self, number: int, own: set[Place], begins: bool, last: int) -> set[Place] | None:
-        """Return further flip-flops that the mutant may set otherwise in a clock; None if more may differ than these.
+        """Return further flip-flops that the mutant may set otherwise in the last of some clocks, or, if these are the
+        first ones, in any; None if more may differ than these.
 
         In the clocks until then all that is not its own is as in the core.
         """
-        gates, given = self._gates, list[int]()
+        gates, given, more = self._gates, list[int](), set[Place]()
         shared, core = self._after[begins][0]
         values = {place: shared[place] if begins else self._other[place] for place in own}
-        found: Bits = {}
-        for outer, (shared, core) in zip(self._outer[: last + 1], self._after[begins], strict=False):
+        for clock, (outer, (shared, core)) in enumerate(
+            zip(self._outer[: last + 1], self._after[begins], strict=False)
+        ):
             inner = {**outer, **shared, **values, **_selected(number)}
             found = self._cones.of(gates, inner)
             if words := self._read(core, found, outer, given):
                 found = self._cones.of(gates, inner | words)
-            values = {place: found[_next(place)][place[1]] for place in own}
-        if any(gates.may_be(wrong, given) for wrong in self._seen(core, found)):
-            return None
-        return {
-            place
-            for place in shared.keys() - own
-            if gates.may_be(gates.differ(core[_next(place)][place[1]], found[_next(place)][place[1]]), given)
-        }
+            after = {place: found[_next(place)][place[1]] for place in shared}
+            values = {place: after[place] for place in own}
+            if not begins and clock < last:
+                continue
+            if any(gates.may_be(wrong, given) for wrong in self._seen(core, found)):
+                return None
+            other = {place: gates.differ(core[_next(place)][place[1]], after[place]) for place in shared.keys() - own}
+            more |= {place for place, wrong in other.items() if gates.may_be(wrong, given)}
+        return more
 
     def _read(self, core: Bits, found: Bits, outer: Levels, given: list[int]) -> Levels:
         """Return words that the mutant reads where its address may be another; they are those of the core else."""
