@@ -32,7 +32,7 @@ METHODS: dict[str, type[TachometerSpec]] = {
 AUTO = "auto"
 _PREFERRED = ("track", "mt", "s")  # the first of them that can be is what `auto` takes
 # Where none is given, the tick is the first of these with which the method can be.
-_TICKS = ("20us", "25us", "40us", "50us", "100us", "125us", "200us", "250us", "500us", "1ms")
+_TICKS = "20us 25us 40us 50us 100us 125us 160us 200us 250us 320us 500us 1ms".split()
 _OF_TICK = ("tick", "tick_cycles", "max_time", "max_ticks")  # parameters that another tick may suit
 
 

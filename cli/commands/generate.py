@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import singledispatch
 from pathlib import Path
 from typing import Any
@@ -77,7 +77,8 @@ class Asked:
         if self.testbench is None and self.record is not None:
             raise ValueError("--motion must be given together with --testbench")
         if self.testbench is not None and self.spec is not self.spec.tachometer and self.bus != "none":
-            raise ValueError("--testbench must not be given together with --loop and --bus: it drives no bus")
+            whole = "--axes" if isinstance(self.spec, AxesSpec) else "--loop"
+            raise ValueError(f"--testbench must not be given together with {whole} and --bus: it drives no bus")
 
     @property
     def on(self) -> Bus | None:
@@ -105,7 +106,10 @@ class Asked:
 def _read(*, bus: str | None, target: str, **given: Any) -> dict[str, Any]:
     names = {field.name for field in fields(Asked)}
     asked = {name: given.pop(name) for name in names & given.keys()}
-    return dict(asked=Asked(bus=bus_for(target, bus), target=target, **asked), **given)
+    on, spec = bus_for(target, bus), asked.pop("spec")
+    if isinstance(spec, AxesSpec) and (on != "none" or target == "rio"):
+        spec = replace(spec, parallel=True)  # registers and pins are of what is held for each axis
+    return dict(asked=Asked(spec=spec, bus=on, target=target, **asked), **given)
 
 
 ASKED = Group(

@@ -17,7 +17,12 @@ _OPTIONS = [
         help=f"Measure N encoders, up to {MAX_AXES}, which have a datapath of method s or track in turn: a and b have "
         "N bits, and what is measured comes with the number of its axis. Without it: one encoder, and no such number.",
     ),
-    option(_AXES, "--parallel", is_flag=True, help="With --axes: outputs for each axis, which hold its values."),
+    option(
+        _AXES,
+        "--parallel",
+        is_flag=True,
+        help="With --axes: outputs for each axis, which hold its values. A --bus and --for rio add them.",
+    ),
 ]
 
 

@@ -18,7 +18,7 @@ from tachometry.spec.control.law import Law
 from tachometry.spec.control.motor import Motor
 from tachometry.spec.core.timing import whole_clocks
 from tachometry.spec.language.option import ParameterError, options_of
-from tachometry.spec.language.units import TIME, TORQUE, Units, format_time, number_reader, parse_time, read_nearest
+from tachometry.spec.language.units import TIME, TORQUE, format_time, parse_time, read_nearest
 from tachometry.spec.methods.track import in_loop
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
@@ -27,17 +27,6 @@ if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
 _LOOP, _MOTOR = "Controller", "Motor and load"
 
 
-class Quantity(click.types.FloatParamType):
-    """Reads a number, plain or with one of some units."""
-
-    def __init__(self, units: Units, default: str) -> None:
-        self._read = number_reader(units, default)
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        return self._read(param.name if param and param.name else "number", str(value))
-
-
-_TORQUE, _TIME = Quantity(TORQUE, "Nm"), Quantity(TIME, "s")
 MOST_SECONDS = 100.0
 _MOST_SPEED = 1e6  # rad/s
 
@@ -55,13 +44,13 @@ _OPTIONS = [
             "--feed-forward": "Add the acceleration of the command.",
         },
     ),
-    option(_MOTOR, "--driver-time TIME", type=_TIME, default="100us", help="Time constant of the current."),
-    option(_MOTOR, "--friction TORQUE", type=_TORQUE, default="5mNm", help="Coulomb friction, Nm or mNm."),
+    option(_MOTOR, "--driver-time TIME", fractional=True, default="100us", help="Time constant of the current."),
+    option(_MOTOR, "--friction TORQUE", fractional=True, default="5mNm", help="Coulomb friction, Nm or mNm."),
     option(_MOTOR, "--viscous B", type=float, default=0.0, help="Viscous friction in Nm/(rad/s)."),
     option(
         _MOTOR,
         "--torque-noise TORQUE",
-        type=_TORQUE,
+        fractional=True,
         default="5mNm",
         help="Standard deviation of a torque that is new every millisecond.",
     ),
@@ -107,7 +96,7 @@ def _setting(
     *,
     start: str,
     load: str | None,
-    torque_noise: float,
+    torque_noise: str,
     gates: bool,
     **given: Any,
 ) -> Setting:
@@ -117,9 +106,9 @@ def _setting(
     from tachometry.sim.encoder.virtual import VirtualEncoder
     from tachometry.sim.studies.loops.control import Setting, Task, in_gates
 
-    if not (torque_noise >= 0 and math.isfinite(torque_noise)):
-        raise ParameterError("torque_noise", f"must be at least 0 Nm, not {torque_noise:g}")
-    task = Task(motion=parse_motion(motion), load=_load(load), noise=torque_noise)
+    if not (0 <= (noise := read_nearest("torque_noise", torque_noise, TORQUE, "Nm")) < math.inf):
+        raise ParameterError("torque_noise", f"must be at least 0 Nm, not {noise:g} Nm")
+    task = Task(motion=parse_motion(motion), load=_load(load), noise=noise)
     fastest = max(map(abs, task.motion.speed(np.linspace(0, task.motion.duration, _LOOKS)).tolist()))
     most = 2 * math.pi * spec.timing.clock_hz / spec.encoder.counts_per_rev
     if fastest > most:
@@ -146,8 +135,8 @@ def _core_motor_and_gains(
     delay: str | None,
     unfiltered: bool,
     feed_forward: bool,
-    driver_time: float,
-    friction: float,
+    driver_time: str,
+    friction: str,
     viscous: float,
     **of_law: Any,
 ) -> tuple[TachometerSpec, Any, Any]:
@@ -158,7 +147,11 @@ def _core_motor_and_gains(
     law = Law(tachometer=spec, **take_values(Law, of_law, vars(spec.timing)))
     inertia, torque_constant = float(law.inertia), float(law.torque_constant)
     motor = Motor(
-        inertia=inertia, torque_constant=torque_constant, driver_seconds=driver_time, viscous=viscous, coulomb=friction
+        inertia=inertia,
+        torque_constant=torque_constant,
+        driver_seconds=read_nearest("driver_time", driver_time, TIME, "s"),
+        viscous=viscous,
+        coulomb=read_nearest("friction", friction, TORQUE, "Nm"),
     )
     late = 0 if delay is None else whole_clocks("delay", delay, spec.timing.clock_hz)
     if not 0 <= late <= law.period:

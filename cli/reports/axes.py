@@ -13,7 +13,7 @@ def axes_rows(spec: AxesSpec) -> list[tuple[str, str]]:
     greatest = axis.widths.max_velocity * alone.scale.unit_velocity
     latencies = manifest(spec)["latency_cycles"]
     own = {
-        "greatest speed": f"{speed_text(alone, greatest)} ({axis.widths.max_velocity} counts per tick)",
+        "greatest speed": f"{speed_text(alone, greatest)} ({plural(axis.widths.max_velocity, 'count')} per tick)",
         "full scale": full_scale_text(alone, axis),
         "widths": ", ".join(f"{port.name} {port.width}" for port in axis.ports.outputs if port.width > 1),
         **_reciprocal(spec),

@@ -25,7 +25,8 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
     encoder, timing = spec.encoder, spec.timing
     counts = f"{encoder.pulses_per_rev} pulses per revolution x{encoder.decoding}: {encoder.counts_per_rev} counts"
     fastest = spec.scale.greatest_speed
-    greatest = f"{speed_text(spec, fastest)} ({fastest / spec.scale.unit_velocity:.6g} counts per tick)"
+    per_tick = fastest / spec.scale.unit_velocity
+    greatest = f"{speed_text(spec, fastest)} ({per_tick:.6g} count{'s' * (per_tick != 1)} per tick)"
     latencies = manifest(spec)["latency_cycles"]
     memory = spec.words.memory
     return [
@@ -99,8 +100,10 @@ _REAL = (
 
 def _delay(spec: TachometerSpec, plans: Plans, late: str) -> str:
     late = late or f"{short_time(spec.times.seconds(spec.latency.tick_to_velocity))} from tick to velocity"
+    if spec.lowpass is not None:
+        late += f" and {short_time(1 / spec.lowpass)} by the low-pass filter"
     if spec.words.on_ramps:
-        return f"{late}; {spec.words.on_ramps}"
+        return late if spec.lowpass else f"{late}; {spec.words.on_ramps}"
     times = plans.line.measurement_time / 2
     halves = dict.fromkeys(short_time(float(find(times))) for find in (np.nanmin, np.nanmax))
     return f"{late}, and half of the time it is measured in: {' to '.join(halves)}"

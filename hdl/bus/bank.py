@@ -13,6 +13,8 @@ from tachometry.hdl.bus.native import native_port
 from tachometry.spec.registers.field import WORD, Field, Register
 from tachometry.spec.registers.map import COUNTER_WIDTH, RegisterMap
 
+_DEEPEST = 128  # terms of an expression
+
 
 class RegisterBank(wiring.Component):
     """Registers as `RegisterMap` lists them, on a native port.
@@ -109,7 +111,9 @@ class RegisterBank(wiring.Component):
             _word(m, register, shown) & selects.replicate(WORD)
             for register, selects in zip(self._map, selected, strict=True)
         ]
-        m.d.comb += bus.read_data.eq(reduce(or_, answers))
+        # Amaranth follows an expression by recursion, which must not be as deep as 64 axes have registers.
+        parts = [reduce(or_, answers[first : first + _DEEPEST]) for first in range(0, len(answers), _DEEPEST)]
+        m.d.comb += bus.read_data.eq(reduce(or_, parts))
 
     def _settings(self, m: Module, here: dict[str, Value]) -> dict[str, Value]:
         """Return the settings by their names, as they are read."""

@@ -152,7 +152,7 @@ def test_verify(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch:
 
 def test_registers_of_every_axis(tmp_path: Path) -> None:
     """The driver reads all axes of one capture, and is C99; nothing is beside the windows."""
-    core = "--ppr 25 --clock 1MHz --tick 100us --max-time 400us --axes 3 --parallel --name axes".split()
+    core = "--ppr 25 --clock 1MHz --tick 100us --max-time 400us --axes 3 --name axes".split()
     assert run("generate", *core, "--for", "litex", "-o", tmp_path) == 0
     driver = (tmp_path / "axes_driver.h").read_text()
     assert all(f"now->velocity_{axis} = axes_signed_32(velocity_{axis});" in driver for axis in range(3))

@@ -32,6 +32,15 @@ def tables(text: str) -> tuple[dict[str, str], list[str], list[list[str]]]:
     return dict(rows), heads, lines
 
 
+def test_a_low_pass_filter_is_late(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("plan", "--ppr", "500", "--max-speed", "400rad/s", "--lowpass", "100Hz") == 0
+    rows, _, _ = tables(capsys.readouterr().out)
+    assert rows["method"].startswith("TRACK")
+    assert rows["delay"].endswith(
+        f" from tick to velocity and {1e3 / (2 * math.pi * 100):.3f}ms by the low-pass filter"
+    )
+
+
 def test_configuration_agrees_with_the_manifest(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("plan", *OPTIONS, "--filter", "3", "--decoding", "2") == 0
     rows, _, _ = tables(capsys.readouterr().out)

@@ -1,10 +1,13 @@
 """Registers of many axes against their golden model, and a driver in C that reads those of every axis at once."""
 
 import pytest
+from amaranth.hdl import Fragment
 from hdl.bus.test_bank import random_accesses
 from support.axes import motions, small
 from support.simulate import clock_by_clock
 
+from tachometry.hdl.bus import bank
+from tachometry.hdl.bus.bank import RegisterBank
 from tachometry.hdl.core import axes_registers
 from tachometry.sim.golden.axes_registers import GoldenAxesBank
 from tachometry.spec import AxesSpec
@@ -19,7 +22,8 @@ from tachometry.spec.registers.axes import AxesMap
         (4, small(2, parallel=True, most=None, velocity_width=9, external_tick=True, position_width=40)),
     ],
 )
-def test_registers_are_those_of_the_golden_model(seed: int, spec: AxesSpec) -> None:
+def test_registers_are_those_of_the_golden_model(seed: int, spec: AxesSpec, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bank, "_DEEPEST", 7)  # less than there are, as with more axes
     registers = AxesMap(spec.tachometer, spec)
     assert [one.name for one in registers.status] == [f"STATUS_{axis}" for axis in range(spec.axes)]
     trace = motions(spec, 1500)
@@ -39,6 +43,12 @@ def test_registers_are_those_of_the_golden_model(seed: int, spec: AxesSpec) -> N
     for access, (data, error) in zip(accesses, answers, strict=True):
         row = seen[access.clock + 1]
         assert (row["bus.read_data"], bool(row["bus.error"])) == (data, error), access
+
+
+def test_64_axes_have_registers() -> None:
+    """Amaranth follows expressions by recursion, and Python's has an end."""
+    spec = small(64, parallel=True, tick=448)
+    Fragment.get(RegisterBank(AxesMap(spec.tachometer, spec)), None).prepare()
 
 
 def test_every_axis_has_a_window_of_the_same_size() -> None:

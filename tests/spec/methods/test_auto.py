@@ -29,6 +29,7 @@ CHOICES = [
         f"as the turns of 4 axes fit the tick of {whole_clocks('tick', FOUR, 48_000_000)} clocks",
     ),
     ({"axes": "4", "tick": "5us"}, "s", f"as track needs --tick {ONE} and mt is of one axis"),
+    ({"axes": "64", "clock": "12MHz"}, "s", "as track needs 10 machines or --tick 1.36ms and mt is of one axis"),
     ({"bounds": "yes"}, "mt", "as it has --bounds"),
     ({"bounds": "yes", "tick": "250ns"}, "s", "as mt needs a tick of 23 clocks"),
     ({"max-memory": "5ms"}, "track", "as it has --max-memory"),
