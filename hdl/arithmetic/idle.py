@@ -20,10 +20,13 @@ class Idle:
 
     def within(self, box: str) -> Self:
         """Return the same from outside of a box."""
-        names = {field.name: getattr(self, field.name) for field in fields(self)}
-        return replace(
-            self, **{name: f"{box}.{path}" for name, path in names.items() if path and isinstance(path, str)}
-        )
+
+        def outside(value: object) -> object:
+            if isinstance(value, tuple):
+                return tuple(map(outside, value))
+            return f"{box}.{value}" if value and isinstance(value, str) else value
+
+        return replace(self, **{field.name: outside(getattr(self, field.name)) for field in fields(self)})
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,22 @@ class IdleDivision(Idle):
     def paths(self) -> tuple[str, ...]:
         """Signals that it moves on."""
         return (self.digits, self.less_one)
+
+
+@dataclass(frozen=True)
+class IdleBox(Idle):
+    """A box that goes on by itself while all else stands still: nothing outside depends on it but at a stop.
+
+    One that others in the box around it wait for names what is not 0 as long as they do.
+    """
+
+    box: str
+    busy: tuple[str, ...] = ()  # registers in it
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """None, as it goes on clock by clock."""
+        return ()
 
 
 @dataclass(frozen=True)

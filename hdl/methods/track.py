@@ -4,7 +4,7 @@ from amaranth import Module, ResetInserter, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 
-from tachometry.hdl.arithmetic.idle import Idle, idle_of
+from tachometry.hdl.arithmetic.idle import Idle, IdleBox, idle_of
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.tick_counts import TickCounts
@@ -49,7 +49,8 @@ class TrackMethod(wiring.Component):
     @property
     def idle(self) -> tuple[Idle, ...]:
         """Registers that a simulation may move on."""
-        return idle_of({"tick_counts": self.tick_counts, "left": self.left})
+        boxes = {"tick_counts": self.tick_counts, "left": self.left, "machine": self.machine}
+        return (IdleBox("machine"), *idle_of(boxes))
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -9,6 +9,7 @@ from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.arithmetic.idle import Idle, IdleBox
 from tachometry.hdl.front_end.sampling_clock import state_after, states_of
 from tachometry.hdl.methods.small_unit import SmallUnit
 from tachometry.hdl.methods.track_unit import QuickUnit
@@ -138,6 +139,12 @@ class TrackMachine(wiring.Component):
                 **dict.fromkeys(OUTPUTS[1:], Out(signed(WIDTH))),
             }
         )
+
+    @property
+    def idle(self) -> tuple[Idle, ...]:
+        """The small unit: while it works, all else waits for it, or rests."""
+        busy = ("unit.reads", "unit.adds", "unit.shifts")
+        return (IdleBox("unit", busy),) if isinstance(self.unit, SmallUnit) else ()
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

