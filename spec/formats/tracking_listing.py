@@ -66,12 +66,13 @@ known:
     near = raw - edge keep
     share = log_dt - log_T
     w = sum lo+ growing
-    step = zero
+    quick step = zero
     quick t = v + ~ product place
     quick $number by
     quick V = t - v + t
     small t = v + ~
     small V = sum + ~
+    small step = zero
     small t product place
     minus_sixteenth s+ near
     if pos goto event
@@ -91,13 +92,15 @@ grown:
     left keep
     P product mean
     quick zero s+ left by
-    memory = T + step min most_memory
+    quick memory = T + step min most_memory
+    small memory = T + step min most_memory max clock
     t = places - ~
     small zero s+ left by
     V product place_64
     since = tau
     P = P - moved
     t s+ ~ keep log
+    quick memory = memory max clock
     log_64 + minus_log_n + ~ exp
     edge = raw - moved
     e = zero s+ ~ keep log
@@ -134,6 +137,7 @@ few:
     of_v + log_X - log_dt + ~ exp
     t = log_T + log_T
     after = one
+    small of_e = log_e + log_X
     t = t + t - w
     a = a s+ ~ keep log
     log_X + log_64                      # order one, where the acceleration is not seen
@@ -144,7 +148,7 @@ few:
     of_a + ~ exp
     as = zero
     quality = of_straight
-    of_e = log_e + log_X
+    quick of_e = log_e + log_X
     vs = v s- ~
     velocity = sum
     log_X gain 0
@@ -152,7 +156,7 @@ few:
 curved:
     as = a product velocity             # the velocity at the time when it is shown
     quality = of_curve
-    of_e = log_e + log_X
+    quick of_e = log_e + log_X
     vs = v
     velocity = sum + ~
     log_X gain 0
@@ -279,7 +283,7 @@ lone:
     e = c - P keep log
     edge = raw - moved
     since = tau
-    memory = T + step min most_memory
+    memory = T + step min most_memory max clock
     P = P - moved
     goto heard
 alone:

@@ -119,7 +119,7 @@ class Tracker:
                 self.slow_until = 2 * self.memory
         if 4096 * dt < self.memory:
             growth = min(growth, 0)
-        self.memory = min(self.memory + growth * min(dt, self.memory), self.most_memory)
+        self.memory = max(min(self.memory + growth * min(dt, self.memory), self.most_memory), 1)
         self.mean += (e - self.mean) / 4
         least = math.inf
         if abs(e) > (4 + self.long) * self.sure:

@@ -101,7 +101,7 @@ struct Recursion : Tables {
     edge = raw - moved;
     int64_t step = power(std::min<int64_t>(log_dt - log_memory, 0) + log_memory + log_growth, 1);
     if (log_dt - log_memory + k.log_4096 < 0 && grows >= 0) step = 0;
-    int64_t grown = std::min(memory + (grows >= 0 ? step : -step), k.most_memory);
+    int64_t grown = std::max(std::min(memory + (grows >= 0 ? step : -step), k.most_memory), k.clock);
     since = tau;
     if (n > 1) {
       int64_t rest = total - product(P, n, k.mean) + sign_of(left) * product(V, std::abs(left), k.place_64);

@@ -139,7 +139,7 @@ class Recursion:
         step = self._power(log_step)
         if log_dt - self.log_memory + k["log_4096"] < 0 <= self.grows:
             step = 0
-        memory = min(self.memory + (step if self.grows >= 0 else -step), k["most_memory"])
+        memory = max(min(self.memory + (step if self.grows >= 0 else -step), k["most_memory"]), k["clock"])
         self.since = tau
         if n > 1:
             rest_of = total - self._product(p, n, "mean")

@@ -76,6 +76,22 @@ def test_a_memory_of_the_most_events_shrinks_or_stays(grows: int) -> None:
     assert machine.words["T"] == state.memory
 
 
+@pytest.mark.parametrize("multiplier", ["serial", "block"])
+@pytest.mark.parametrize("number", [1, 2])
+def test_a_memory_of_a_clock_does_not_shrink(number: int, multiplier: str) -> None:
+    """Half of it is rounded up, so it would be negative after some events, and grow to that side."""
+    program, tick = replace(CORES[2], multiplier=multiplier).program, CORES[2].form.tick_cycles
+    machine, state = Interpreter(program), Recursion(program.form, program.lead)
+    row = (number, number * tick // 2, number**2, tick // 4, number, 0, 0, 0, tick)
+    for _ in range(40):
+        assert machine.tick(*row) == state.tick(*row)
+        assert machine.words["T"] == state.memory
+        state.grows, state.log_growth = -1, program.constants["log_half"]
+        machine.words["growth"] = -program.constants["count"]
+        machine.words["growing"] = state.log_memory + state.log_growth
+    assert state.memory == program.constants["clock"]
+
+
 @pytest.mark.parametrize(
     ("lines", "word"),
     [

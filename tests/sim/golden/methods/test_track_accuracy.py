@@ -110,6 +110,13 @@ def test_many_counts_in_the_first_events_are_forgotten(lines: int, seeds: int) -
     assert own < 1.2**2 * other
 
 
+def test_a_memory_that_keeps_falling_grows_again() -> None:
+    """In reversals with many counts in a tick it once fell below 0, and the velocity was off by a tenth of it."""
+    spec = core(tick="1ms", max_time="100ms", max_speed="400rad/s", ppr="2000")
+    own, other = errors(replace(ROWS["reversals, real"], lines=2000), 404, True, spec)
+    assert own < 1.1 * other
+
+
 @nightly
 @pytest.mark.parametrize("name", PROMISED)
 def test_the_errors_are_those_that_are_promised(name: str) -> None:
