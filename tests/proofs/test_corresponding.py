@@ -35,3 +35,9 @@ def test_what_is_always_equal_opposite_or_constant_is_found() -> None:
     assert kept[places["opposite"]] == one ^ 1
     assert (kept[places["zero"]], kept[places["high"]]) == (0, 1)
     assert len({literal >> 1 for literal in kept.values()}) == len(names) - 3
+
+
+def test_a_word_is_one_of_some() -> None:
+    gates, words = Gates(), {0, 3, 6, 7, 12}
+    told = [gates.one_of([word >> bit & 1 for bit in range(4)], words) for word in range(16)]
+    assert {word for word, known in enumerate(told) if known} == words

@@ -8,7 +8,7 @@ it does to others, and to outputs, must be the same whatever that is. So nothing
 Most gates of a mutant have the same inputs as in the core, and are the same one here; the solver is asked for the rest.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from proofs.mutation.cases import Case
@@ -30,6 +30,7 @@ opt_clean
 write_aiger -ascii -symbols cut.aag
 """
 _CLOCKS = (1, 2, 4)  # over which an induction is tried
+_SMALL = 5  # bits of a register of which all values are tried
 _FIRST = 4  # clocks after which no flip-flop has what memories gave at power-up
 Bits = dict[str, list[int]]  # literals of each port, the lowest bit first
 
@@ -107,6 +108,55 @@ class Cut:
         after = self._core(begun, len(self._outer))
         kept = corresponding(gates, anything, after[_FIRST][0], lambda inner: self._core(inner, 2)[1][0])
         self._after = {False: self._core(kept, max(_CLOCKS)), True: after}
+        self._words = [list(self._known(outer)) for outer in self._outer]
+        self._facts = self._registers(after[_FIRST][0])
+
+    def _known(self, outer: Levels) -> Iterator[int]:
+        """Yield that words which are read are in the memory, if that is not written."""
+        for k, memory in enumerate(self._cut.memories):
+            if not memory.written and memory.reads == 1 and len(memory.words) == 1 << memory.address_width:
+                bits = [outer[f"word_{k}", bit] for bit in range(memory.width)]
+                yield self._gates.one_of(bits, {*memory.words})
+
+    def _registers(self, first: Levels) -> list[int]:
+        """Return what registers hold: one of the words of a memory, or 0, if they are as wide as it and it follows; one
+        of the values that follow, if they are small.
+        """
+        gates, facts = self._gates, list[int]()
+        (now, _), (after, _) = self._after[False][:2]
+        begun = [fact for words in self._words[:_FIRST] for fact in words]
+        words = [{*memory.words, 0} for memory in self._cut.memories if not memory.written]
+        widths = [memory.width for memory in self._cut.memories if not memory.written]
+        held = [
+            [[level[f"q_{k}", bit] for bit in range(register.width)] for level in (first, now, after)]
+            for k, register in enumerate(self._cut.registers)
+        ]
+        wide = [(one, some) for some, width in zip(words, widths, strict=True) for one in held if len(one[0]) == width]
+        wide = [(one, some) for one, some in wide if not gates.may_be(gates.one_of(one[0], some) ^ 1, begun)]
+        while True:
+            facts = [gates.one_of(one[1], some) for one, some in wide]
+            left = [
+                (one, some)
+                for one, some in wide
+                if not gates.may_be(gates.one_of(one[2], some) ^ 1, self._words[0] + facts)
+            ]
+            if len(left) == len(wide):
+                break
+            wide = left
+        for one in held:
+            if 1 < len(one[0]) <= _SMALL:
+                values = {*range(1 << len(one[0]))}
+                some = {value for value in values if gates.may_be(gates.one_of(one[0], {value}), begun)}
+                before = -1
+                while before != len(some) < len(values):
+                    before = len(some)
+                    for value in values - some:
+                        given = [*self._words[0], *facts, gates.one_of(one[1], some)]
+                        if gates.may_be(gates.one_of(one[2], {value}), given):
+                            some.add(value)
+                if some != values:
+                    facts.append(gates.one_of(one[1], some))
+        return facts
 
     def _core(self, inner: Levels, clocks: int) -> list[tuple[Levels, Bits]]:
         """Return of each clock what is in the flip-flops of the core, and what it sets."""
@@ -144,6 +194,7 @@ class Cut:
         In the clocks until then all that is not its own is as in the core.
         """
         gates, given, more = self._gates, list[int](), set[Place]()
+        facts = [] if begins else self._facts
         shared, core = self._after[begins][0]
         values = {place: shared[place] if begins else self._other[place] for place in own}
         for clock, (outer, (shared, core)) in enumerate(
@@ -155,12 +206,17 @@ class Cut:
                 found = self._cones.of(gates, inner | words)
             after = {place: found[_next(place)][place[1]] for place in shared}
             values = {place: after[place] for place in own}
+            facts = facts + self._words[clock]
             if not begins and clock < last:
                 continue
-            if any(gates.may_be(wrong, given) for wrong in self._seen(core, found)):
+
+            def wrong(literal: int, facts: list[int] = facts) -> bool:
+                return gates.may_be(literal, given) and gates.may_be(literal, given + facts)
+
+            if any(wrong(literal) for literal in self._seen(core, found)):
                 return None
             other = {place: gates.differ(core[_next(place)][place[1]], after[place]) for place in shared.keys() - own}
-            more |= {place for place, wrong in other.items() if gates.may_be(wrong, given)}
+            more |= {place for place, literal in other.items() if wrong(literal)}
         return more
 
     def _read(self, core: Bits, found: Bits, outer: Levels, given: list[int]) -> Levels:

@@ -1,7 +1,7 @@
 """And-gates, and what a solver knows of them."""
 
 import random
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from pysat.solvers import Solver
 
@@ -58,6 +58,15 @@ class Gates:
         for one, other in zip(some, others, strict=True):
             found = self.any_of(found, self.differ(one, other))
         return found
+
+    def one_of(self, bits: list[int], words: Collection[int]) -> int:
+        """Return whether bits, the lowest first, are one of some words."""
+        if not words or not bits:
+            return int(bool(words))
+        *lower, bit = bits
+        zeros = [word for word in words if not word >> len(lower) & 1]
+        ones = [word for word in words if word >> len(lower) & 1]
+        return self.any_of(self.all_of(bit, self.one_of(lower, ones)), self.all_of(bit ^ 1, self.one_of(lower, zeros)))
 
     def played(self, given: Mapping[int, int], last: int) -> list[int]:
         """Return of each literal up to the last one `GAMES` levels, a bit for each; of inputs that are not given they

@@ -215,6 +215,14 @@ def sudden(spec: TrackTachometer, rng: np.random.Generator) -> PinTrace:
     return _ticked(spec, rng, order[0], np.cumsum(np.concatenate(step)[order[1]]), last)
 
 
+def numbers(spec: TrackTachometer, rng: np.random.Generator) -> PinTrace:
+    """Return ticks with as many counts, forward or backward, as tell the bits of their number apart."""
+    most = spec.timing.tick_cycles // (1 + spec.filter_clocks)
+    near = np.add.outer(1 << np.arange(most.bit_length()), np.arange(-8, 9)).ravel()
+    counts = np.unique(np.clip([*near, *-near], -most, most))
+    return _of_counts(spec, rng.permutation(counts))
+
+
 def tracked(spec: TrackTachometer, rng: np.random.Generator) -> Iterator[PinTrace]:
     """Yield what a tracking core is played: first short motions, which end in the middle of a tick or of a program."""
     ticks = spec.times.longest_tick
@@ -222,6 +230,7 @@ def tracked(spec: TrackTachometer, rng: np.random.Generator) -> Iterator[PinTrac
         yield hostile(spec, rng, 6).until(int(rng.integers(1, 3 * ticks)))
     yield from ending(spec, rng)
     yield rattle(spec, rng)
+    yield numbers(spec, rng)
     for number in range(12):
         yield (stress(spec, int(rng.integers(1 << 30)), 10), bursts(spec, rng), hostile(spec, rng, _TICKS))[number % 3]
     for _ in range(4):
