@@ -40,7 +40,7 @@ def test_many_axes_are_right_again_in_time() -> None:
 @nightly
 def test_the_velocity_of_tracking_is_right_again_in_time() -> None:
     """Every fortieth bit of the flip-flops and words."""
-    campaign = tracking.upsets(90)
+    campaign = tracking.upsets("track", 90)
     assert campaign.fine
     assert len(campaign.bits) > campaign.bits.n_flip_flops + 2000
     assert 0 < (campaign.clocks > 0).sum() < 30

@@ -15,9 +15,14 @@ from rich.console import Console
 from rich.progress import track
 from support.report import Table, arguments, chosen
 
+
+def _fortieth(name: str, n: int) -> Campaign:
+    return tracking.upsets(name, max(n // 40, 1))
+
+
 SUBJECTS: dict[str, Callable[[int], Campaign]] = {
     **{name: partial(upsets, name) for name in (*UPSET, OUTPUTS)},
-    "track": lambda n: tracking.upsets(max(n // 40, 1)),
+    **{name: partial(_fortieth, name) for name in tracking.TRACK},
     "axes": axes.upsets,
     **{name: partial(loops.upsets, name) for name in loops.LOOPS},
 }
@@ -65,7 +70,7 @@ def main(words: Sequence[str] | None = None) -> int:
         start = time.monotonic()
         done.append((SUBJECTS[name](options.upsets), time.monotonic() - start))
     for block in ("upsets", "track"):
-        if rows := [one for one in done if (one[0].name == "track") == (block == "track")]:
+        if rows := [one for one in done if (one[0].name in tracking.TRACK) == (block == "track")]:
             _table(rows).write(options.output, block)
     print("\nmean, 99 %, worst: ticks until the outputs were right again, of those that were seen")
     for campaign, _ in done:

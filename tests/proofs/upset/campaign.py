@@ -20,30 +20,30 @@ from tachometry.spec.core.health import Health
 from tachometry.spec.core.index import Index
 
 TICK_CYCLES, MAX_TICKS = 100, 20
-_OPTIONS: dict[str, dict[str, Any]] = {
-    "m": {"average": 10},
-    "track": {"timing": Timing(5_000_000, 340, 20), "max_speed": Speed.parse("75rev/s"), "multiplier": "block"},
-}
-# Of `track` the rounding, and the noise and the offsets that it learns gradually, outlive every rest: after an upset it
-# is not equal in all bits again, see tracking.py.
-UPSET = [method for method in METHODS if method != "track"]
 # What a core of M may have beside, which must not keep the velocity from recovering; proofs are about these outputs.
 OUTPUTS = "m, outputs"
-_OUTPUTS = {
-    **{
+_OPTIONS: dict[str, dict[str, Any]] = {
+    "m": {"average": 10},
+    OUTPUTS: {
         "index": Index(once=True),
         "preset": 0,
         "position_modulo": "7",
         "probe": "both",
         "health": Health(complements=4),
+        "over_speed": Speed.parse("1rad/s"),
+        "compare": Compare(2, 3, 0, "7clk", "both"),
     },
-    **{"over_speed": Speed.parse("1rad/s"), "compare": Compare(2, 3, 0, "7clk", "both")},
+    "track": {"timing": Timing(5_000_000, 340, 20), "max_speed": Speed.parse("75rev/s"), "multiplier": "block"},
+    "track, serial": {"timing": Timing(5_000_000, 1000, 20), "multiplier": "serial"},
 }
+# Of `track` the rounding, and the noise and the offsets that it learns gradually, outlive every rest: after an upset it
+# is not equal in all bits again, see tracking.py.
+UPSET = [method for method in METHODS if method != "track"]
 
 
 def spec_of(name: str) -> TachometerSpec:
     """Return a core like the default one, with shorter ticks and a shorter maximum time, so that the campaign ends; of
-    a method, or `OUTPUTS`.
+    a method, `OUTPUTS`, or tracking without a multiplier block.
     """
     method = name.split(",")[0]
     options: dict[str, Any] = {
@@ -52,7 +52,7 @@ def spec_of(name: str) -> TachometerSpec:
         "age": True,
         "bounds": METHODS[method].facts.bounds,
     }
-    return METHODS[method](**options | _OPTIONS.get(method, {}) | (_OUTPUTS if name == OUTPUTS else {}))
+    return METHODS[method](**options | _OPTIONS.get(method, {}) | _OPTIONS.get(name, {}))
 
 
 def motion(spec: TachometerSpec, n_cycles: int, seed: int) -> PinTrace:

@@ -13,29 +13,31 @@ from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.spec import TrackTachometer
 from tachometry.spec.formats.tracking import WIDTH
 
-GAP = 510  # clocks from a count to the next: each is alone in its tick
+GAP = 1.5  # ticks from a count to the next: each is alone in its tick
 SETTLED = 900  # counts, after which the noise and the edges of the disc are known
 ALLOWED = 1300  # counts
+TRACK = ("track", "track, serial")
 SHARE = 1000  # of the velocity that it may be off by
 _GRADUAL = ("velocity", "acceleration", "position_fine", "quality")
 
 
-def _trace(n: int) -> PinTrace:
+def _trace(n: int, gap: int) -> PinTrace:
     """Return `n` counts at a constant speed, with edges that are displaced by their kind."""
-    clock = np.round((np.arange(1, n + 1) + np.resize([0.1, -0.05, 0.02, -0.07], n)) * GAP).astype(np.int64)
+    clock = np.round((np.arange(1, n + 1) + np.resize([0.1, -0.05, 0.02, -0.07], n)) * gap).astype(np.int64)
     level = quadrature(np.arange(n + 1))
     return PinTrace(np.append(0, clock), level & np.uint8(1), level >> np.uint8(1), int(clock[-1]))
 
 
-def upsets(n: int, seed: int = 1) -> Campaign:
+def upsets(name: str, n: int, seed: int = 1) -> Campaign:
     """Run a campaign, as `campaign.upsets` does; right is a velocity that is 1/1000 off at most."""
-    spec = spec_of("track")
+    spec = spec_of(name)
     assert isinstance(spec, TrackTachometer)
-    trace = _trace(SETTLED + 300 + ALLOWED + 20)
+    gap = round(GAP * spec.timing.tick_cycles)
+    trace = _trace(SETTLED + 300 + ALLOWED + 20, gap)
     core = Upsettable(spec, trace)
-    ((name, _),) = core.bits.memories
+    ((words, _),) = core.bits.memories
     varying = sum(word not in spec.program.constants for word in spec.program.words)
-    core.bits = Bits(core.bits.flip_flops, [(name, WIDTH * varying)])
+    core.bits = Bits(core.bits.flip_flops, [(words, WIDTH * varying)])
     names = compared_names(spec)
     columns = [[port.name for port in spec.ports.outputs].index(name) for name in names]
     tick, age, velocity = (names.index(name) for name in ("tick", "age", "velocity"))
@@ -52,5 +54,5 @@ def upsets(n: int, seed: int = 1) -> Campaign:
         far = np.abs(shown[:, velocity] - other[:, velocity]) * SHARE > np.abs(other[:, velocity])
         return far | (shown[:, exact] != other[:, exact]).any(axis=1)
 
-    allowed = np.full(trace.n_clocks, ALLOWED * GAP)
-    return play("track", spec, core, trace, n, allowed, seed, wrong, first=SETTLED * GAP)
+    allowed = np.full(trace.n_clocks, ALLOWED * gap)
+    return play(name, spec, core, trace, n, allowed, seed, wrong, first=SETTLED * gap)
