@@ -1,4 +1,4 @@
-"""What the arguments of proofs/mutation/argued.json say of the program of the tracking method, and of its windows."""
+"""Tests of what arguments in proofs/mutation/argued.json say of the program and the windows of tracking."""
 
 from collections.abc import Callable, Iterator
 
