@@ -4,16 +4,14 @@ One line is one chain of the adder, from left to right: `word = first term, furt
 
     + w, - w      add, subtract               s+ w, s- w    with the sign that `keep` kept
     lo+ w, hi+ w  min(sum, 0) + w, max(sum, 0) + w          min w, max w  the lesser, the greater
-    sum           as first term: go on from the line before
+    sum           as first term: go on from the line before      chance        decides how results are rounded
     ~             the result of the unit, read before it begins anew      $x     an input of the tick, as first term
     o@last, o@up, o@down   the offset of the last count's edge, of the edge above and below the position
     o@m1, o@m2, o@m3       of the last count if n mod 4 ≥ 1, of that before if ≥ 2, of the third if = 3, else 0
-    keep          the sign of the sum         log, exp      begin log2|sum|, 2^sum
-    gain k        begin: logarithm of the gain of p (0), v (1) or a (2)
+    keep          the sign of the sum         log, exp      begin log2|sum|, 2^sum       out name      an output
+    gain k        begin: log of the gain of p (0), v (1), a (2)  quick, small  before a line: for that machine only
     by            the factor of products      product name  begin: sum·factor/2^shift of that name
     over n        begin: shift right by n     over by       by ⌊log2⌋ of the factor's whole part
-    chance        the number that decides how results are rounded
-    out name      an output                   quick, small   before a line: only for the machine that is so
 """
 
 LISTING = """
