@@ -174,6 +174,10 @@ class GroupedCommand(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         try:
+            *_, order = self.make_parser(ctx).parse_args(list(args))  # of two values the first would be left out unseen
+            for one in () if ctx.resilient_parsing else order:
+                if isinstance(one, click.Option) and not one.multiple and order.count(one) > 1:
+                    raise click.UsageError(f"{one.opts[0]} must be given once, not {order.count(one)} times")
             with options_named():
                 return super().parse_args(ctx, args)
         except click.NoSuchOption as error:

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from support.command import without
 from support.hostile import make_files
 from support.nightly import only
 
@@ -65,7 +66,8 @@ def table() -> dict[str, list[Row]]:
             groups[group] = []
             continue
         options, _, message = line.partition(" => ")
-        groups[group] += [Row(f"{start} {options}".replace("CORE", CORE).strip(), message) for start in before]
+        starts = [" ".join(without(start.replace("CORE", CORE).split(), options.split())) for start in before]
+        groups[group] += [Row(f"{start} {options}".replace("CORE", CORE).strip(), message) for start in starts]
     return groups
 
 

@@ -38,12 +38,12 @@ def test_a_fault_of_the_program_has_a_status_and_a_line_of_its_own(
 
 # A finder that is asked for every import, and is interrupted at one of them.
 INTERRUPTED = """
-import os, signal, sys
+import signal, sys
 from tachometry.cli.main import main
 class Finder:
     def find_spec(self, name, path=None, target=None):
         if name == sys.argv[1]:
-            os.kill(os.getpid(), signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
 sys.meta_path.insert(0, Finder())
 main(sys.argv[2:])
 """
@@ -51,11 +51,11 @@ main(sys.argv[2:])
 
 # A function of a command is stopped when it begins.
 STOPPED = """
-import importlib, os, signal, sys
+import importlib, signal, sys
 from tachometry.cli.main import main
 module, _, name = "{where}".rpartition(".")
 def stopped(*_, **__):
-    os.kill(os.getpid(), signal.{stop})
+    signal.raise_signal(signal.{stop})
 setattr(importlib.import_module(module), name, stopped)
 main(sys.argv[1:])
 """

@@ -1,6 +1,7 @@
 """The command `tachometry`, in this process."""
 
 import threading
+from collections.abc import Collection, Iterable
 
 import pytest
 
@@ -16,3 +17,14 @@ def run(*args: object) -> int:
         main([str(arg) for arg in args])
     assert isinstance(stop.value.code, int)
     return stop.value.code
+
+
+def without(words: Iterable[str], names: Collection[str]) -> list[str]:
+    """Return words of a command line without the options of these names, and what is behind each."""
+    kept: list[str] = []
+    before = ""
+    for word in words:
+        if not {before, word} & {name for name in names if name.startswith("-")}:
+            kept.append(word)
+        before = word
+    return kept

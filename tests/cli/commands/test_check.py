@@ -22,17 +22,18 @@ from tachometry.sim.testbench.check import EQUIVALENT, Make, check
 from tachometry.spec import of_texts
 from tachometry.spec.language import provenance
 
-SMALL = "--ppr 8 --clock 1MHz --tick 8us --max-time 160us --max-speed 2000rad/s --method"
+CLOCKED = "--ppr 8 --clock 1MHz --max-speed 2000rad/s --method"
+SMALL = f"--tick 8us --max-time 160us {CLOCKED}"
 CORES = {
     "s": f"{SMALL} s --bus axi-lite --irq --probe 2 --testbench cocotb --ci github",
     "rio": f"{SMALL} t --for rio --ci gitlab",
     "litex": f"{SMALL} mt --for litex --index",
-    "axes": f"{SMALL} s --axes 3 --tick 20us --testbench cocotb",
-    "loop": f"{SMALL} m --tick 200us --max-time 2ms --loop --gains inputs --bus uart --baud 50000",
-    "bench of a loop": f"{SMALL} m --tick 200us --max-time 2ms --loop --testbench cocotb",
+    "axes": f"{CLOCKED} s --axes 3 --tick 20us --max-time 160us --testbench cocotb",
+    "loop": f"{CLOCKED} m --tick 200us --max-time 2ms --loop --gains inputs --bus uart --baud 50000",
+    "bench of a loop": f"{CLOCKED} m --tick 200us --max-time 2ms --loop --testbench cocotb",
     "external ticks": f"{SMALL} m --external-tick --testbench cocotb",
     "vivado": f"{SMALL} m --for vivado",
-    "track": f"{SMALL} track --tick 1ms --max-time 10ms --for linux",
+    "track": f"{CLOCKED} track --tick 1ms --max-time 10ms --for linux",
 }
 Generated = Callable[..., Path]
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.command import run
+from support.command import run, without
 from support.nightly import only_rows
 
 from tachometry.sim import golden
@@ -254,7 +254,8 @@ def test_ctrl_c_in_the_simulation(
 
     (tmp_path / "t.csv").write_text("before")
     monkeypatch.setattr(PySim, "run", interrupted)
-    options = [*all_outputs(tmp_path / "new"), "--trace", str(tmp_path / "t.csv"), "--engine", "pysim"]
+    others = without(all_outputs(tmp_path / "new"), ["--trace"])
+    options = [*others, "--trace", str(tmp_path / "t.csv"), "--engine", "pysim"]
     assert run("simulate", *CORE, *MOTION, *options) == 130
     assert capsys.readouterr() == ("", "tachometry: interrupted\n")
     assert contents(tmp_path) == {"t.csv": b"before"}

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.command import without
 from support.nightly import nightly, only
 
 from tachometry.cli.main import main
@@ -75,7 +76,8 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     @cache
     def made(case: str) -> Path:
         folder = tmp_path_factory.mktemp("bench")
-        assert generate(folder, *SMALL.split(), *CASES[case].split()) == 0
+        words = CASES[case].split()
+        assert generate(folder, *without(SMALL.split(), words), *words) == 0
         return folder
 
     return made
