@@ -6,9 +6,11 @@ import pytest
 from proofs.mutation.cases import CASES
 from support.tracking import Interpreter, windows
 
+from tachometry.sim.golden.methods.track_recursion import log2
 from tachometry.spec import TrackTachometer
 from tachometry.spec.formats.tracking_code import Instruction, Jump
 
+SERIAL = next(case.spec for case in CASES if isinstance(case.spec, TrackTachometer) and not case.spec.external_tick)
 BLOCK = next(case.spec for case in CASES if isinstance(case.spec, TrackTachometer) and case.spec.external_tick)
 PROGRAM = BLOCK.program
 
@@ -89,3 +91,28 @@ def test_clocks_of_a_tick_are_counted() -> None:
     assert right == (BLOCK.times.min_tick_cycles - 2, BLOCK.form.longest_tick - 1)
     assert counted(lambda left: left ^ (~left >> 2 & 1) << 4) == right
     assert counted(lambda left: left ^ (~left & 1) << 4) != right
+
+
+def test_the_lowest_bit_of_the_last_counts_time_is_not_seen() -> None:
+    """It is added to ticks of silence, of which a logarithm is taken and which are held against times."""
+    program, form = SERIAL.program, SERIAL.form
+    stores = {one.store for one in program.code.instructions if one.first == "$last"}
+    assert stores == {"quiet"}
+
+    def seen(quiet: int) -> tuple[int, bool, bool]:
+        constants = program.constants
+        return log2(quiet + constants["lead"]), quiet < constants["max_time"], quiet < constants["forget"]
+
+    for last in range(0, form.longest_tick, 2):
+        for clocks in range(form.tick_cycles, form.tick_cycles + program.constants["forget"], form.tick_cycles):
+            quiet = (clocks + last) << form.time_bits
+            assert seen(quiet) == seen(quiet + (1 << form.time_bits))
+
+
+def test_a_quality_has_18_bits_and_an_age_one() -> None:
+    """An update follows each tick before the next."""
+    program = SERIAL.program
+    least = {(one.left.name, one.word) for one in program.code.instructions if one.store == "least"}
+    assert least == {("ZERO", "one"), ("ZERO", ""), ("ZERO", "~")}  # the last one is a power
+    assert program.constants["most_quality"] < 1 << 18
+    assert SERIAL.latency.datapath < SERIAL.times.shortest_tick - 1
