@@ -8,16 +8,16 @@ from support.tracking import Interpreter, windows
 
 from tachometry.sim.golden.methods.track_recursion import log2
 from tachometry.spec import TrackTachometer
-from tachometry.spec.formats.tracking_code import Instruction, Jump
+from tachometry.spec.formats.tracking_code import Instruction, Jump, Program
 
 SERIAL = next(case.spec for case in CASES if isinstance(case.spec, TrackTachometer) and not case.spec.external_tick)
 BLOCK = next(case.spec for case in CASES if isinstance(case.spec, TrackTachometer) and case.spec.external_tick)
 PROGRAM = BLOCK.program
 
 
-def ways() -> Iterator[tuple[Instruction, int, bool, int]]:
+def ways(program: Program = PROGRAM) -> Iterator[tuple[Instruction, int, bool, int]]:
     """Yield each instruction on every way with counts of the tick, 0 to 2, whether the unit was begun, and clocks."""
-    code, times = PROGRAM.code, PROGRAM.times
+    code, times = program.code, program.times
     for counts in range(3):
         known = {Jump.ALWAYS: True, Jump.END: True, Jump.EMPTY: counts == 0, Jump.ONE: counts == 1}
         open_ = [(code.labels[label], 0, False, 0) for label in ("tick", "reset")]
@@ -40,7 +40,8 @@ def ways() -> Iterator[tuple[Instruction, int, bool, int]]:
 
 
 def test_a_result_is_taken_where_one_was_begun() -> None:
-    assert all(begun for one, _, begun, _ in ways() if one.word == "~")
+    for program in (PROGRAM, SERIAL.program):
+        assert all(begun for one, _, begun, _ in ways(program) if one.word == "~")
 
 
 def test_inputs_are_taken_an_even_number_of_clocks_after_the_tick() -> None:

@@ -216,11 +216,11 @@ def sudden(spec: TrackTachometer, rng: np.random.Generator) -> PinTrace:
 
 
 def numbers(spec: TrackTachometer, rng: np.random.Generator) -> PinTrace:
-    """Return ticks with as many counts, forward or backward, as tell the bits of their number apart."""
+    """Return a rest, and ticks with as many counts, forward or backward, as tell the bits of their number apart."""
     most = spec.timing.tick_cycles // (1 + spec.filter_clocks)
     near = np.add.outer(1 << np.arange(most.bit_length()), np.arange(-8, 9)).ravel()
     counts = np.unique(np.clip([*near, *-near], -most, most))
-    return _of_counts(spec, rng.permutation(counts))
+    return _of_counts(spec, np.append(np.zeros(2 * spec.timing.max_ticks, dtype=np.int64), rng.permutation(counts)))
 
 
 def tracked(spec: TrackTachometer, rng: np.random.Generator) -> Iterator[PinTrace]:
@@ -230,7 +230,6 @@ def tracked(spec: TrackTachometer, rng: np.random.Generator) -> Iterator[PinTrac
         yield hostile(spec, rng, 6).until(int(rng.integers(1, 3 * ticks)))
     yield from ending(spec, rng)
     yield rattle(spec, rng)
-    yield numbers(spec, rng)
     for number in range(12):
         yield (stress(spec, int(rng.integers(1 << 30)), 10), bursts(spec, rng), hostile(spec, rng, _TICKS))[number % 3]
     for _ in range(4):
@@ -330,6 +329,7 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
         add(trace, int(rng.choice([1, 1, 2, 5])))
     last: Iterable[PinTrace] = ()
     if isinstance(spec, TrackTachometer):
+        add(numbers(spec, np.random.default_rng(seed)), 0)
         last = tracked(spec, rng)
     elif isinstance(spec, STachometer) and isinstance(spec.form.reciprocal, Reciprocal):
         last = [*ending(spec, rng), hard(spec, spec.form.reciprocal)]
