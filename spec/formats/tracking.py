@@ -3,14 +3,14 @@
 A word has 40 bits. Places are in 2^−20 counts, relative to the position at the end of the tick. Times are in clocks
 with `time_bits` fraction bits, so that no time of a tick is longer than a factor of the multiplier. Logarithms are to
 base 2, with 12 fraction bits. The velocity is in 2^−`velocity_bits` counts per clock: 8 times the greatest speed fits.
-The acceleration is in 2^−`acceleration_bits` counts per clock²: 100,000 rad/s² fits.
+The acceleration is in 2^−`acceleration_bits` counts per clock²: `greatest_acceleration` fits, and more is held there.
 
 Error analysis. What is added to p, v and a is a power of 2 from a table, off by at most 0.2 % and at most an LSB; the
 relative error moves the gains only, which are flat. A result is rounded up if its 8 bits below the LSB and the number
 of the event, its bits reversed, carry: so in the mean of 256 events nothing is lost, and a step below the LSB is still
 made. What is left is a walk of a by less than an LSB an event, over as many events as the memory has: 2^−63 ·
-(48 MHz)² · √4096 = 0.016 counts/s² at 2000 counts, which is 1/100 of what a real disc leaves. Products by a time are
-exact to the LSB, as the time is.
+(48 MHz)² · √4096 = 0.016 counts/s² at 2000 counts, which is 1/100 of what a real disc leaves. A finer disc leaves less
+of that, so less than 100,000 rad/s² has to fit there. Products by a time are exact to the LSB, as the time is.
 """
 
 import math
@@ -38,12 +38,16 @@ MOST_EVENTS_BITS = 12  # memory does not grow beyond 2^12 events
 # The deviation of a slope at the end of N events in the time T, as D·√(1/N)/T: of a line and of a parabola.
 STRAIGHT, CURVE = 2.3, 12.0
 FORGET = Fraction(1, 10)  # seconds of silence after which the state is forgotten, if the maximum time is no longer
-GREATEST_ACCELERATION = 110_000  # rad/s²
 
 
 def fixed_log(value: float) -> int:
     """Return a logarithm as a word."""
     return round(value * (1 << LOG_BITS))
+
+
+def greatest_acceleration(counts_per_rev: int) -> float:
+    """Return in rad/s² what fits the word of the acceleration: less if counts are finer, for the sake of the LSB."""
+    return 110_000 / math.sqrt(max(counts_per_rev / 2000, 1))
 
 
 @dataclass(frozen=True)
@@ -107,7 +111,7 @@ class Tracking:
     @cached_property
     def acceleration_bits(self) -> int:
         """Fraction bits of the acceleration."""
-        greatest = GREATEST_ACCELERATION * self.counts_per_rev / (2 * math.pi) / self.clock_hz**2
+        greatest = greatest_acceleration(self.counts_per_rev) * self.counts_per_rev / (2 * math.pi) / self.clock_hz**2
         return WIDTH - 2 - math.ceil(math.log2(greatest))
 
     @cached_property

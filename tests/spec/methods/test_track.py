@@ -6,7 +6,7 @@ import pytest
 from support.tracking import core
 
 from tachometry.spec import ParameterError, TrackTachometer, of_options, with_loop
-from tachometry.spec.formats.tracking import GREATEST_ACCELERATION, WIDTH
+from tachometry.spec.formats.tracking import WIDTH
 from tachometry.spec.formats.tracking_code import FIRST_INPUT, FIRST_OFFSET, OFFSETS
 from tachometry.spec.formats.tracking_units import QUICK, Small
 from tachometry.spec.methods.track import in_loop
@@ -73,8 +73,10 @@ def test_words_hold_the_greatest_speed_and_acceleration(options: dict[str, str],
     most = 2 ** (WIDTH - 2)
     speed = Fraction(form.max_count, form.longest_tick)
     assert 8 * speed * 2**form.velocity_bits <= most < 32 * speed * 2**form.velocity_bits
-    acceleration = GREATEST_ACCELERATION * spec.encoder.counts_per_rev / 6.2832 / spec.timing.clock_hz**2
-    assert acceleration * 2**form.acceleration_bits <= most
+    counts = spec.encoder.counts_per_rev
+    finer = 2000 / max(counts, 2000)  # in rad/s² half as much for counts that are four times as fine
+    acceleration = 1e5 * finer**0.5 * counts / 6.2832 / spec.timing.clock_hz**2
+    assert acceleration * 2**form.acceleration_bits <= most < 4 * acceleration * 2**form.acceleration_bits
     assert (form.longest_tick << form.time_bits) < 1 << form.factor_bits
     assert form.most_number * (form.longest_tick - 1) < 1 << form.times_bits
     assert all(0 <= shift < 64 for _, shift in spec.program.shifts)

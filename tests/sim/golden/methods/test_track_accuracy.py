@@ -110,6 +110,14 @@ def test_many_counts_in_the_first_events_are_forgotten(lines: int, seeds: int) -
     assert own < 1.2**2 * other
 
 
+def test_a_fine_disc_is_not_limited_by_the_lsb_of_the_acceleration() -> None:
+    """100,000 rad/s² of a disc of 5000 lines once had to fit its word, which doubled the error at a constant speed."""
+    spec = core(max_time="100ms", max_speed="400rad/s", ppr="5000", tick="100us")
+    slow = replace(ROWS["very slow, real"], lines=5000)
+    own, other = np.mean(np.square([errors(slow, seed, True, spec) for seed in range(401, 405)]), axis=0)
+    assert own < 1.2**2 * other
+
+
 def test_a_memory_that_keeps_falling_grows_again() -> None:
     """In reversals with many counts in a tick it once fell below 0, and the velocity was off by a tenth of it."""
     spec = core(tick="1ms", max_time="100ms", max_speed="400rad/s", ppr="2000")
