@@ -118,7 +118,7 @@ class AxesTrackDatapath(wiring.Component):
     def _shown(self, m: Module) -> tuple[Signal, Signal, data.View, data.View]:
         """Return a strobe, whose turn is shown with it, and what is new: it is added up once for all machines."""
         layout = kept_layout(self._axis)
-        m.submodules.state = state = Memory(shape=layout, depth=max(self._spec.axes, 2), init=[], attrs=BLOCK)
+        m.submodules.state = state = Memory(shape=layout, depth=1 << len(self.axis), init=[], attrs=BLOCK)
         read = state.read_port()
         write = state.write_port()
         # Strobes of every machine in four clocks of its turn; no two machines have the same one at once.

@@ -117,7 +117,8 @@ class TrackTurns(wiring.Component):
         """Return counts of the axis that has its turn, and its position if an index may reset it."""
         names = ("count", "handed_position") if self._axis.front_end.index_resets else ("count",)
         shape = data.StructLayout({name: getattr(self, name).shape() for name in names})
-        m.submodules.handed_over = handed = Memory(shape=shape, depth=self._spec.slots, init=[], attrs=BLOCK)
+        depth = 1 << len(self.slot)  # behind the last turn the axis is one more than there are
+        m.submodules.handed_over = handed = Memory(shape=shape, depth=depth, init=[], attrs=BLOCK)
         read = handed.read_port()
         write = handed.write_port()
         taken = Signal(shape)

@@ -43,6 +43,15 @@ def test_sixty_four_axes() -> None:
     check(4, Cxxrtl(), 1)
 
 
+def test_no_memory_of_five_tracked_axes_is_read_behind_its_end() -> None:
+    """Compiled, that would end the process."""
+    words = next(words for words in AXES if words[1] == "track" and "5" in words)
+    spec = core_of(words)
+    assert isinstance(spec, AxesSpec)
+    assert spec.slots == 5
+    assert lockstep(spec, stress_of(spec, 1, 5), Cxxrtl()).n_mismatches == 0
+
+
 @nightly  # tests/hdl/axes lints it, and the 64 axes above are those of its gates
 def test_the_exported_verilog(tmp_path: Path) -> None:
     check(1, LintingVerilator(tmp_path, few=True), 1)
