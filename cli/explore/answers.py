@@ -175,8 +175,7 @@ def curves(options: Texts) -> Answer:
 
     def shown(name: str, spec: TachometerSpec, plan: Plan) -> Answer:
         error = plan.resolution + plan.disc + spec.scale.rounding_lsb * spec.scale.rad_per_s_per_lsb
-        filtered = 0 if spec.lowpass is None else 1 / spec.lowpass
-        late = float(spec.times.seconds(spec.latency.tick_to_velocity) + filtered)
+        late = float(spec.times.seconds(spec.latency.tick_to_velocity) + spec.times.filter_lag)
         delay = late + plan.measurement_time / 2 * (not spec.words.on_ramps)
         errors, delays = greatest(unit.of(error)), greatest(delay)
         known = [(one, late) for one, late in zip(errors, delays, strict=True) if one is not None and late is not None]

@@ -100,10 +100,10 @@ _REAL = (
 
 def _delay(spec: TachometerSpec, plans: Plans, late: str) -> str:
     late = late or f"{short_time(spec.times.seconds(spec.latency.tick_to_velocity))} from tick to velocity"
-    if spec.lowpass is not None:
-        late += f" and {short_time(1 / spec.lowpass)} by the low-pass filter"
+    if lag := spec.times.filter_lag:
+        late += f" and {short_time(lag)} by the low-pass filter"
     if spec.words.on_ramps:
-        return late if spec.lowpass else f"{late}; {spec.words.on_ramps}"
+        return late if lag else f"{late}; {spec.words.on_ramps}"
     times = plans.line.measurement_time / 2
     halves = dict.fromkeys(short_time(float(find(times))) for find in (np.nanmin, np.nanmax))
     return f"{late}, and half of the time it is measured in: {' to '.join(halves)}"

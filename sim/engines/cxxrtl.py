@@ -244,6 +244,7 @@ class State:
         self.flip_flops = {name: int(width) for width, name in wires}
         self.memories = {name: (int(width), int(depth)) for width, name, depth in memories}
         self.written = [name for name in self.memories if f"{name}.commit(" in text]
+        self._text, self._whole = text, self
 
     def part(self, chosen: Callable[[str], bool]) -> "State":
         """Return what of it has chosen names, which are those within boxes."""
@@ -252,10 +253,10 @@ class State:
         part.written = [name for name in self.written if chosen(plain(name.removeprefix("memory_")))]
         return part
 
-    def evaluation(self, text: str, outputs: Iterable[str]) -> str:
+    def evaluation(self, outputs: Iterable[str]) -> str:
         """Return what CXXRTL has written as `eval`, for this part alone: without outputs."""
-        whole = State(text)
-        body = text.partition("bool p_top::eval(performer *performer) {\n")[2].partition("\n}\n")[0]
+        whole = self._whole
+        body = self._text.partition("bool p_top::eval(performer *performer) {\n")[2].partition("\n}\n")[0]
         left = "|".join([*(whole.flip_flops.keys() - self.flip_flops.keys()), *outputs])
         body = re.sub(rf"^\t+(?:{left})(?:\.next)? = .*;\n", "", body, flags=re.MULTILINE)
         unwritten = "|".join(set(whole.written) - set(self.written))
@@ -297,7 +298,7 @@ def _moving(idle: Idle, names: Mapping[str, str], of: str) -> tuple[str, str]:
     raise TypeError(idle)
 
 
-def _skip(design: Design, text: str, state: State) -> dict[str, Any]:
+def _skip(design: Design, state: State) -> dict[str, Any]:
     """Return what of the struct `Model` skips clocks, and what stands before it."""
     names = {plain(wire): wire for wire in state.flip_flops}
     paths = {path for idle in design.idle for path in idle.paths}
@@ -344,7 +345,7 @@ def _skip(design: Design, text: str, state: State) -> dict[str, Any]:
     parts = {"alone": alone, "within": inner} if boxes else {}
     return {
         "parts": "\n".join(
-            f"bool {name}(performer *performer = nullptr) {{\n{part.evaluation(text, outputs)}\n}}"
+            f"bool {name}(performer *performer = nullptr) {{\n{part.evaluation(outputs)}\n}}"
             for name, part in parts.items()
         ),
         "orders": "\n".join(orders),
@@ -359,7 +360,7 @@ def model_of(design: Design, text: str) -> str:
     if "bool converged = true;" not in text:
         raise NotImplementedError("a core must settle in one evaluation")
     state = State(text)
-    skip = _skip(design, text, state)
+    skip = _skip(design, state)
     played = skip.pop("played")
     pins = [mangled(pin.name) for pin in design.pins]
     return _MODEL.format(

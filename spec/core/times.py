@@ -15,6 +15,11 @@ class Times(Follows[S]):
         return Fraction(clocks, self.spec.timing.clock_hz)
 
     @property
+    def filter_lag(self) -> Fraction:
+        """Seconds by which a low-pass filter is late on a ramp; 0 without one."""
+        return Fraction(0) if self.spec.lowpass is None else 1 / self.spec.lowpass
+
+    @property
     def longest_tick(self) -> int:
         """Most clocks in a tick; an external one lasts two nominal ones at most, if nothing else was asked for."""
         cycles = self.spec.timing.tick_cycles

@@ -10,7 +10,7 @@ from tachometry.hdl.bus import bank
 from tachometry.hdl.bus.bank import RegisterBank
 from tachometry.hdl.core import axes_registers
 from tachometry.sim.golden.axes_registers import GoldenAxesBank
-from tachometry.spec import AxesSpec
+from tachometry.spec import AxesSpec, ParameterError
 from tachometry.spec.core.index import Index
 from tachometry.spec.registers.axes import AxesMap
 
@@ -49,6 +49,12 @@ def test_64_axes_have_registers() -> None:
     """Amaranth follows expressions by recursion, and Python's has an end."""
     spec = small(64, parallel=True, tick=448)
     Fragment.get(RegisterBank(AxesMap(spec.tachometer, spec)), None).prepare()
+
+
+def test_registers_are_of_what_is_held_for_each_axis() -> None:
+    spec = small(3)
+    with pytest.raises(ParameterError, match="parallel must be given together with --axes and --bus:"):
+        AxesMap(spec.tachometer, spec)
 
 
 def test_every_axis_has_a_window_of_the_same_size() -> None:

@@ -287,6 +287,11 @@ def test_cores_that_do_not_fit_are_refused(options: dict[str, str], bus: str | N
         export(of_texts("s", {"ppr": "500"} | options), NAME, bus, target="rio")
 
 
+def test_axes_must_have_pins_for_each() -> None:
+    with pytest.raises(ParameterError, match="parallel must be given together with --axes for RIO"):
+        export(small(4), NAME, target="rio")
+
+
 def test_the_page_has_every_pin_and_its_command_makes_the_plugin(tmp_path: Path) -> None:
     rows = dict(re.findall(r"^\| `([\w-]+)` \| (\w+)", PAGE, re.MULTILINE))
     found = {name: pin.kind for method in METHODS for name, pin in hal_pins(core(method)).items()}
