@@ -23,14 +23,14 @@ from tachometry.spec.methods.track_axis import TrackAxis
 def tick_layout(axis: TrackAxis) -> data.StructLayout:
     """Return what is new with the tick of an axis."""
     shapes = {"pulse_count": signed(axis.widths.count), "position": signed(axis.position_width)}
-    return data.StructLayout({**shapes, "overflow": 1, "stalled": 1})
+    return data.StructLayout({**shapes, "overflow": 1})
 
 
 def kept_layout(axis: TrackAxis) -> data.StructLayout:
-    """Return what is kept of an axis from turn to turn: its position, and how long it has been silent."""
+    """Return what is kept of an axis from turn to turn: its position, and the time since its last count."""
     most = axis.timing.max_ticks
     shapes = {"position": signed(axis.position_width), "elapsed": range(most + 1), "counted": 1}
-    return data.StructLayout({**shapes, "silent": range(most + 2)})
+    return data.StructLayout(shapes)
 
 
 class AxesTrackDatapath(wiring.Component):
@@ -142,7 +142,7 @@ class AxesTrackDatapath(wiring.Component):
         after = Signal(kept_layout(axis))
         m.d.sync += before.eq(kept)
         with m.If(known.first):
-            m.d.sync += [before.position.eq(0), before.elapsed.eq(most), before.counted.eq(0), before.silent.eq(1)]
+            m.d.sync += [before.position.eq(0), before.elapsed.eq(most), before.counted.eq(0)]
         moved, counted = delay(m, known.moved, known.counted)
         position: Value = before.position + moved
         if axis.front_end.index_resets:
@@ -150,12 +150,10 @@ class AxesTrackDatapath(wiring.Component):
         pulses, overflow = moved, C(0)
         if axis.widths.max_count < axis.form.longest_tick:
             pulses, overflow = saturate(m, moved, axis.widths.max_count)
-        long = before.silent == most + 1
         m.d.sync += [
             after.position.eq(position),
             after.elapsed.eq(Mux(before.counted, 1, before.elapsed + (before.elapsed != most))),
             after.counted.eq(counted),
-            after.silent.eq(Mux(moved.any(), 0, before.silent + ~long)),
         ]
         return after, delay(m, pulses, overflow)
 
@@ -174,13 +172,13 @@ class AxesTrackDatapath(wiring.Component):
             m.d.sync += [
                 whose.eq(of_axis),
                 ticks.position.eq(after.position),
-                ticks.stalled.eq(after.silent == axis.timing.max_ticks + 1),
                 ticks.pulse_count.eq(counts[0]),
                 ticks.overflow.eq(counts[1]),
                 *(new[name].eq(found[name]) for name in ("velocity", "acceleration", "quality")),
                 new.position_fine.eq(rounded),
                 new.interval.eq(after.elapsed),
                 new.forced.eq(~after.counted),
+                new.stalled.eq(found.stalled & ~after.counted),
             ]
         return valid, whose, ticks, new
 

@@ -15,6 +15,9 @@ from tachometry.spec.methods.track_axis import TrackAxis
 SHOWN_AFTER = 4  # clocks
 
 
+_FOUND = ("velocity", "acceleration", "quality", "stalled")
+
+
 def turn_layout(axis: TrackAxis) -> data.StructLayout:
     """Return what a turn has and finds; `place` is that of `position_fine` with one bit more, relative to `position`.
 
@@ -27,7 +30,7 @@ def turn_layout(axis: TrackAxis) -> data.StructLayout:
             "moved": signed(axis.form.moved_bits),
             "counted": 1,
             **({"position": signed(axis.position_width)} if axis.front_end.index_resets else {}),
-            **{name: layout[name] for name in ("velocity", "acceleration", "quality")},
+            **{name: layout[name] for name in _FOUND},
             "place": signed(WIDTH - PLACE_BITS + axis.fine_bits + 1),
         }
     )
@@ -106,7 +109,7 @@ class TrackTurns(wiring.Component):
             self.turn.first.eq(first),
             self.turn.moved.eq(counts.moved),
             self.turn.counted.eq(counts.number.any()),
-            *(self.turn[name].eq(getattr(machine, name)) for name in ("velocity", "acceleration", "quality")),
+            *(self.turn[name].eq(getattr(machine, name)) for name in _FOUND),
             self.turn.place.eq(machine.position_fine >> (PLACE_BITS - axis.fine_bits - 1)),
         ]
         if position is not None:

@@ -85,7 +85,8 @@ class RegisterCore(wiring.Component):
         if self._map.irq:
             box = Interrupts(self._map)
             connect(m, box, bank, whole)
-            m.d.comb += [box.ticks.eq(whole.tick), box.stalled.eq(whole.stalled), self.irq.eq(box.irq)]
+            ticks = getattr(whole, spec.facts.stalls_with)
+            m.d.comb += [box.ticks.eq(ticks), box.stalled.eq(whole.stalled), self.irq.eq(box.irq)]
             if core.watch is not None:
                 m.d.comb += box.fault.eq(core.watch.seen)
             if core.trip is not None:

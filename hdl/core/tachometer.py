@@ -36,7 +36,7 @@ from tachometry.spec import TachometerSpec, TrackTachometer
 from tachometry.spec.core.compare import LIST_PINS
 from tachometry.spec.core.probe import packed_edges
 from tachometry.spec.core.stream import READY, flags_of, parts_of, size_of
-from tachometry.spec.language.port import FINE, MISSED, UPDATE, WIDE
+from tachometry.spec.language.port import FINE, MISSED, TICK, UPDATE, WIDE
 
 
 class Tachometer(wiring.Component):
@@ -117,7 +117,7 @@ class Tachometer(wiring.Component):
             None if spec.lowpass is None else LowPass(spec.scale.low_pass, layout, clears=spec.facts.last_at_rest)
         )
         self.standstill: Standstill | None = None
-        if not isinstance(self.datapath, OwnStandstill):
+        if not isinstance(self.datapath, OwnStandstill) and spec.facts.stalls_with == TICK:
             self.standstill = Standstill(spec.timing.max_ticks, spec.widths.count, max_shift=spec.times.max_tick_shift)
         self.update_age = UpdateAge(spec.timing.max_ticks, spec.widths.stamp) if spec.age else None
         self.velocity_output: SerialVelocityOutput | PipelinedVelocityOutput | None = None

@@ -83,5 +83,6 @@ class TrackMethod(wiring.Component):
                 ),
                 new.interval.eq(counts.elapsed),
                 new.forced.eq(~counts.number.any()),
+                new.stalled.eq(machine.stalled & ~counts.number.any()),
             ]
         return m

@@ -115,7 +115,8 @@ class TrackMachine(wiring.Component):
     kind, end, down : In
         Of the last count's edge; of the position at the end; whether the count went backward.
     velocity, position_fine, quality, acceleration : Out(signed)
-        They are those of this tick `program.clocks - 1` after `begin`.
+    stalled : Out(1)
+        Of a tick without a count. All are those of this tick `program.clocks - 1` after `begin`.
     """
 
     def __init__(self, program: Program, *others: Program) -> None:
@@ -137,6 +138,7 @@ class TrackMachine(wiring.Component):
                 "end": In(2),
                 "down": In(1),
                 **dict.fromkeys(OUTPUTS[1:], Out(signed(WIDTH))),
+                "stalled": Out(1),
             }
         )
 
@@ -281,7 +283,7 @@ class TrackMachine(wiring.Component):
         for number, name in enumerate(OUTPUTS):
             if name:
                 with m.If(shows == number):
-                    m.d.sync += getattr(self, name).eq(made)
+                    m.d.sync += getattr(self, name).eq(~made[-1] if name == "stalled" else made)
         # The unit.
         uses = from_unit | reduce(and_, (now.start != start for start in Start if not program.times.of(start)))
         m.d.comb += [

@@ -6,6 +6,7 @@ from amaranth.lib import data, stream
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.formats.velocity_output import VelocityOutput
+from tachometry.spec.language.port import UPDATE
 
 # The velocities of an update, and which way each is rounded: to the nearest (0), down (−1) or up (1).
 VELOCITIES = {"velocity": 0, **BOUNDS}
@@ -18,6 +19,8 @@ def update_layout(spec: TachometerSpec) -> data.StructLayout:
     the low-pass filter: no update will follow before the next count.
     """
     fields = {"velocity": signed(spec.widths.native), "interval": spec.widths.interval, "forced": 1}
+    if spec.facts.stalls_with == UPDATE:
+        fields["stalled"] = 1
     if spec.widths.stamp:
         fields["stamp"] = spec.widths.stamp
     if spec.facts.last_at_rest and spec.lowpass is not None:

@@ -17,7 +17,7 @@ from tachometry.sim.signals.axes import AxesTrace, Trace
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, Table
 from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
-from tachometry.spec.language.port import MISSED, WIDE
+from tachometry.spec.language.port import MISSED, TICK, WIDE
 
 
 def model(spec: TachometerSpec) -> Any:
@@ -52,7 +52,9 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
     ticks, index = count(spec, steps, last, beyond)
     del last  # as long as all ticks
     wrong = health.faults(spec, trace, steps, index)
-    ticks = health.with_health(spec, with_stalled(spec, ticks, nominal), wrong)
+    if spec.facts.stalls_with == TICK:
+        ticks = with_stalled(spec, ticks, nominal)
+    ticks = health.with_health(spec, ticks, wrong)
     measured = golden.updates(ticks, steps, trace.n_clocks)
     if "cause" not in measured.columns:
         measured = measured.having(cause=measured.clock - spec.latency.datapath)

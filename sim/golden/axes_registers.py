@@ -35,8 +35,9 @@ class GoldenAxesBank(GoldenBank):
         self._follow(overflow)
         stalls = []
         for axis in range(registers.axes.axes):
-            own = ticks["axis"] == axis
-            stalls.append(rises(ticks.clock[own], ticks[f"stalled_{axis}"][own]))
+            rows = self._tables[registers.axes.axis.facts.stalls_with]
+            own = rows["axis"] == axis
+            stalls.append(rises(rows.clock[own], rows[f"stalled_{axis}"][own]))
         self._stalls = np.unique(np.concatenate(stalls))
 
     def _of_clock(self, clock: int) -> dict[str, int]:

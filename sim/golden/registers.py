@@ -69,7 +69,8 @@ class GoldenBank:
         self._happened = {"updated": self._tables[UPDATE].clock, "indexed": self._tables[INDEX].clock}
         self._happened |= {name: self._tables[name].clock for name in (WIDE, MISSED)}
         self._follow(self._tables[TICK].overflow)
-        self._stalls = rises(self._tables[TICK].clock, self._tables[TICK].stalled)
+        stalls = self._tables[registers.spec.facts.stalls_with]
+        self._stalls = rises(stalls.clock, stalls.stalled)
 
     def _follow(self, overflow: np.ndarray) -> None:
         """Find the clocks of what is counted; `overflow` is a column of the ticks."""

@@ -12,7 +12,7 @@ from tachometry.sim.theory import tsuji
 from tachometry.sim.theory.checks import Floats
 
 MOST_MEMORY_SECONDS = 4
-MOST_EVENTS = 4096
+MOST_EVENTS = 8192
 LARGEST_SHARE = 1 / 4
 ORDER_ONE = 1 / 64  # from this X on downward the acceleration is left out of what is shown, if it is not seen
 

@@ -39,10 +39,14 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> Iterator[Port]:
     yield strobe("decode_error", f"One clock: {wrong}" if wrong else "Never high: one line cannot be wrong.")
     text = "pulse_count was saturated at the maximum speed; position is exact all the same."
     yield held(TICK, "overflow", help=text)
-    text = "The shaft rests: pulse_count was 0 in this period and in those before it for longer than the maximum "
-    text += "time, that is for stalled_after_ticks of the manifest; the time before the first period is one of them. "
-    text += "It falls with the next count."
-    yield held(TICK, "stalled", help=text)
+    if spec.facts.stalls_with == UPDATE:
+        text = "The shaft stands still: at the end of this period the last count, or the reset, was the maximum time "
+        text += "ago. The velocity is 0."
+    else:
+        text = "The shaft rests: pulse_count was 0 in this period and in those before it for longer than the maximum "
+        text += "time, that is for stalled_after_ticks of the manifest; the time before the first period is one of "
+        text += "them. It falls with the next count."
+    yield held(spec.facts.stalls_with, "stalled", help=text)
     if spec.scale.output:
         yield held(UPDATE, "velocity_overflow", help="This velocity was saturated to the width of the port.")
     if spec.age:

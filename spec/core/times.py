@@ -5,6 +5,7 @@ from fractions import Fraction
 from tachometry.spec.core.follows import Follows, S
 from tachometry.spec.core.probe import TIME_WIDTH
 from tachometry.spec.core.timing import MAX_TICK_CYCLES
+from tachometry.spec.language.port import TICK
 
 
 class Times(Follows[S]):
@@ -86,5 +87,5 @@ class Times(Follows[S]):
 
     @property
     def stalled_after_ticks(self) -> int:
-        """Nominal ticks that ticks in a row without a count must last for `stalled` to rise."""
-        return self.spec.timing.max_ticks + 1
+        """Nominal ticks without a count after which `stalled` rises: of empty ticks, or since the last count."""
+        return self.spec.timing.max_ticks + (self.spec.facts.stalls_with == TICK)

@@ -9,7 +9,7 @@ Error analysis. What is added to p, v and a is a power of 2 from a table, off by
 relative error moves the gains only, which are flat. A result is rounded up if its 8 bits below the LSB and the number
 of the event, its bits reversed, carry: so in the mean of 256 events nothing is lost, and a step below the LSB is still
 made. What is left is a walk of a by less than an LSB an event, over as many events as the memory has: 2^−63 ·
-(48 MHz)² · √4096 = 0.016 counts/s² at 2000 counts, which is 1/100 of what a real disc leaves. A finer disc leaves less
+(48 MHz)² · √8192 = 0.023 counts/s² at 2000 counts, which is 1/70 of what a real disc leaves. A finer disc leaves less
 of that, so less than 100,000 rad/s² has to fit there. Products by a time are exact to the LSB, as the time is.
 """
 
@@ -34,7 +34,7 @@ POWER_BITS = 17  # fraction bits of a power in its table
 MOST_NUMBER_BITS = 11  # of the counts of a tick that an event takes
 
 MOST_MEMORY = 4  # seconds
-MOST_EVENTS_BITS = 12  # memory does not grow beyond 2^12 events
+MOST_EVENTS_BITS = 13  # memory does not grow beyond 2^13 events
 # The deviation of a slope at the end of N events in the time T, as D·√(1/N)/T: of a line and of a parabola.
 STRAIGHT, CURVE = 2.3, 12.0
 FORGET = Fraction(1, 10)  # seconds of silence after which the state is forgotten, if the maximum time is no longer
@@ -153,7 +153,7 @@ class Tracking:
         logs = {
             "of_straight": math.log2(STRAIGHT) + of_quality, "of_curve": math.log2(CURVE) + of_quality, "none": -127,
             "log_3_2": math.log2(3 / 2), "log_9_4": math.log2(9 / 4), "log_8": 3, "log_32": 5, "log_64": 6,
-            "log_256": 8, "log_4096": MOST_EVENTS_BITS, "log_4": 2, "log_eighth": -3, "log_half": -1,
+            "log_256": 8, "log_8192": MOST_EVENTS_BITS, "log_4": 2, "log_eighth": -3, "log_half": -1,
             "log_5_8": math.log2(8 / 5),
             "of_velocity": v - PLACE_BITS + t, "of_speed": v + t, "of_slope": a - v + t + 1,
             "of_bound": math.log2(self.quality) - v + 2**-EXP_INDEX,  # not below the velocity for the table
@@ -161,10 +161,10 @@ class Tracking:
         return {
             **{name: fixed_log(value) for name, value in logs.items()},
             "past_4": fixed_log(2) + 1, "log_quarter": -fixed_log(2) - 1,
+            "past_8": fixed_log(3) + 32,  # a memory of 8 events is off by so much, for the tables
             "order": order, "order_lag": order - fixed_log(math.log2(3.5)),
-            "limit_first": order + 2 * fixed_log(PLACE_BITS - 2),  # of a noise of 1/4
             "zero": 0, "one": 1, "three": 3, "minus_one": -1, "minus_two": -2, "fade": -5,
-            "count": one, "half": one // 2, "almost_half": one // 2 - 1,
+            "count": one, "half": one // 2,
             "quarter": one // 4, "minus_quarter": -one // 4,
             "sixteenth": one // 16, "minus_sixteenth": -one // 16,
             "least_noise": one >> 10, "most_noise": 1 << RESULT_BITS - 2,  # which no error reaches

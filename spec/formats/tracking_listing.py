@@ -16,7 +16,7 @@ One line is one chain of the adder, from left to right: `word = first term, furt
 
 LISTING = """
 reset:                                  # before the first tick
-    D = quarter
+    D = quarter log
     noises = noises_first
     turn = zero
     o0 = zero
@@ -25,8 +25,9 @@ reset:                                  # before the first tick
     o3 = zero
     p = zero
     phase = minus_two
-    limit = limit_first
+    limit = order + ~ + ~
     doubt = log_8
+    quiet = zero
     after = minus_one
 tick:
     if empty goto silent
@@ -61,7 +62,7 @@ known:
     log_dt = ~
     small dt by
     a product half_velocity
-    near = raw - edge keep
+    e = raw - edge keep
     share = log_dt - log_T
     w = sum lo+ growing
     quick step = zero
@@ -72,16 +73,16 @@ known:
     small V = sum + ~
     small step = zero
     small t product place
-    minus_sixteenth s+ near
+    minus_sixteenth s+ e
     if pos goto event
     ~ keep                              # the same edge again: no event, unless it moved
     minus_quarter s+ ~
     if neg goto same
 event:
     P = p + ~
-    w exp                               # memory grows by g·min(dt, T), if it grows or 4096·dt ≥ T
+    w exp                               # memory grows by g·min(dt, T), if it grows or 8192·dt ≥ T
     growth keep
-    share + log_4096 - growth
+    share + log_8192 - growth
     if neg goto grown
     step = zero s+ ~
 grown:
@@ -103,7 +104,7 @@ grown:
     edge = raw - moved
     e = zero s+ ~ keep log
 heard:
-    $counts + almost_half s- e
+    $counts + slack - one s- e
     if neg goto slip
     log_e = ~
     e - mu over 2
@@ -115,12 +116,20 @@ heard:
     minus_D3 s+ mu s+ mu
     if neg goto calm
     small log_dt + log_32 exp
-fired:
-    T = memory - ~ lo+ ~ log
+    T = memory - ~ lo+ ~
     slow_T = zero
+    log_X + log_256
+    if pos goto kept
+    e over 1                            # the memory was long: half of the error is of the place
+    log_e = log_e + log_half
+    P = P + ~
+    e = e - ~
+kept:
+    T log
 sized:
     of_e = log_e - log_dt
     e keep
+    after = one
     log_T = ~
     log_X = log_dt - ~ min log_quarter gain 1
     of_v = sum + of_e + log_X
@@ -134,16 +143,16 @@ few:
     log_X gain 2
     of_v + log_X - log_dt + ~ exp
     t = log_T + log_T
-    after = one
+    step = D + D
     small of_e = log_e + log_X
     t = t + t - w
     a = a s+ ~ keep log
     log_X + log_64                      # order one, where the acceleration is not seen
     if pos goto curved
-    of_a = log_T - of_slope
+    of_v = log_T - of_slope
     t + ~ + ~
     if pos goto curved
-    of_a + ~ exp
+    of_v + ~ exp
     as = zero
     quality = of_straight
     quick of_e = log_e + log_X
@@ -179,6 +188,7 @@ shown:
     small tick by
     velocity product shown
     w = doubt + log_X - slips hi+ slips     # D·√X, more if errors keep a sign
+    triple = step + D
     t = ~
     limit + w over 1
     quick slope by
@@ -189,13 +199,11 @@ shown:
     as product acceleration
     t max least min most_quality out quality
     ~ out acceleration
-    after
-    if neg goto end
-    sum - one
-    if neg goto ready
+    after - one
+    if neg goto fewer
 learn:                                  # nothing below is in a hurry
     e - lag keep log
-    w = D + D + D
+    lost = slips hi+ lost               # counts were lost or added, and now the place is right
     log_X + log_3_2 + ~ exp
     noises = noises max noises_first    # an upset may have made it less
     quick sum min noises_offset by
@@ -211,7 +219,7 @@ short:
     small noises min noises_offset by
     before = e
     slips = slips lo+ fade max none
-    zero s+ t - D min w over by
+    zero s+ t - D min triple over by
     a keep
     t = zero s+ a min most
     D = D + ~ min most_noise max least_noise
@@ -220,34 +228,61 @@ short:
 ready:                                  # growth of the memory and noise, for the next event
     D log
     minus_Ds = zero - D
-    t = sum
     growth = zero
-    growing = log_T
+    after = minus_one
     limit = order + ~ + ~
     lag log
     w = order_lag - log_X - limit
-    after = minus_one
+    slack = half
     trouble = ~ + w + ~                 # lag² over 7/2 U
-    D over 1
+    D over 2
     log_X + log_256
-    if pos goto scaled
-    minus_Ds = minus_Ds - ~
-    trouble = trouble - log_9_4
-    t = minus_Ds + minus_Ds             # five D_s, as the memory is long
+    if neg goto long
+    log_X + log_64
+    if neg goto some
+    w = minus_Ds min minus_sixteenth    # −D_a
+    log_X + past_8
+    if neg goto scaled
+    slack = half - minus_Ds - minus_Ds
 scaled:
     doubt = trouble + log_9_4 hi+ log_8
-    minus_D3 = minus_Ds + minus_Ds + minus_Ds
-    minus_D4 = sum + t
+    minus_D3 = w + w + w
+    minus_D4 = sum + w
+judged:
     trouble
-    if neg goto kept
-    growth = zero - count               # that outweighs any logarithm
-    growing = log_T + log_half
-    trouble - log_4
-    if neg goto end
+    if neg goto grows
+    sum - log_4
+    if neg goto shrinks
+    sum - log_4
+    if neg goto halves
     slow_T = T + T
+    growth = zero - count               # that outweighs any logarithm
+    growing = log_T - log_half
 end:
     end
-kept:
+fewer:
+    sum + one
+    if neg goto end
+    goto ready
+halves:
+    slow_T = T + T
+shrinks:
+    growth = zero - count
+    growing = log_T + log_half
+    end
+some:
+    w = minus_Ds - ~ min minus_sixteenth
+    goto scaled
+long:
+    trouble = trouble - log_9_4
+    minus_Ds = minus_Ds - ~ - ~
+    w = sum min minus_sixteenth
+    doubt = trouble + log_9_4 hi+ log_8
+    minus_D3 = w + w + w
+    minus_D4 = sum + w + w              # five of them
+    goto judged
+grows:
+    growing = log_T
     T - slow_T
     if pos goto end
     growing = log_T + log_eighth
@@ -286,10 +321,13 @@ lone:
     goto heard
 alone:
     mu = mu + ~
+    slips = slips min zero
     quick log_dt + log_8 exp
     since + lead by
     small log_dt + log_8 exp
-    goto fired
+    T = memory - ~ lo+ ~ log
+    slow_T = zero
+    goto sized
 calm:
     T = memory log
     goto sized
@@ -315,6 +353,7 @@ young:
 begin:
     e = c - p keep log
     slips = none
+    lost = zero
     edge = raw - moved
     of_velocity - log_dt + ~ exp
     phase = zero
@@ -344,7 +383,7 @@ same:
 silent:
     since = $length + since min most_since
     quiet = $length + quiet max zero min most
-    sum - forget
+    sum - max_time out stalled + max_time - forget
     if pos goto rest
     phase
     if neg goto nothing
@@ -363,10 +402,22 @@ below:
     zero - P - o@down
 beyond:
     max zero
-    t = sum - half + minus_D3 + minus_Ds + minus_Ds
+    t = sum - half
     if neg goto still
+    P = P s- t                          # at the next edge
+    w = minus_D3 + minus_Ds + minus_Ds
+    half - slack
+    if pos goto sure
+    w = zero - half - quarter max w
+sure:
+    t = t + w
+    if neg goto still
+    zero - lost
+    if pos goto trusted
+    t = t - count - count - count - count
+    if neg goto still
+trusted:
     quiet + lead log
-    P = P s- t
     w = zero
     t - half
     if neg goto whole
@@ -386,7 +437,6 @@ still:
 rest:
     phase = minus_two
     since = zero
-    quiet = zero
     p = zero
 nothing:
     quality = none

@@ -222,6 +222,7 @@ class TrackTachometer(TachometerSpec):
         update_by="tick",
         bounds=False,
         awaits_count=True,
+        stalls_with=UPDATE,
         usual={"max-time": _MAX_TIME},
     )
     latency = cached_property(TrackLatency)

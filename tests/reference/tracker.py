@@ -37,6 +37,8 @@ class Tracker:
     v: float = 0
     a: float = 0
     at: float = 0
+    lost: float = 0  # counts that may still be missing, once a slip is confirmed
+    share: float = 1 / 4  # of the latest event in the memory
     shown: tuple[float, float] = (0, 0)  # velocity and acceleration of order two, or of order one
     position: int = 0
     last: int = 0
@@ -78,15 +80,18 @@ class Tracker:
         if raw == self.edge and abs(way) < 1 / 4:
             return
         self.edge = raw
-        if abs(e) > n + 1 / 2:
+        if abs(e) > n + 1 / 2 + (2 * self.sure if self.share >= 1 / 8 else 0):
             self.slips += 1
             if self.slips < 3 and 4 * dt <= self.memory:
                 self.p, self.at = c, t
             else:
                 self._begin(n, raw, c, t, dt)
             return
+        if self.slips > 0 and abs(e) <= self.alarm:
+            self.lost = 4
         self.slips = 0
-        share = self._remember(e, dt)
+        share, more = self._remember(e, dt)
+        way, e = way + more, e - more
         rate = min(1 / self.memory, 1 / (4 * dt))
         e1 = e * share / (1 + share) / (1 + 2 * share)
         e2, e3 = e1 * share, e1 * share**2
@@ -103,6 +108,7 @@ class Tracker:
         self.memory = dt / 32 if n > 1 else dt
         self.slow_until = self.before = self.mean = self.lag = 0.0
         self.shown, self.slips, self.phase, self.long = (self.v, 0), 0, 2, False
+        self.lost, self.share = 0, 1 / 4
         self.expected = self.noise**2 / 4
 
     @property
@@ -110,30 +116,42 @@ class Tracker:
         """The noise; while the memory is long, it is learned from the errors alone."""
         return self.noise * (3 / 2 if self.long else 1)
 
-    def _remember(self, e: float, dt: float) -> float:
-        """Let the memory grow or fall; the share of the event in it."""
+    @property
+    def certain(self) -> float:
+        """The noise of alarms, which also an edge has that shares no tick."""
+        middle = not self.long and self.share < 1 / 64
+        return max(self.noise * 5 / 4 if middle else self.sure, 1 / 16)
+
+    @property
+    def alarm(self) -> float:
+        return (4 + self.long) * self.certain
+
+    def _remember(self, e: float, dt: float) -> tuple[float, float]:
+        """Let the memory grow or fall; the share of the event in it, and how far the place moves at once."""
         growth = 1 / 8 if self.memory < self.slow_until else 1.0
         if self.lag**2 >= 7 / 2 * self.expected:
             growth = -1 / 2
             if self.lag**2 >= 14 * self.expected:
                 self.slow_until = 2 * self.memory
-        if 4096 * dt < self.memory:
+            if self.lag**2 >= 56 * self.expected:
+                growth = -2
+        if 8192 * dt < self.memory:
             growth = min(growth, 0)
         self.memory = max(min(self.memory + growth * min(dt, self.memory), self.most_memory), 1)
         self.mean += (e - self.mean) / 4
-        least = math.inf
-        if abs(e) > (4 + self.long) * self.sure:
+        least, more = math.inf, 0.0
+        if abs(e) > self.alarm:
             least = 8 * dt
-        elif abs(self.mean) > 3 / 2 * self.sure:
-            least = 32 * dt
+        elif abs(self.mean) > 3 / 2 * self.certain:
+            least, more = 32 * dt, e / 2 if self.long else 0
         if least < math.inf:
             self.memory, self.slow_until = min(self.memory, least), 0
-        return min(dt / self.memory, 1 / 4)
+        return min(dt / self.memory, 1 / 4), more
 
     def _learn(self, n: int, e: float, share: float, kind: int) -> None:
         self.events = min(self.events + 1, 504)
         b = math.floor(math.log2(self.events + 8))
-        self.long = share < 1 / 256
+        self.long, self.share = share < 1 / 256, share
         alike = self.long and self.lag**2 < 7 / 2 * self.expected
         change = 3 / 2 * abs(e) if alike else abs(e - self.before)
         self.noise = max(self.noise + 2.0 ** -min(b, 8) * (min(change, 4 * self.noise) - self.noise), 2**-10)
@@ -152,7 +170,9 @@ class Tracker:
         z = self.p + (velocity + slope * s / 2) * s - self.position
         sign = 1 if z >= 0 else -1
         offset = self.offsets[(self.position if z > 0 else self.position - 1) % 4]
-        beyond = max(sign * (z + offset), 0) - 1 / 2 - 5 * self.sure
+        margin = 3 * self.certain + 2 * self.sure
+        margin = (min(margin, 3 / 4) if self.share >= 1 / 8 else margin) + self.lost
+        beyond = max(sign * (z + offset), 0) - 1 / 2 - margin
         if beyond <= 0:
             return shown
         most = (5 / 8 if beyond > 1 / 2 else 1) / (silence + self.lead)

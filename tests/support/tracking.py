@@ -54,7 +54,7 @@ class Interpreter:
         unit, code = self._unit, self.program.code.instructions
         unit._chance = 1 << CHANCE_BITS - 1
         place, sum_, sign, result, by = self.program.code.labels["tick" if self.met else "reset"], 0, 1, 0, 1
-        shown: dict[str, int] = {}
+        shown = {"stalled": 0}
 
         def name(word: str) -> str:
             return (f"o{chosen[word]}" if chosen[word] >= 0 else "zero") if word in chosen else word
@@ -87,7 +87,7 @@ class Interpreter:
             if one.store:
                 self.words[name(one.store)] = sum_
             if one.output:
-                shown[one.output] = sum_
+                shown[one.output] = int(sum_ >= 0) if one.output == "stalled" else sum_
             match one.start:
                 case Start.LOG:
                     result = log2(sum_)
@@ -116,7 +116,7 @@ def core(**options: str) -> TrackTachometer:
     return spec
 
 
-MOTIONS = ("even", "even", "lost", "twins", "rest", "dither", "burst", "random")
+MOTIONS = ("even", "even", "lost", "twins", "shifted", "rest", "dither", "burst", "random")
 
 
 def motions(spec: TrackTachometer, rng: np.random.Generator, n_ticks: int) -> tuple[Steps, NDArray[np.int64]]:
@@ -138,13 +138,15 @@ def motions(spec: TrackTachometer, rng: np.random.Generator, n_ticks: int) -> tu
         duration = tick * int(rng.choice([3, 20, 60, 600]))
         kind, way = rng.choice(MOTIONS), rng.choice([-1, 1])
         speed = most * 10 ** rng.uniform(-4, 0.05)
-        if kind in ("even", "lost", "twins"):
+        if kind in ("even", "lost", "twins", "shifted"):
             slope = speed / duration * rng.choice([-0.9, 0, 0, 0, 0.5, 3])
             way_at = np.cumsum(speed + slope * np.arange(0, duration, 8)) * 8  # an integral is enough
             at = np.interp(np.arange(1, int(way_at[-1]) + 1), way_at, np.arange(0, duration, 8))
             at += rng.normal(0, rng.choice([0, 0.02, 0.2]), len(at)) / speed
             step = np.full(len(at), way)
-            if kind == "lost":
+            if kind == "shifted":  # all edges of the second half, by half a count
+                at[len(at) // 2 :] += 1 / (2 * speed)
+            elif kind == "lost":
                 first = int(rng.integers(len(at) + 1))
                 kept = np.r_[:first, min(first + int(rng.integers(1, 6)), len(at)) : len(at)]
                 at, step = at[kept], step[kept]

@@ -12,6 +12,8 @@ struct Recursion : Tables {
   int64_t reversed[1 << CHANCE_BITS] = {};
   int64_t phase = 0, turn = 0, noises, p = 0, v = 0, a = 0, shown_v = 0, shown_a = 0, memory = 0, log_memory = 0;
   int64_t slow_until = 0, since = 0, quiet = 0, noise, sure, alarm, error = 0, mean = 0, lag = 0, edge = 0, slips = 0;
+  int64_t certain, slack = 0, lost = 0;
+  bool stalled = false;
   int64_t log_share, offsets[4] = {0, 0, 0, 0}, grows = 1, log_growth = 0, log_limit, trouble = 0, chance, moved = 0, quality = 0;
   int64_t *row = nullptr;
 
@@ -19,8 +21,8 @@ struct Recursion : Tables {
     for (int i = 0; i < 1 << CHANCE_BITS; i++)
       for (int bit = 0; bit < CHANCE_BITS; bit++) reversed[i] |= (int64_t)(i >> bit & 1) << (CHANCE_BITS - 1 - bit);
     noises = k.noises_first;
-    noise = sure = k.quarter, alarm = 4 * sure;
-    log_share = -k.log_4, trouble = -k.log_9_4, log_limit = k.limit_first;
+    noise = sure = certain = k.quarter, alarm = 4 * sure;
+    log_share = -k.log_4, trouble = -k.log_9_4, log_limit = 2 * log2(noise) + k.order;
   }
 
   int64_t log2(int64_t x) const {
@@ -61,6 +63,7 @@ struct Recursion : Tables {
     int64_t deviation = power(round(std::max(more + log_share, slips) + log_limit, 1) + quality - log_memory, 1);
     row[2] = std::min(std::max(deviation, least), k.most_quality);
     row[3] = product(shown_a, k.slope, k.acceleration);
+    row[4] = stalled;
   }
 
   void tick(int64_t number, int64_t times, int64_t places, int64_t last, int64_t moved_, int kind, bool down, int end, int64_t length) {
@@ -69,6 +72,7 @@ struct Recursion : Tables {
     since = std::min(since + (length << t), k.most_since);
     quiet = std::min(quiet + (length << t), k.most);
     moved = moved_ * k.count;
+    stalled = !number && quiet >= k.max_time;
     if (!number) return silence(end);
     quiet = last << t;
     event(number, times << t, places, kind, down);
@@ -100,7 +104,7 @@ struct Recursion : Tables {
     int64_t P = p + way, e = at - P;
     edge = raw - moved;
     int64_t step = power(std::min<int64_t>(log_dt - log_memory, 0) + log_memory + log_growth, 1);
-    if (log_dt - log_memory + k.log_4096 < 0 && grows >= 0) step = 0;
+    if (log_dt - log_memory + k.log_8192 < 0 && grows >= 0) step = 0;
     int64_t grown = std::max(std::min(memory + (grows >= 0 ? step : -step), k.most_memory), k.clock);
     since = tau;
     if (n > 1) {
@@ -108,7 +112,7 @@ struct Recursion : Tables {
       e = power(log2(rest) + k.log_64 - log_n, sign_of(rest));
     }
     int64_t log_e = log2(e);
-    if (std::abs(e) >= k.half + n * k.count) {
+    if (std::abs(e) >= slack + n * k.count) {
       slips = std::max<int64_t>(slips, 0) + 1;
       offsets[kind] = std::max(-k.quarter, std::min(offsets[kind], k.quarter));
       if (slips >= 3 || log_dt + k.log_4 - log_memory - 1 >= 0) return begin(n, at, raw, tau, dt, log_dt);
@@ -116,8 +120,15 @@ struct Recursion : Tables {
       return emit(ahead(), place());
     }
     mean += round(e - mean, 2);
-    if (std::abs(e) >= alarm) slow_until = 0, grown = std::min(grown, power(log_dt + k.log_8, 1));
-    else if (2 * std::abs(mean) >= 3 * sure) slow_until = 0, grown = std::min(grown, power(log_dt + k.log_32, 1));
+    bool sudden = std::abs(e) >= alarm;
+    if (sudden) slow_until = 0, grown = std::min(grown, power(log_dt + k.log_8, 1));
+    else if (2 * std::abs(mean) >= 3 * certain) {
+      slow_until = 0, grown = std::min(grown, power(log_dt + k.log_32, 1));
+      if (log_share + k.log_256 < 0) {
+        int64_t half = round(e, 1);
+        P += half, e -= half, log_e += k.log_half;
+      }
+    }
     memory = grown, log_memory = log2(memory);
     int64_t x = log_share = std::min(log_dt - log_memory, k.log_quarter), of_v = log_e - log_dt + x + x;
     v = V + power(of_v + gain(1), sign_of(e));
@@ -132,6 +143,7 @@ struct Recursion : Tables {
       shown_v -= power(log_at - k.of_slope, sign_of(a)), shown_a = 0, quality = k.of_straight;
     emit(ahead(), place());
     // What is learned.
+    if (slips > 0 && !sudden) lost = 4 * k.count;
     slips = std::max(std::min<int64_t>(slips, 0) + k.fade, k.none);
     noises = std::min(noises + k.noises_one, k.noises_most);
     if (is_long && trouble < 0) change = e + round(e, 1);
@@ -152,18 +164,22 @@ struct Recursion : Tables {
     sure = noise;
     int64_t lagging = log_share + log_limit - k.order_lag;
     bool is_long = log_share + k.log_256 < 0;
-    if (is_long) sure += round(noise, 1), lagging += k.log_9_4;
-    alarm = (4 + is_long) * sure;
+    int64_t quarter = round(noise, 2);
+    if (is_long) sure += 2 * quarter, lagging += k.log_9_4;
+    certain = std::max(sure + (!is_long && log_share + k.log_64 < 0 ? quarter : 0), k.sixteenth);
+    alarm = (4 + is_long) * certain;
+    slack = k.half + (log_share + k.past_8 >= 0 ? 2 * sure : 0);
     grows = 1, log_growth = 0;
     trouble = 2 * log2(lag) - lagging;
     if (trouble >= 0) {
       grows = -1, log_growth = k.log_half;
       if (trouble - k.log_4 >= 0) slow_until = 2 * memory;
+      if (trouble - 2 * k.log_4 >= 0) log_growth = -k.log_half;
     } else if (memory < slow_until) log_growth = k.log_eighth;
   }
   void begin(int64_t n, int64_t at, int64_t raw, int64_t tau, int64_t dt, int64_t log_dt) {
     int64_t e = at - p;
-    phase = 2, slips = k.none;
+    phase = 2, slips = k.none, lost = 0;
     v = shown_v = power(log2(e) + k.of_velocity - log_dt, sign_of(e));
     p = at - moved, edge = raw - moved;
     since = tau, log_memory = n > 1 ? log_dt - k.log_32 : log_dt, memory = n > 1 ? power(log_memory, 1) : dt, log_share = k.log_quarter;
@@ -172,18 +188,21 @@ struct Recursion : Tables {
     ready();
   }
   void silence(int end) {
-    if (quiet >= k.forget) phase = since = quiet = p = 0;
+    if (quiet >= k.forget) phase = since = p = 0;
     if (phase != 2) return nothing();
     int64_t least = 1, z = place(), sign = sign_of(z), velocity = ahead();
-    int64_t beyond = std::max<int64_t>(sign * (z + offsets[(z < 0 ? end - 1 : end) & 3]), 0) - k.half - 5 * sure;
+    int64_t beyond = std::max<int64_t>(sign * (z + offsets[(z < 0 ? end - 1 : end) & 3]), 0) - k.half;
+    if (beyond >= 0) z -= sign * beyond;
+    int64_t margin = 3 * certain + 2 * sure;
+    if (slack > k.half) margin = std::min(margin, k.half + k.quarter);
+    beyond -= margin + lost;
     if (beyond >= 0) {
-      z -= sign * beyond;
       int64_t share = beyond - k.half >= 0 ? k.log_5_8 : 0;
       int64_t bound = k.of_speed - log2(quiet + k.lead) - share;
       velocity = sign * std::min(sign * velocity, power(bound, 1));
       least = power(bound + k.of_bound, 1);
     }
-    if (quiet >= k.max_time) velocity = shown_a = 0;
+    if (stalled) velocity = shown_a = 0;
     emit(velocity, z, least);
   }
   void nothing() {
@@ -201,7 +220,7 @@ CALLED void begin(Recursion *state, const Constants *constants, const Tables *ta
 CALLED void track(Recursion *state, int64_t ticks, const int64_t *windows, int64_t *rows) {
   for (int64_t i = 0; i < ticks; i++) {
     auto of = [&](int column) { return windows[column * ticks + i]; };
-    state->row = rows + 4 * i;
+    state->row = rows + 5 * i;
     state->tick(of(0), of(1), of(2), of(3), of(4), (int)of(5), of(6) != 0, (int)of(7), of(8));
   }
 }

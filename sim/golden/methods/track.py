@@ -82,7 +82,7 @@ class Windows:
         yield from zip(*(column.tolist() for column in vars(self).values()), strict=True)
 
 
-# What is shown in each tick, shape (n, 4), of windows that come after those of the call before.
+# What is shown in each tick, shape (n, 5), of windows that come after those of the call before.
 Rows = Callable[[Windows], NDArray[np.int64]]
 Begin = Callable[[Tracking, int], Rows]
 _PIECE = 1 << 16  # ticks at a time, for which memory is needed beside that of the columns
@@ -91,7 +91,7 @@ _PIECE = 1 << 16  # ticks at a time, for which memory is needed beside that of t
 def rows(form: Tracking, lead: int) -> Rows:
     """Return the Python model after a reset."""
     state = Recursion(form, lead)
-    return lambda windows: np.array([state.tick(*row) for row in windows.rows()], dtype=np.int64).reshape(-1, 4)
+    return lambda windows: np.array([state.tick(*row) for row in windows.rows()], dtype=np.int64).reshape(-1, 5)
 
 
 def constants_of(form: Tracking, lead: int) -> dict[str, int]:
@@ -126,7 +126,7 @@ def compiled(names: tuple[str, ...]) -> Begin | None:
 
         def shown(windows: Windows) -> NDArray[np.int64]:
             columns = np.array([*vars(windows).values()], dtype=np.int64)
-            found = np.empty((columns.shape[1], 4), dtype=np.int64)
+            found = np.empty((columns.shape[1], 5), dtype=np.int64)
             begun, given, taken = (ctypes.c_void_p(array.ctypes.data) for array in (state, columns, found))
             library.track(begun, ctypes.c_int64(len(found)), given, taken)
             return found
@@ -148,22 +148,23 @@ class Model:
         shown = (compiled(tuple(constants_of(spec.form, spec.program.lead))) or rows)(spec.form, spec.program.lead)
         unused, shift = 64 - spec.position_width - spec.fine_bits, PLACE_BITS - spec.fine_bits
         n, most = len(ticks), spec.timing.max_ticks
-        names = ("velocity", "interval", "forced", "acceleration", "quality", "position_fine")
-        columns = {name: np.empty(n, dtype=bool if name == "forced" else np.int64) for name in names}
+        names = ("velocity", "interval", "forced", "acceleration", "quality", "position_fine", "stalled")
+        flags = ("forced", "stalled")
+        columns = {name: np.empty(n, dtype=bool if name in flags else np.int64) for name in names}
         begin, reached, latest = -1, 0, -most
         for first in range(0, n, _PIECE):
             piece = slice(first, first + _PIECE)
             last = ticks.clock[piece] - spec.latency.tick
             windows = Windows.of(steps, last, spec.form.most_number, begin, reached)
             begin, reached = int(last[-1]), reached + int(windows.moved.sum())
-            velocity, place, quality, acceleration = shown(windows).T
+            velocity, place, quality, acceleration, stalled = shown(windows).T
             fine = (ticks.position[piece] << spec.fine_bits) + ((place + (1 << shift - 1)) >> shift)
             counted = windows.number > 0
             number = np.arange(first, first + len(last))
             before = np.maximum.accumulate(np.append(latest, np.where(counted, number, latest)))
             latest = int(before[-1])
             interval = np.minimum(number - before[:-1], most)
-            values = (velocity, interval, ~counted, acceleration, quality, fine << unused >> unused)
+            values = (velocity, interval, ~counted, acceleration, quality, fine << unused >> unused, stalled)
             for name, value in zip(names, values, strict=True):
                 columns[name][piece] = value
         return Table(ticks.clock + spec.latency.datapath, {"cause": ticks.clock, **columns})

@@ -16,7 +16,8 @@ from tachometry.spec.formats.tracking import (
 )
 
 REST, ONE, TRACKS = range(3)
-Row = tuple[int, int, int, int]  # velocity, place at the end of the tick, deviation to be expected, acceleration
+# Velocity, place at the end of the tick, deviation to be expected, acceleration, whether the shaft stands still.
+Row = tuple[int, int, int, int, int]
 _HALF = 1 << CHANCE_BITS - 1
 
 
@@ -48,13 +49,14 @@ class Recursion:
         self.p = self.v = self.a = self.shown_v = self.shown_a = 0
         self.memory = self.log_memory = self.slow_until = 0
         self.since = self.quiet = 0
-        self.noise = self.sure = k["quarter"]
-        self.alarm = 4 * self.sure
+        self.stalled = False
+        self.noise = self.sure = self.certain = k["quarter"]  # D, D_s, D_a
+        self.alarm, self.slack, self.lost = 4 * self.certain, 0, 0
         self.error = self.mean = self.lag = self.edge = self.slips = 0
         self.log_share = -k["log_4"]
         self.offsets = [0] * 4
         self.grows, self.log_growth = 1, 0
-        self.log_limit, self.trouble = k["limit_first"], -k["log_9_4"]
+        self.log_limit, self.trouble = 2 * log2(self.noise) + k["order"], -k["log_9_4"]
         self._chance, self.quality = _HALF, 0
 
     # The arithmetic.
@@ -91,12 +93,13 @@ class Recursion:
     def tick(
         self, number: int, times: int, places: int, last: int, moved: int, kind: int, down: int, end: int, length: int
     ) -> Row:
-        """Take a tick; velocity, place relative to the position, the deviation to be expected, acceleration."""
+        """Return what the ports show of a tick; the place is relative to the position."""
         k, bits = self._k, self._form.time_bits
         self._chance = _HALF
         self.since = min(self.since + (length << bits), k["most_since"])
         self.quiet = min(self.quiet + (length << bits), k["most"])
         self._moved = moved << PLACE_BITS
+        self.stalled = not number and self.quiet >= k["max_time"]
         if number:
             self.quiet = last << bits
             return self._event(number, times << bits, places, kind, down)
@@ -137,7 +140,7 @@ class Recursion:
         # Memory.
         log_step = min(log_dt - self.log_memory, 0) + self.log_memory + self.log_growth
         step = self._power(log_step)
-        if log_dt - self.log_memory + k["log_4096"] < 0 <= self.grows:
+        if log_dt - self.log_memory + k["log_8192"] < 0 <= self.grows:
             step = 0
         memory = max(min(self.memory + (step if self.grows >= 0 else -step), k["most_memory"]), k["clock"])
         self.since = tau
@@ -147,7 +150,7 @@ class Recursion:
             rest_of += more if left >= 0 else -more
             e = self._power(log2(rest_of) + k["log_64"] - log_n, -1 if rest_of < 0 else 1)
         log_e = log2(e)
-        if abs(e) >= k["half"] + (n << PLACE_BITS):
+        if abs(e) >= self.slack + (n << PLACE_BITS):
             self.slips = max(self.slips, 0) + 1
             self.offsets[kind] = max(-k["quarter"], min(self.offsets[kind], k["quarter"]))
             if self.slips >= 3 or log_dt + k["log_4"] - self.log_memory - 1 >= 0:
@@ -157,10 +160,14 @@ class Recursion:
         # A change of the speed leaves 8 or 32 events.
         quarter = self._round(e - self.mean, 2)
         self.mean += quarter
-        if abs(e) >= self.alarm:
+        sudden = abs(e) >= self.alarm
+        if sudden:
             self.slow_until, memory = 0, min(memory, self._power(log_dt + k["log_8"]))
-        elif 2 * abs(self.mean) >= 3 * self.sure:
+        elif 2 * abs(self.mean) >= 3 * self.certain:
             self.slow_until, memory = 0, min(memory, self._power(log_dt + k["log_32"]))
+            if self.log_share + k["log_256"] < 0:
+                half = self._round(e, 1)
+                p, e, log_e = p + half, e - half, log_e + k["log_half"]
         self.memory, self.log_memory = memory, log2(memory)
         # The least squares.
         self.log_share = x = min(log_dt - self.log_memory, k["log_quarter"])
@@ -172,6 +179,8 @@ class Recursion:
         change, self.error = e - self.error, e
         self._show_order()
         row = self._emit(self._ahead())
+        if self.slips > 0 and not sudden:
+            self.lost = 4 * k["count"]
         self._learn(n, e, change, kind)
         self._ready()
         return row
@@ -217,18 +226,25 @@ class Recursion:
         """Find what the next event takes of this one: growth of the memory, noise."""
         k = self._k
         self.log_limit = 2 * log2(self.noise) + k["order"]
-        self.sure, sures = self.noise, 4
-        lagging = self.log_share + self.log_limit - k["order_lag"]
+        self.sure = self.certain = self.noise
+        lagging, times = self.log_share + self.log_limit - k["order_lag"], 4
+        quarter = self._round(self.noise, 2)
         if self.log_share + k["log_256"] < 0:
-            self.sure += self._round(self.noise, 1)
-            lagging, sures = lagging + k["log_9_4"], 5
-        self.alarm = sures * self.sure
+            self.sure = self.certain = self.noise + 2 * quarter
+            lagging, times = lagging + k["log_9_4"], 5
+        elif self.log_share + k["log_64"] < 0:
+            self.certain += quarter
+        self.certain = max(self.certain, k["sixteenth"])
+        self.alarm = times * self.certain
+        self.slack = k["half"] + (2 * self.sure if self.log_share + k["past_8"] >= 0 else 0)
         self.grows, self.log_growth = 1, 0
         self.trouble = 2 * log2(self.lag) - lagging
         if self.trouble >= 0:
             self.grows, self.log_growth = -1, k["log_half"]
             if self.trouble - k["log_4"] >= 0:
                 self.slow_until = 2 * self.memory
+            if self.trouble - 2 * k["log_4"] >= 0:
+                self.log_growth = -k["log_half"]
         elif self.memory < self.slow_until:
             self.log_growth = k["log_eighth"]
 
@@ -241,7 +257,7 @@ class Recursion:
         """Take the speed from the event before to this one."""
         k = self._k
         e = at - self.p
-        self.phase, self.slips = TRACKS, k["none"]
+        self.phase, self.slips, self.lost = TRACKS, k["none"], 0
         self.v = self.shown_v = self._power(log2(e) + k["of_velocity"] - log_dt, -1 if e < 0 else 1)
         self.p, self.edge = at - self._moved, raw - self._moved
         self.since, self.memory, self.log_memory, self.log_share = tau, dt, log_dt, k["log_quarter"]
@@ -268,21 +284,25 @@ class Recursion:
         """Say what the silence of a tick says."""
         k = self._k
         if self.quiet >= k["forget"]:
-            self.phase, self.since, self.quiet, self.p = REST, 0, 0, 0
+            self.phase, self.since, self.p = REST, 0, 0
         if self.phase != TRACKS:
             return self._nothing()
         z, least = self._place, 1
         sign = -1 if z < 0 else 1
         offset = self.offsets[(end - 1 if z < 0 else end) & 3]
-        beyond = max(sign * (z + offset), 0) - k["half"] - 5 * self.sure
+        beyond = max(sign * (z + offset), 0) - k["half"]
+        z -= sign * max(beyond, 0)
+        margin = 3 * self.certain + 2 * self.sure
+        if self.slack > k["half"]:
+            margin = min(margin, k["half"] + k["quarter"])
+        beyond -= margin + self.lost
         velocity = self._ahead()
         if beyond >= 0:
-            z -= sign * beyond
             share = k["log_5_8"] if beyond - k["half"] >= 0 else 0
             bound = k["of_speed"] - log2(self.quiet + self._lead) - share
             velocity = sign * min(sign * velocity, self._power(bound))
             least = self._power(bound + k["of_bound"])
-        if self.quiet >= k["max_time"]:
+        if self.stalled:
             velocity = self.shown_a = 0
         return self._emit(velocity, z, least)
 
@@ -302,4 +322,5 @@ class Recursion:
             place,
             min(max(self._power(noise + self.quality - self.log_memory), least), k["most_quality"]),
             self._product(self.shown_a, k["slope"], "acceleration"),
+            int(self.stalled),
         )

@@ -29,7 +29,7 @@ CHOICES = [
         f"as the turns of 4 axes fit the tick of {whole_clocks('tick', FOUR, 48_000_000)} clocks",
     ),
     ({"axes": "4", "tick": "5us"}, "s", f"as track needs --tick {ONE} and mt is of one axis"),
-    ({"axes": "64", "clock": "12MHz"}, "s", "as track needs 10 machines or --tick 1.36ms and mt is of one axis"),
+    ({"axes": "64", "clock": "12MHz"}, "s", "as track needs 11 machines or --tick 1424us and mt is of one axis"),
     ({"bounds": "yes"}, "mt", "as it has --bounds"),
     ({"bounds": "yes", "tick": "250ns"}, "s", "as mt needs a tick of 23 clocks"),
     ({"max-memory": "5ms"}, "track", "as it has --max-memory"),
@@ -114,7 +114,7 @@ def test_without_a_tick_it_is_as_long_as_the_method_needs(texts: dict[str, str],
     ("texts", "ticks"),
     [
         ({"tick": "30us"}, 3334),  # track: 100 ms
-        ({"tick": "5.25us", "method": "track"}, 19048),
+        ({"tick": "5.5us", "method": "track"}, 18182),
         ({"tick": "30us", "method": "s"}, 334),
         ({"tick": "20ms", "method": "s"}, 2),
         ({"tick": "1ns", "clock": "1GHz", "method": "s"}, 1 << 20),

@@ -44,14 +44,14 @@ def test_twins(name: str) -> None:
     held = windows(spec, 1, 1500)
     right = track.rows(spec.form, spec.program.lead)(held)
     assert np.array_equal(compiled(spec, held), right)
-    assert all(len(np.unique(column)) > 30 for column in right.T)
+    assert all(len(np.unique(column)) > 30 for column in right.T[:4])
 
 
 # Speeds and accelerations are the greatest in bursts at the shortest distance, of which the first core has many.
 @pytest.mark.parametrize("name", only(["default"], CORES))
 def test_what_is_shown_fits_the_ports(name: str) -> None:
     spec = CORES[name]
-    velocity, _, quality, acceleration = np.concatenate(
+    velocity, _, quality, acceleration, _ = np.concatenate(
         [compiled(spec, windows(spec, seed, 20_000)) for seed in range(2)]
     ).T
     assert np.abs(velocity).max() < 1 << spec.widths.native - 1
@@ -190,16 +190,20 @@ def test_quality_is_the_velocity_at_least_while_the_shaft_has_stopped() -> None:
 def test_quality_is_greater_after_counts_were_lost() -> None:
     """The place is that of one event then, which leaves an error in the velocity; this is forgotten, and so is that."""
     spec, n, lost = core(), 20_000, 12_000
-    place = np.arange(1, n) + np.random.default_rng(3).normal(0, 0.1, n - 1)
-    clock = np.round(place * spec.timing.tick_cycles / 0.9).astype(np.int64)  # so a tick holds a count, or none
-    kept = np.r_[:lost, lost + 4 : n - 1]
-    found, at = golden.run(spec, trace_of(clock[kept], np.arange(1, len(kept) + 1))).updates, round(lost / 0.9)
-    wrong = np.abs(found.velocity - np.median(found.velocity))
-    before, after = found.quality[at - 10], found.quality[at + 10 : at + 3000]
-    assert wrong[at + 10 : at + 3000].max() > 20 * before
-    assert 0.5 < np.mean(wrong[at + 10 : at + 3000] <= after) < 0.9
-    assert after[0] > 15 * before
-    assert found.quality[-1] < 2 * before
+    kept, at = np.r_[:lost, lost + 4 : n - 1], round(lost / 0.9)
+    covered, last = [], []
+    for seed in range(6):
+        place = np.arange(1, n) + np.random.default_rng(seed).normal(0, 0.1, n - 1)
+        clock = np.round(place * spec.timing.tick_cycles / 0.9).astype(np.int64)  # so a tick holds a count, or none
+        found = golden.run(spec, trace_of(clock[kept], np.arange(1, len(kept) + 1))).updates
+        wrong = np.abs(found.velocity - np.median(found.velocity))
+        before, after = found.quality[at - 10], found.quality[at + 10 : at + 3000]
+        assert wrong[at + 10 : at + 3000].max() > 20 * before
+        assert after[0] > 15 * before
+        covered.append(np.mean(wrong[at + 10 : at + 3000] <= after))
+        last.append(found.quality[-1] / before)
+    assert 0.5 < np.mean(covered) < 0.9
+    assert np.median(last) < 2
 
 
 WORDS = ("noise", "noises", "turn", 0, 1, 2, 3)  # what outlives a rest; numbers are those of offsets
