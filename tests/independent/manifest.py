@@ -261,7 +261,7 @@ class Expected:
             "clock_hz": lambda: settings.clock_hz,
             "tick_cycles": lambda: settings.tick,
             "max_ticks": lambda: settings.max_ticks,
-            "stalled_after_ticks": lambda: settings.max_ticks + 1,
+            "stalled_after_ticks": lambda: settings.max_ticks + (settings.method != "track"),
             "counts_per_rev": lambda: settings.counts_per_turn,
             "decoding": lambda: settings.decoding,
             "velocity.width": lambda: next(p["width"] for p in manifest["ports"] if p["name"] == "velocity"),

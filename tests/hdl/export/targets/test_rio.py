@@ -191,7 +191,6 @@ def check_axis(
             "position": (count + OFFSET) / SCALE,
             "count": count,
             "index-enable": enabled,
-            "stalled": ticks.stalled[at],
             **{name: ticks.get(name.replace("-", "_"))[at] for name in ("age", "swallowed-edges") if name in found},
             **{name: np.count_nonzero(events < clock) for name, events in counted.items()},
         }
