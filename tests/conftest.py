@@ -3,8 +3,9 @@
 import gc
 import os
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -35,3 +36,28 @@ def generated(tmp_path: Path) -> Callable[..., Path]:
         return tmp_path
 
     return generate
+
+
+@pytest.fixture
+def described() -> Callable[[Mapping[str, str]], Any]:
+    """Return what gives the manifest of a core of these options."""
+    from tachometry.spec import of_options
+    from tachometry.spec.registers.manifest import manifest
+
+    return lambda words: manifest(of_options(words))
+
+
+@pytest.fixture
+def golden() -> Callable[..., Any]:
+    """Return what gives the golden tables of a core of these options, whose lines change at some clocks or stay."""
+    import numpy as np
+
+    from tachometry.sim import golden
+    from tachometry.sim.signals.recording import PinTrace
+    from tachometry.spec import of_options
+
+    def run(words: Mapping[str, str], clocks: Any, n_clocks: int, **lines: Any) -> Any:
+        levels = {name: np.broadcast_to(np.array(line, np.uint8), len(clocks)) for name, line in lines.items()}
+        return golden.run(of_options(words).tachometer, PinTrace.of_lines(np.array(clocks), n_clocks, levels)).tables
+
+    return run
