@@ -145,6 +145,12 @@ def test_the_program_in_c_shows_the_registers(core: str, name: str, tmp_path: Pa
     assert (done.returncode, done.stderr) == (1, f"this is not {name}, or another version of it\n")
 
 
+@pytest.mark.parametrize(("core", "interrupts"), [("irq", ["0 29 4"]), ("apb", [])])
+def test_the_interrupt_is_shared_61_and_its_level_is_high(core: str, interrupts: list[str]) -> None:
+    """0 is a shared one, whose numbers begin at 32, and 4 a high level, which `irq` has while an event waits."""
+    assert re.findall(r"interrupts = <(.*)>;", made(core)["spindle.dtso"]) == interrupts
+
+
 # It needs dtc, which `make dtc` installs.
 @nightly
 @pytest.mark.parametrize("core", CORES)

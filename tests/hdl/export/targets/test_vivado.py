@@ -117,6 +117,8 @@ def test_module_and_component_say_one_thing(core: str) -> None:
     }
     assert parameters == parameters_of_module
     assert parameters["FREQ_HZ"] == "1000000"
+    assert parameters["POLARITY"] == ("ACTIVE_LOW" if ".rst(~" in verilog else "ACTIVE_HIGH")
+    assert parameters.get("SENSITIVITY") == ("LEVEL_HIGH" if core == "axi" else None)
     for listed in root.iter(f"{SPIRIT}file"):
         assert f"spindle_ip/{listed.findtext(f'{SPIRIT}name')}" in files
     for file in ("spindle.v", "spindle.xdc"):
