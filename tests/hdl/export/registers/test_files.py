@@ -114,6 +114,8 @@ def check_header(registers: RegisterMap, text: str, folder: Path) -> None:
     assert float(macros["RAD_PER_S_PER_LSB"]) == described["velocity"]["rad_per_s_per_lsb"]
     assert float(macros["RAD_PER_COUNT"]) == pytest.approx(2 * math.pi / described["counts_per_rev"], rel=1e-15)
     assert float(macros["UNIT_PER_LSB"]) == 0.5 ** described["velocity"]["frac_bits"]
+    for name in ("TICK_CYCLES", "MAX_TICKS", "COUNTS_PER_REV", "INTERVAL_UNIT_CYCLES"):
+        assert macros[name] == f"UINT32_C({described[name.lower()]})"
     for port in ("acceleration", "position_fine"):
         assert (f"{port.upper()}_PER_LSB" in macros) == (port in described)
         if port in described:
