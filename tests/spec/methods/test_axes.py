@@ -102,6 +102,7 @@ def test_latencies(parallel: bool) -> None:
         for tick in (0, 3):
             clock = 960 * tick + first + axis * turn + turn + 2 + parallel
             assert spec.tick_clock(axis, tick) == clock
+    assert manifest(spec)["axes"]["first_tick"] == spec.tick_clock(0, 0)
     told = manifest(spec)["latency_cycles"]
     assert told == {"pin_to_count": 2 + 8 - 1, "tick_latency": spec.tick_clock(7, 0) - 959, "tick_to_velocity": 0}
 
