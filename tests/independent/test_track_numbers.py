@@ -109,3 +109,9 @@ def test_offsets_are_learned_by_the_rules(golden: Found, described: Found, ticks
 def test_a_memory_finds_its_length_by_the_rules(golden: Found, described: Found) -> None:
     rows = beside(golden, described, uneven(8000, swing=0.3), CLOCK)[1000:]
     assert median(abs(own - rule) for own, _, rule, _ in rows) < median(row[1] for row in rows) / 100
+
+
+def test_a_memory_has_up_to_8192_events(golden: Found, described: Found) -> None:
+    """Its quality says so; while it is long, the noise of the rules is 3/2 of D."""
+    rows = beside(golden, described, uneven(12_000), CLOCK)[10_000:]
+    assert fmean(row[1] for row in rows) == pytest.approx(2.3 / 1.5 * fmean(row[3] for row in rows), rel=0.1)
