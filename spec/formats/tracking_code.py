@@ -7,6 +7,7 @@ was before it, and meanwhile adds a term as others do; it stores nothing. A mach
 the first two terms of a line at once.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import IntEnum
@@ -151,8 +152,8 @@ def assembled(listing: str = LISTING, apart: int = 2, ports: int = 1) -> Code:
     """
     code: list[Instruction] = []
     labels: dict[str, int] = {}
-    for line in listing.splitlines():
-        words = line.partition("#")[0].split()
+    for line in re.sub("#.*", "", listing).replace(";", "\n").splitlines():
+        words = line.split()
         if words[:1] in (["quick"], ["small"]):
             words = words[1:] if (words[0] == "quick") == (ports > 1) else []
         if not words:

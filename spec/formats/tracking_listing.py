@@ -1,6 +1,7 @@
 """The program of the tracking method as a listing; docs/concepts/track.md says what it computes.
 
-One line is one chain of the adder, from left to right: `word = first term, further terms, what is begun with the sum`.
+One line, or part of it up to a `;`, is one chain of the adder, from left to right: `word = first term, further terms,
+what is begun with the sum`.
 
     + w, - w      add, subtract               s+ w, s- w    with the sign that `keep` kept
     lo+ w, hi+ w  min(sum, 0) + w, max(sum, 0) + w          min w, max w  the lesser, the greater
@@ -17,22 +18,13 @@ One line is one chain of the adder, from left to right: `word = first term, furt
 LISTING = """
 reset:                                  # before the first tick
     D = quarter log
-    noises = noises_first
-    turn = zero
-    o0 = zero
-    o1 = zero
-    o2 = zero
-    o3 = zero
-    p = zero
-    phase = minus_two
+    noises = noises_first; turn = zero; o0 = zero; o1 = zero
+    o2 = zero; o3 = zero; p = zero; phase = minus_two
     limit = order + ~ + ~
-    doubt = log_8
-    quiet = zero
-    after = minus_one
+    doubt = log_8; quiet = zero; after = minus_one
 tick:
     if empty goto silent
-    $number log
-    if one goto single
+    $number log; if one goto single
     t = o@m1 + o@m2 + o@m3              # about the mean time, by logarithms; what is left goes into e
     minus_log_n = zero - ~
     $times log
@@ -73,17 +65,14 @@ known:
     small V = sum + ~
     small step = zero
     small t product place
-    minus_sixteenth s+ e
-    if pos goto event
+    minus_sixteenth s+ e; if pos goto event
     ~ keep                              # the same edge again: no event, unless it moved
-    minus_quarter s+ ~
-    if neg goto same
+    minus_quarter s+ ~; if neg goto same
 event:
     P = p + ~
     w exp                               # memory grows by g·min(dt, T), if it grows or 8192·dt ≥ T
     growth keep
-    share + log_8192 - growth
-    if neg goto grown
+    share + log_8192 - growth; if neg goto grown
     step = zero s+ ~
 grown:
     small $number by
@@ -96,30 +85,25 @@ grown:
     t = places - ~
     small zero s+ left by
     V product place_64
-    since = tau
-    P = P - moved
+    since = tau; P = P - moved
     t s+ ~ keep log
     quick memory = memory max clock
     log_64 + minus_log_n + ~ exp
     edge = raw - moved
     e = zero s+ ~ keep log
 heard:
-    $counts + slack - one s- e
-    if neg goto slip
+    $counts + slack - one s- e; if neg goto slip
     log_e = ~
     e - mu over 2
-    minus_D4 s+ e
-    if pos goto alone
+    minus_D4 s+ e; if pos goto alone
     mu = mu + ~ keep
     quick log_dt + log_32 exp
     since + lead by
-    minus_D3 s+ mu s+ mu
-    if neg goto calm
+    minus_D3 s+ mu s+ mu; if neg goto calm
     small log_dt + log_32 exp
     T = memory - ~ lo+ ~
     slow_T = zero
-    log_X + log_256
-    if pos goto kept
+    log_X + log_256; if pos goto kept
     e over 1                            # the memory was long: half of the error is of the place
     log_e = log_e + log_half
     P = P + ~
@@ -135,26 +119,22 @@ sized:
     of_v = sum + of_e + log_X
     sum + ~ exp
     w = log_X + limit
-    log_X + log_256
-    if pos goto few
+    log_X + log_256; if pos goto few
     w = w + log_9_4
 few:
     v = V s+ ~
     log_X gain 2
     of_v + log_X - log_dt + ~ exp
-    t = log_T + log_T
-    step = D + D
+    t = log_T + log_T; step = D + D
     small of_e = log_e + log_X
     t = t + t - w
     a = a s+ ~ keep log
     log_X + log_64                      # order one, where the acceleration is not seen
     if pos goto curved
     of_v = log_T - of_slope
-    t + ~ + ~
-    if pos goto curved
+    t + ~ + ~; if pos goto curved
     of_v + ~ exp
-    as = zero
-    quality = of_straight
+    as = zero; quality = of_straight
     quick of_e = log_e + log_X
     vs = v s- ~
     velocity = sum
@@ -199,8 +179,7 @@ shown:
     as product acceleration
     t max least min most_quality out quality
     ~ out acceleration
-    after - one
-    if neg goto fewer
+    after - one; if neg goto fewer
 learn:                                  # nothing below is in a hurry
     e - lag keep log
     lost = slips hi+ lost               # counts were lost or added, and now the place is right
@@ -210,10 +189,8 @@ learn:                                  # nothing below is in a hurry
     lag = lag s+ ~
     e over 1
     t = e - before keep
-    log_X + log_256
-    if pos goto short
-    trouble
-    if pos goto short
+    log_X + log_256; if pos goto short
+    trouble; if pos goto short
     t = e + ~ keep
 short:
     small noises min noises_offset by
@@ -227,48 +204,38 @@ short:
     if one goto offsets
 ready:                                  # growth of the memory and noise, for the next event
     D log
-    minus_Ds = zero - D
-    growth = zero
-    after = minus_one
+    minus_Ds = zero - D; growth = zero; after = minus_one
     limit = order + ~ + ~
     lag log
     w = order_lag - log_X - limit
     slack = half
     trouble = ~ + w + ~                 # lag² over 7/2 U
     D over 2
-    log_X + log_256
-    if neg goto long
-    log_X + log_64
-    if neg goto some
+    log_X + log_256; if neg goto long
+    log_X + log_64; if neg goto some
     w = minus_Ds min minus_sixteenth    # −D_a
-    log_X + past_8
-    if neg goto scaled
+    log_X + past_8; if neg goto scaled
     slack = half - minus_Ds - minus_Ds
 scaled:
     doubt = trouble + log_9_4 hi+ log_8
     minus_D3 = w + w + w
     minus_D4 = sum + w
 judged:
-    trouble
-    if neg goto grows
-    sum - log_4
-    if neg goto shrinks
-    sum - log_4
-    if neg goto halves
+    trouble; if neg goto grows
+    sum - log_4; if neg goto shrinks
+    sum - log_4; if neg goto halves
     slow_T = T + T
     growth = zero - count               # that outweighs any logarithm
     growing = log_T - log_half
 end:
     end
 fewer:
-    sum + one
-    if neg goto end
+    sum + one; if neg goto end
     goto ready
 halves:
     slow_T = T + T
 shrinks:
-    growth = zero - count
-    growing = log_T + log_half
+    growth = zero - count; growing = log_T + log_half
     end
 some:
     w = minus_Ds - ~ min minus_sixteenth
@@ -283,8 +250,7 @@ long:
     goto judged
 grows:
     growing = log_T
-    T - slow_T
-    if pos goto end
+    T - slow_T; if pos goto end
     growing = log_T + log_eighth
     end
 single:
@@ -301,8 +267,7 @@ single:
     phase
     goto known
 offsets:
-    log_X + past_4
-    if pos goto ready
+    log_X + past_4; if pos goto ready
     noises max noises_least by
     e keep
     zero s+ e min half over by          # a quarter of what the kind's offset learns
@@ -314,8 +279,7 @@ offsets:
     goto ready
 lone:
     e = c - P keep log
-    edge = raw - moved
-    since = tau
+    edge = raw - moved; since = tau
     memory = T + step min most_memory max clock
     P = P - moved
     goto heard
@@ -334,59 +298,38 @@ calm:
 slip:                                   # counts were lost or added, or the offset was upset
     o@last = o@last min quarter max minus_quarter
     slips = slips hi+ one
-    sum - three
-    if pos goto begin
-    log_dt + log_4 - log_T - one
-    if pos goto begin
+    sum - three; if pos goto begin
+    log_dt + log_4 - log_T - one; if pos goto begin
     p = c - moved
     goto show
 first:
-    p = c - moved
-    edge = raw - moved
-    since = tau
+    p = c - moved; edge = raw - moved; since = tau
     phase = minus_one
     goto nothing
 young:
     log_dt = ~
-    phase + one
-    if neg goto first
+    phase + one; if neg goto first
 begin:
     e = c - p keep log
-    slips = none
-    lost = zero
-    edge = raw - moved
+    slips = none; lost = zero; edge = raw - moved
     of_velocity - log_dt + ~ exp
-    phase = zero
-    since = tau
-    p = c - moved
+    phase = zero; since = tau; p = c - moved
     v = zero s+ ~
-    vs = sum
-    a = zero
-    as = zero
-    mu = zero
-    lag = zero
-    before = zero
-    slow_T = zero
-    T = dt
-    log_T = log_dt
-    log_X = log_quarter
-    after = zero
-    quality = of_curve
+    vs = sum; a = zero; as = zero; mu = zero; lag = zero
+    before = zero; slow_T = zero; T = dt; log_T = log_dt
+    log_X = log_quarter; after = zero; quality = of_curve
     if one goto show
     log_T = log_dt - log_32 exp         # means of many counts are by logarithms: they are forgotten
     T = ~
     goto show
 same:
-    edge = edge - moved
-    p = p - moved
+    edge = edge - moved; p = p - moved
     goto show
 silent:
     since = $length + since min most_since
     quiet = $length + quiet max zero min most
-    sum - max_time out stalled + max_time - forget
-    if pos goto rest
-    phase
-    if neg goto nothing
+    sum - max_time out stalled + max_time - forget; if pos goto rest
+    phase; if neg goto nothing
 show:
     since + lead by
     as product velocity
@@ -406,21 +349,18 @@ beyond:
     if neg goto still
     P = P s- t                          # at the next edge
     w = minus_D3 + minus_Ds + minus_Ds
-    half - slack
-    if pos goto sure
+    half - slack; if pos goto sure
     w = zero - half - quarter max w
 sure:
     t = t + w
     if neg goto still
-    zero - lost
-    if pos goto trusted
+    zero - lost; if pos goto trusted
     t = t - count - count - count - count
     if neg goto still
 trusted:
     quiet + lead log
     w = zero
-    t - half
-    if neg goto whole
+    t - half; if neg goto whole
     w = log_5_8
 whole:
     w = of_speed - ~ - w exp
@@ -430,18 +370,13 @@ whole:
     least = ~
 still:
     P out position_fine
-    quiet - max_time
-    if neg goto shown
+    quiet - max_time; if neg goto shown
     velocity = zero
     goto quiet
 rest:
-    phase = minus_two
-    since = zero
-    p = zero
+    phase = minus_two; since = zero; p = zero
 nothing:
-    quality = none
-    least = zero
-    velocity = zero
+    quality = none; least = zero; velocity = zero
     p out position_fine
 quiet:
     as = zero

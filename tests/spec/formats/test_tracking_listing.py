@@ -107,7 +107,7 @@ def test_a_memory_of_a_clock_does_not_shrink(number: int, multiplier: str) -> No
     ],
 )
 def test_a_jump_adds_the_term_behind_it(lines: str, word: str) -> None:
-    code = assembled(lines.replace(";", "\n")).instructions
+    code = assembled(lines).instructions
     assert next(one.word for one in code if one.jump not in (Jump.NEVER, Jump.END)) == word
 
 
@@ -147,7 +147,7 @@ def test_two_terms_are_added_at_once(line: str, terms: list[tuple[str, str]]) ->
     ],
 )
 def test_what_comes_too_early_waits(listing: str, idle: int) -> None:
-    made = assembled(listing.replace("; ", "\n"), ports=2).instructions
+    made = assembled(listing, ports=2).instructions
     assert made.count(Instruction()) == idle
 
 
