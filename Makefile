@@ -128,9 +128,10 @@ bitstreams: $(VENV)/.boards icarus ## bitstreams of three boards in build, their
 	$(BIN)/python bench/boards.py
 	$(BIN)/pytest -q -n auto tests/boards/fpga/bitstreams.py
 
-docs: demo $(VENV)/.test chromium ## pages of options, ports and registers, in docs/reference, and the pictures of demo and explore
+docs: demo $(VENV)/.test chromium ## pages of options, ports and registers, in docs/reference, and the pictures of the demo and the guides
 	$(BIN)/python bench/reference_pages.py
 	$(BIN)/python bench/explore.py -o docs/guides/explore.png
+	$(BIN)/python bench/pictures.py
 	cp build/demo/methods.png docs/demo.png
 
 api: $(VENV)/.docs ## what every module has, from its docstrings, in build/api

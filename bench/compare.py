@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import situations
-from pages import markdown, write
+from pages import markdown, stamp, write
 
 from tachometry.cli.main import main as tachometry
 
@@ -211,6 +211,8 @@ def main() -> None:
         if getattr(options, name) < 1:
             parser.error(f"--{name} must be at least 1, not {getattr(options, name)}")
     write(PAGE, page(options.seeds, options.jobs))
+    stamp(PAGE)
+    stamp(FIGURE)
     sys.stdout.write(f"written: {PAGE}, {FIGURE}\n")
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from gain_figure import Found, save_usable_gains
 from gate_check import check
-from pages import markdown, write_block
+from pages import markdown, stamp, write_block
 from usable_gain import IDEAL, KINDS, REAL, TASK, TICKS, setting, usable, variants
 
 from tachometry.sim.encoder.motion import parse_motion
@@ -174,6 +174,8 @@ def main() -> None:
         sys.stdout.write(f"{table}\n")
         if given.output is not None:
             write_block(given.output, name, table)
+        if name == "gains" and given.plot is not None:
+            stamp(given.plot)
 
 
 if __name__ == "__main__":

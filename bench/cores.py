@@ -6,7 +6,11 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
+from amaranth.lib import wiring
+
 from tachometry.boards.fpga import ecp5_memory
+from tachometry.hdl import core_of
+from tachometry.hdl.core.bus_tachometer import BusTachometer
 from tachometry.hdl.core.demo import Demo
 from tachometry.hdl.export import export
 from tachometry.hdl.export.verilog import verilog_of
@@ -30,7 +34,7 @@ from tachometry.spec.core.compare import Compare
 from tachometry.spec.core.health import Health
 from tachometry.spec.core.index import Index
 from tachometry.spec.core.stream import Stream
-from tachometry.spec.registers.buses import BUSES, bus_of, ports_on
+from tachometry.spec.registers.buses import BUSES, bus_of, ports_on, registers_on
 from tachometry.spec.registers.demo import DemoMap, demo_manifest, demo_ports
 
 FINE = Compare.parse("compare", "100.5:12.5:0:10us:fine")
@@ -60,13 +64,23 @@ class Configuration:
         return any("Fmax" in bars for bars in self.bars.values())
 
     @property
+    def component(self) -> wiring.Component:
+        """The core, with its registers on its bus if it has one."""
+        bus = bus_of(self.bus)
+        if bus is None:
+            return core_of(self.spec)
+        if self.demo and isinstance(self.spec, TachometerSpec):
+            return Demo(DemoMap(self.spec), bus)
+        return BusTachometer(registers_on(self.spec, bus), bus)
+
+    @property
     def hardware(self) -> tuple[str, tuple[Port, ...]]:
         """Verilog and ports."""
         bus = bus_of(self.bus)
         if self.demo and bus is not None and isinstance(self.spec, TachometerSpec):
             registers = DemoMap(self.spec)
             described = {"generator": "", "license": "", **demo_manifest(registers, bus, CORE)}
-            return verilog_of(Demo(registers, bus), described), demo_ports(registers, bus)
+            return verilog_of(self.component, described), demo_ports(registers, bus)
         return export(self.spec, CORE, self.bus)[f"{CORE}.v"], ports_on(self.spec, bus)
 
 

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from pages import stamp
 from playwright.sync_api import sync_playwright
 
 FLAGS = "--headless --no-sandbox --disable-gpu --no-first-run --disable-background-networking".split()
@@ -28,4 +29,6 @@ def take(path: Path) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-o", "--output", type=Path, required=True, help="the picture, .png")
-    take(parser.parse_args().output)
+    picture = parser.parse_args().output
+    take(picture)
+    stamp(picture)

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 
-from pages import markdown, write_block
+from pages import markdown, stamp, write_block
 
 ROOT = Path(__file__).resolve().parent.parent
 HEADS = ("the paper says", "computed", "agrees")
 
 
 def main(words: Sequence[str] | None = None) -> None:
-    """Read the claims that the command has written, and replace the table of each figure."""
+    """Read the claims that the command has written, and replace the table and the picture of each figure."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("claims", type=Path, help="claims.csv of the command")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "docs" / "measured" / "figures.md", metavar="PAGE")
@@ -22,6 +22,9 @@ def main(words: Sequence[str] | None = None) -> None:
         for figure, claims in groupby(csv.DictReader(file), lambda row: row["figure"]):
             rows = [[claim[name].replace("|", "") for name in ("paper", "found", "agrees")] for claim in claims]
             write_block(given.output, figure, markdown(HEADS, rows, left=range(3)))
+            picture = given.output.parent / "figures" / f"{figure}.png"
+            picture.write_bytes(given.claims.with_name(picture.name).read_bytes())
+            stamp(picture)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from io import StringIO
 from pathlib import Path
 
 import click
+from pages import stamp
 from rich.console import Console
 from rich.terminal_theme import MONOKAI
 
@@ -71,6 +72,7 @@ def main(output: Path) -> None:
     with replacing(output) as beside:
         text = console.export_svg(title="tachometry monitor", theme=MONOKAI, unique_id="monitor")
         beside.write_text(text, encoding="utf-8", newline="\n")
+    stamp(output)
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from cores import CONFIGURATIONS, Configuration
-from pages import markdown, write
+from pages import markdown, stamp, write
 from rich.console import Console
 from rich.progress import track
 
@@ -421,6 +421,7 @@ def run(options: argparse.Namespace) -> int:
     measured = tables(results)
     if options.output:
         write(options.output, page(measured, tools))
+        stamp(options.output, *(found.name for found in chosen))
         if options.output == PAGE:
             counted = {name: results[row, "ECP5"].figures["COMB"] for name, row in METHOD_CELLS.items()}
             CELLS.write_text(json.dumps(counted, indent=2) + "\n", encoding="utf-8")

@@ -288,3 +288,4 @@ def test_the_cells_that_commands_know_are_those_of_the_page() -> None:
     rows = dict(re.findall(r"^\| (\S+) \| [^|]+ \| (\d+) \|", page, re.MULTILINE))
     assert {name: int(rows[row]) for name, row in size.METHOD_CELLS.items()} == CELLS
     assert {name.removesuffix("-block") for name in CELLS} == set(METHODS)
+    assert f" {CELLS['track']} cells of an ECP5" in (size.ROOT / "docs/concepts/track.md").read_text(encoding="utf-8")

@@ -1,0 +1,95 @@
+"""Samples of what pages and pictures show: a second is enough to see that one of them is too old.
+
+`pages.stamp` keeps the hash of a sample in docs/measured/made_of.json; tests/bench/test_made_of.py computes it anew.
+"""
+
+import ast
+import re
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+from amaranth.hdl import Fragment
+from amaranth.hdl._ir import PortDirection, build_netlist
+from amaranth.lib import wiring
+from cores import CONFIGURATIONS as CONFIGURATIONS
+from health import EXAMPLES, told
+from monitor import CORE as MONITORED
+from motions import OTHERS, SITUATIONS
+from pages import ROOT, block
+from situations import RIVALS, errors
+from tracking import found
+
+from tachometry.boards.monitor.columns import columns
+from tachometry.cli.explore import answers
+from tachometry.sim.figures import FIGURES
+from tachometry.spec import METHODS, of_texts
+from tachometry.spec.registers.demo import DemoMap
+
+MEASURED = ROOT / "docs" / "measured"
+SEED = 1  # no page has it
+
+
+def netlist(top: wiring.Component) -> list[str]:
+    """Return the cells of a core and their connections, without names, comments and the order of ports."""
+    directions = {wiring.In: PortDirection.Input, wiring.Out: PortDirection.Output}
+    flat = sorted(top.signature.flatten(top), key=lambda port: port[0])
+    ports = {"__".join(map(str, path)): (value, directions[member.flow]) for path, member, value in flat}
+    cells = build_netlist(Fragment.get(top, None), ports).cells
+    return [re.sub(r"'[^' ]*'", "", repr(cell)) for cell in cells]
+
+
+@cache
+def measured_core(name: str) -> tuple[list[str], str]:
+    """Return the netlist of a row of size.md, and the code that changes it."""
+    (one,) = (one for one in CONFIGURATIONS if one.name == name)
+    return netlist(one.component), ast.unparse(ast.parse(one.after))
+
+
+@cache
+def tracking() -> list[str]:
+    """Return error and coverage of the tracking method in all situations."""
+    pairs = [found(situation, SEED, "20us") for situation in (*SITUATIONS, *OTHERS)]
+    return [f"{error:.7f} {covered:.1f}" for error, covered in pairs]
+
+
+@cache
+def estimates() -> list[object]:
+    """Return the errors of all methods in every eighth situation, and those of tracking in all."""
+    each = [errors(situation, SEED, (*METHODS, *RIVALS)) for situation in (*SITUATIONS, *OTHERS)[::8]]
+    return [tracking(), *({name: f"{error:.6f}" for name, error in one.items()} for one in each)]
+
+
+def explored() -> list[object]:
+    """Return the page of `explore`, and its answers to the first questions."""
+    form = answers.answer("options", {}, answers.FUNCTIONS)
+    asked = [answers.answer(name, {"options": form["start"]}, answers.FUNCTIONS) for name in ("check", "curves")]
+    return [form, asked, [file.read_bytes() for file in sorted(Path(answers.__file__).parent.glob("static/page.*"))]]
+
+
+def watched() -> list[object]:
+    """Return the demo, and the heads of its live view."""
+    return [measured_core("demo"), [one.head for one in columns(DemoMap(of_texts("s", MONITORED)))]]
+
+
+# By file: a sample of a part of it, which is a block, a row, or the whole.
+MADE_OF: dict[str, Callable[[str], object]] = {
+    "docs/guides/explore.png": lambda _: explored(),
+    "docs/guides/monitor.svg": lambda _: watched(),
+    "docs/guides/sweep.png": lambda _: block(MEASURED / "sweep.md", "errors"),
+    "docs/guides/wheel.png": lambda _: estimates(),
+    "docs/guides/wheel_methods.png": lambda _: estimates(),
+    "docs/measured/boards.md": lambda _: [measured_core("demo"), measured_core("track")],
+    "docs/measured/compare.md": lambda _: estimates(),
+    "docs/measured/compare.png": lambda _: estimates(),
+    "docs/measured/control.md": lambda _: tracking(),  # tests/cli/commands/test_loop_docs.py has the loops about S
+    "docs/measured/control.png": lambda _: block(MEASURED / "control.md", "gains"),
+    **{
+        f"docs/measured/figures/{name}.png": lambda _, name=name: block(MEASURED / "figures.md", name)  # type: ignore[misc]
+        for name in FIGURES
+    },
+    "docs/measured/health.md": lambda _: [f"{told(one, SEED):.7f}" for one in EXAMPLES],
+    "docs/measured/size.md": measured_core,
+    "docs/measured/toggles.md": lambda _: [measured_core(name) for name in ("reference", "table")],
+    "docs/measured/track.md": lambda _: tracking(),
+}
