@@ -11,7 +11,7 @@ export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo figures compare icarus ghdl dtc chromium test test-all lowest pytest verify formal formal-quick mutate upset bench studies size bitstreams docs api page site dist lint clean
+.PHONY: help venv demo figures compare icarus ghdl dtc chromium test test-all lowest pytest verify formal formal-quick mutate upset bench studies size bitstreams docs readme api page site dist lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 16
@@ -128,11 +128,13 @@ bitstreams: $(VENV)/.boards icarus ## bitstreams of three boards in build, their
 	$(BIN)/python bench/boards.py
 	$(BIN)/pytest -q -n auto tests/boards/fpga/bitstreams.py
 
-docs: demo $(VENV)/.test chromium ## pages of options, ports and registers, in docs/reference, and the pictures of the demo and the guides
+docs: $(VENV)/.test chromium ## pages of options, ports and registers, in docs/reference, and the pictures of the guides
 	$(BIN)/python bench/reference_pages.py
 	$(BIN)/python bench/explore.py -o docs/guides/explore.png
 	$(BIN)/python bench/pictures.py
-	cp build/demo/methods.png docs/demo.png
+
+readme: $(VENV)/.size ## the numbers and the picture of README.md, from the comparison that it prints; 5 minutes
+	$(BIN)/python bench/readme.py
 
 api: $(VENV)/.docs ## what every module has, from its docstrings, in build/api
 	$(BIN)/pdoc --docformat numpy -o build/api tachometry.api $(addprefix tachometry.,$(LAYERS)) \

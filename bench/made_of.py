@@ -9,6 +9,7 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
+import readme
 from amaranth.hdl import Fragment
 from amaranth.hdl._ir import PortDirection, build_netlist
 from amaranth.lib import wiring
@@ -22,6 +23,7 @@ from tracking import found
 
 from tachometry.boards.monitor.columns import columns
 from tachometry.cli.explore import answers
+from tachometry.hdl import core_of
 from tachometry.sim.figures import FIGURES
 from tachometry.spec import METHODS, of_texts
 from tachometry.spec.registers.demo import DemoMap
@@ -74,6 +76,7 @@ def watched() -> list[object]:
 
 # By file: a sample of a part of it, which is a block, a row, or the whole.
 MADE_OF: dict[str, Callable[[str], object]] = {
+    "README.md": lambda _: [netlist(core_of(core)) for core in readme.cores().values()],
     "docs/guides/explore.png": lambda _: explored(),
     "docs/guides/monitor.svg": lambda _: watched(),
     "docs/guides/sweep.png": lambda _: block(MEASURED / "sweep.md", "errors"),

@@ -13,11 +13,13 @@ import pytest
 from matplotlib.image import imread
 from support.command import run
 from support.nightly import nightly, only
+from support.script import load
 
 from tachometry.spec import METHODS
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text()
+readme = load("readme")
 
 RUN_BY = "make test"  # this is part of it
 # Most of the time; they run for less in the test without a compiler, and in those of their commands.
@@ -66,10 +68,10 @@ def check_picture(shown: Path, made: Path) -> None:
     nearly so with another.
     """
     if f"\nmatplotlib=={version('matplotlib')} " in (ROOT / "constraints.txt").read_text():
-        assert shown.read_bytes() == made.read_bytes(), "run `make docs`"
+        assert shown.read_bytes() == made.read_bytes(), "run `make readme`"
     first, second = (imread(picture) for picture in (shown, made))
     assert first.shape == second.shape
-    assert abs(first - second).mean() < 0.01, "run `make docs`"
+    assert abs(first - second).mean() < 0.01, "run `make readme`"
 
 
 def test_make_demo_is_what_the_test_runs() -> None:
@@ -106,32 +108,28 @@ def test_python_examples(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
     assert 100 <= float(speed[1]) < 105
 
 
-def cells(page: str, heading: str, row: str) -> list[str]:
-    """Return a row of a table of a page of the documentation, under a heading."""
-    _, part = (ROOT / "docs" / page).read_text(encoding="utf-8").split(f"\n## {heading}\n")
-    line = next(line for line in part.split("\n## ")[0].splitlines() if line.startswith(f"| {row} | "))
-    return [cell.strip() for cell in line.strip("|").split("|")]
+def test_errors_and_picture_are_those_of_the_comparison(tmp_path: Path) -> None:
+    """tests/bench/test_made_of.py has the cells."""
+    table = readme.rows(readme.command(str(tmp_path / "drawn.png")))
+    assert {row["name"] for row in table} >= {*METHODS, *readme.HEADLINE}
+    assert readme.filled(TEXT, table) == TEXT, "run `make readme`"
+    check_picture(readme.PICTURE, tmp_path / "drawn.png")
 
 
-def alike(shown: str, measured: str) -> bool:
-    """Tell whether a number is another to two digits, or none where there is none."""
-    return float(f"{float(measured):.2g}") == float(shown) if measured else shown == "-"
+def test_numbers_without_a_place_are_an_error() -> None:
+    table = [{"name": "track", "rms_rad_s": "0.12345", "COMB": "7"}]
+    filled = readme.filled(TEXT, table)
+    assert "RMS error is 0.12 rad/s" in filled
+    assert re.search(r"^\| \[`track`\].* \| 0\.12 rad/s \| 7 \|$", filled, re.MULTILINE)
+    for wrong in (TEXT.replace("RMS error is", "error is"), TEXT.replace("| [`track`]", "| `trace`"), 2 * TEXT):
+        with pytest.raises(ValueError, match=r"place of track once, not [02] times"):
+            readme.filled(wrong, table)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_numbers_of_the_table_of_methods_are_those_of_the_pages(method: str) -> None:
-    line = re.search(rf"^\| \[?`{method}`.*$", TEXT, re.MULTILINE)
-    assert line is not None
-    _, _, error, comb = (cell.strip() for cell in line[0].strip("|").split("|"))
-    assert alike(error.removesuffix(" rad/s"), cells("measured/compare.md", "Ramp, real encoder", method)[3])
-    row = {"s": "reference", "track": "track"}.get(method, f"{method}-max-speed")
-    assert comb == cells("measured/size.md", "ECP5 (LFE5U-25F, CABGA256)", row)[2]
-
-
-def test_the_first_numbers_are_those_of_the_page() -> None:
-    ours, theirs = (float(number) for number in re.findall(r"wrong by ([\d.]+) rad/s", TEXT.replace("\n", " ")))
-    for shown, method in ((ours, "track"), (theirs, "hostmot2")):
-        assert shown == float(f"{float(cells('measured/compare.md', 'Ramp, real encoder', method)[3]):.1g}")
+def test_all_commands_have_one_drive() -> None:
+    drive = readme.command().removeprefix("tachometry compare ").partition(" --methods")[0]
+    assert f"tachometry generate {drive} " in TEXT
+    assert f'drive="{drive}"\n' in (ROOT / "docs" / "demo.sh").read_text()
 
 
 def test_pictures_are_there() -> None:
