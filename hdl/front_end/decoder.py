@@ -1,6 +1,6 @@
 """From levels to counts."""
 
-from amaranth import Cat, Const, Module, Signal, Value, signed
+from amaranth import Cat, Module, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -120,7 +120,7 @@ class SensorDecoder(wiring.Component):
         past = Signal(len(level))
         table = changes(encoder.sensor, encoder.decoding)
         forward, backward, wrong = (
-            _looked_up({pair for pair, (step, error) in table.items() if of(step, error)}, level, past)
+            _looked_up(m, {pair for pair, (step, error) in table.items() if of(step, error)}, level, past)
             for of in (lambda step, _: step > 0, lambda step, _: step < 0, lambda _, error: error)
         )
         if encoder.reverse:
@@ -154,13 +154,20 @@ class SensorDecoder(wiring.Component):
 
 def _among(some: tuple[Levels, ...], level: Value) -> Value:
     """Tell whether the lines have one of these levels."""
-    return Const(sum(1 << packed_levels(levels) for levels in some), 1 << len(level)).bit_select(level, 1)
+    return level.matches(*map(packed_levels, some))
 
 
-def _looked_up(pairs: set[tuple[Levels, Levels]], level: Value, past: Value) -> Value:
+def _looked_up(m: Module, pairs: set[tuple[Levels, Levels]], level: Value, past: Value) -> Value:
     """Tell whether the levels before and these are one of the pairs."""
-    bits = sum(1 << (packed_levels(before) << len(level) | packed_levels(after)) for before, after in pairs)
-    return Const(bits, 1 << 2 * len(level)).bit_select(Cat(level, past), 1)
+    # No shift of a constant: Verilator 5.48 joins two of them, and cuts the longer constant.
+    numbers = sorted(packed_levels(before) << len(level) | packed_levels(after) for before, after in pairs)
+    found = Signal()
+    with m.Switch(Cat(level, past)):
+        with m.Case(*numbers):
+            m.d.comb += found.eq(1)
+        with m.Default():
+            m.d.comb += found.eq(0)
+    return found
 
 
 def decoder_of(encoder: Encoder, wheel: ToothWheel | None = None) -> QuadratureDecoder | SensorDecoder:
