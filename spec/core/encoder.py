@@ -106,7 +106,7 @@ class Encoder:
         "forward), step-dir (each rise of A is a step, forward while B is high), up-down (each rise of A counts up, "
         "of B down), or hall (A, B and C of a motor, 120 electrical degrees apart).",
         choices=tuple(SENSORS),
-        tests=("", "hall", "pulses"),
+        tests=("", "hall", "pulses", "step-dir", "up-down"),
         tacit=True,
     )
     reverse: bool = option(False, "Count backward what would be forward.", tacit=True)

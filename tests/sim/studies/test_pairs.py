@@ -19,10 +19,11 @@ APART = {
     frozenset({("adaptive", "25%"), ("lowpass", "20kHz")}),
     # A period of halls has six counts, and only A and B have a state for the index and edges to miss.
     *(frozenset({("sensor", "hall"), ("decoding", value)}) for value in "12"),
+    *(frozenset({("sensor", sensor), ("decoding", "2")}) for sensor in ("step-dir", "up-down")),
     frozenset({("sensor", "hall"), ("whole-cycles", "yes")}),
     *(
         frozenset({("sensor", sensor), (name, value)})
-        for sensor in ("hall", "pulses")
+        for sensor in ("hall", "pulses", "step-dir", "up-down")
         for name, value in (
             ("health", "yes"),
             ("health", "yes health-edges 5"),
