@@ -132,7 +132,8 @@ class Tachometer(wiring.Component):
                 given = spec.scale.carrying, spec.widths.native
                 self.compare_output = FineCompareOutput(spec.compare, clocks, spec.position_width, *given)
             else:
-                self.compare_output = CompareOutput(spec.compare, clocks, spec.position_width)
+                aims = spec.compare.both and spec.front_end.moves_position
+                self.compare_output = CompareOutput(spec.compare, clocks, spec.position_width, aims=aims)
         self.stream: RecordStream | None = None
         if spec.stream is not None:
             self.stream = RecordStream(parts_of(spec), len(flags_of(spec)) - 1, size_of(spec), spec.stream.packet)
@@ -369,19 +370,19 @@ class Tachometer(wiring.Component):
         if self.compare_output is None:
             return
         m.submodules.compare_output = box = self.compare_output
+        counter, updates = self.position_counter, self.datapath.updates
+        if hasattr(box, "moves"):
+            m.d.comb += box.moves.eq(counter.clear if self._spec.preset is None else counter.clear | counter.load)
         if isinstance(box, FineCompareOutput):
-            counter, updates = self.position_counter, self.datapath.updates
             follow(m, box, updates.p, ("velocity", "position_fine"))
-            jumps = counter.clear if self._spec.preset is None else counter.clear | counter.load
-            m.d.comb += [box.valid.eq(updates.valid), box.tick.eq(self.tick), box.moves.eq(jumps)]
+            m.d.comb += [box.valid.eq(updates.valid), box.tick.eq(self.tick)]
         else:
             (step,) = delay(m, self.decoder.step, clocks=self._spec.latency.tick)
             m.d.comb += [box.step.eq(step), box.position.eq(self.position)]
-        shown = ["compare", "compare_valid", "compare_position", "compare_count"]
+        follow(m, self, box, ("compare", "compare_valid", "compare_position", "compare_count"))
         if "compare_waiting" in box.signature.members:
             follow(m, box, self, LIST_PINS)
-            shown.append("compare_waiting")
-        follow(m, self, box, shown)
+            follow(m, self, box, ("compare_waiting",))
 
     def _stream(self, m: Module) -> None:
         """Send records, if they are asked for."""

@@ -13,6 +13,7 @@ from tachometry.spec.core.compare import BACKWARD, BOTH, COUNT_WIDTH, LIST_PINS,
 
 # A position, whether it is reached, and what follows when it is.
 Awaited = tuple[Value, Value, list[Any]]
+_Taken = Mapping[str, Member] | None
 
 
 class CompareOutput(wiring.Component):
@@ -22,6 +23,9 @@ class CompareOutput(wiring.Component):
     another lasts makes it longer. In both directions a position is the edge between it and the one below, so the place
     is the same: a step to it, or a step from it down. A shaft that swings about the edge makes a pulse each time. The
     positions are computed, or come from a list.
+
+    A position that is set does not make a pulse. In both directions the output then goes on by one position a clock,
+    without a pulse, until the shaft stands between two of them.
 
     Latency: a step that is in `position` in clock c begins a pulse in clock c + 1.
 
@@ -33,12 +37,16 @@ class CompareOutput(wiring.Component):
         Bits of a position.
     taken : mapping of str to Member or None
         What it is given in place of `position` and `step`.
+    aims : bool
+        The position may be set. Only with both directions, and without a list.
 
     Members
     -------
     position : In(signed(width))
     step : In(signed(2))
         The step that is in `position` for the first clock.
+    moves : In(1)
+        The position of the next clock is set. Only with `aims`.
     compare : Out(1)
         The pulse.
     compare_valid : Out(1)
@@ -54,15 +62,16 @@ class CompareOutput(wiring.Component):
         Positions in the list, with the one that is awaited.
     """
 
-    def __init__(self, compare: Compare, clocks: int, width: int, taken: Mapping[str, Member] | None = None) -> None:
+    def __init__(self, compare: Compare, clocks: int, width: int, taken: _Taken = None, *, aims: bool = False) -> None:
         self._compare = compare
         self._clocks = clocks
         position = signed(width)
         pins = dict(zip(LIST_PINS, (In(position), In(1), In(1)), strict=True))
         of_list = {**pins, "compare_waiting": Out(range(compare.depth + 1))} if compare.depth else {}
+        counted = {"position": In(position), "step": In(signed(2)), **({"moves": In(1)} if aims else {})}
         super().__init__(
             {
-                **({"position": In(position), "step": In(signed(2))} if taken is None else taken),
+                **(counted if taken is None else taken),
                 "compare": Out(1),
                 "compare_valid": Out(1),
                 "compare_position": Out(position),
@@ -103,24 +112,39 @@ class CompareOutput(wiring.Component):
         """Tell whether this step leads to a position, in a direction that counts."""
         back, direction = self.step[1], self._compare.direction
         if direction == BOTH:
-            return self.step[0] & ((self.position + back)[: len(awaited)] == awaited.as_unsigned())
+            return self.step[0] & ((self.position + back)[: len(self.position)] == awaited[: len(self.position)])
         return self.step[0] & (back == (direction == BACKWARD)) & (self.position == awaited)
 
     def _computed(self, m: Module) -> Awaited:
         """Return what is awaited of positions that lie equally apart."""
         compare, back = self._compare, self.step[1]
-        awaited = Signal.like(self.position, init=compare.ahead(len(self.position)))
+        aims = hasattr(self, "moves")
+        # Positions that end do not wrap, and the one behind the last needs another bit where all are compared.
+        width = len(self.position) + (aims and compare.count > 0)
+        awaited = Signal(signed(width), init=compare.ahead(width))
         if compare.direction != BOTH:
             there = self._at(awaited) & (self.compare_count != compare.count if compare.count else 1)
             return awaited, there, [awaited.eq(awaited + compare.apart)]
         here = Signal.like(awaited)  # the next one forward, or the one before it backward
         m.d.comb += here.eq(Mux(back, awaited - compare.step, awaited))
-        there, moves = self._at(here), [awaited.eq(awaited + Mux(back, -compare.step, compare.step))]
+        turn = Signal()
+        behind, left = Value.cast(1), Value.cast(1)  # whether there are positions
+        moves = [awaited.eq(awaited + Mux(turn, -compare.step, compare.step))]
         if compare.count:
             number = Signal(range(compare.count + 1), init=compare.passed)  # of those that lie behind
-            there &= Mux(back, number.any(), number != compare.count)
-            moves.append(number.eq(Mux(back, number - 1, number + 1)))
-        return here, there, moves
+            behind, left = number.any(), number != compare.count
+            moves.append(number.eq(Mux(turn, number - 1, number + 1)))
+        m.d.comb += turn.eq(back)
+        if aims:
+            beyond = Signal(signed(width + (compare.count > 0)))
+            aiming = Signal()
+            m.d.comb += beyond.eq(self.position - awaited)
+            above, below = (beyond >= 0) & left, (beyond < -compare.step) & behind
+            m.d.sync += aiming.eq(self.moves | (aiming & (above | below)))
+            with m.If(aiming & (above | below)):
+                m.d.comb += turn.eq(below)  # so does a step that leads to a position now
+                m.d.sync += moves
+        return here, self._at(here) & Mux(back, behind, left), moves
 
     def _listed(self, m: Module, reached: Signal) -> Awaited:
         """Return what is awaited of a list."""

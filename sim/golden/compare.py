@@ -44,7 +44,7 @@ def pulses(spec: TachometerSpec, steps: Steps, trace: PinTrace, updates: Table) 
         return listed(spec, steps, trace)
     if isinstance(spec, TrackTachometer) and compare.fine:
         return {COMPARE: _table([*_carried(spec, compare, steps, updates, trace.n_clocks)])}
-    return {COMPARE: _table([*_computed(compare, _ways(spec, compare, steps), 1 << spec.position_width - 1)])}
+    return {COMPARE: _table([*_computed(spec, compare, steps, trace.n_clocks)])}
 
 
 def listed(spec: TachometerSpec, steps: Steps, trace: PinTrace) -> dict[str, Table]:
@@ -70,6 +70,12 @@ def _ways(spec: TachometerSpec, compare: Compare, steps: Steps) -> dict[str, _Pa
     }
 
 
+def _sets(spec: TachometerSpec, steps: Steps) -> NDArray[np.int64]:
+    """Return the clocks from which on the position is what a preset or an index has set."""
+    resets = steps.index[: len(steps.index) * spec.front_end.index_resets]
+    return np.sort(np.concatenate([steps.presets, resets])) + spec.latency.tick
+
+
 def _carried(
     spec: TrackTachometer, compare: Compare, steps: Steps, updates: Table, n_clocks: int
 ) -> Iterator[tuple[int, int]]:
@@ -79,9 +85,7 @@ def _carried(
     way = spec.scale.carrying
     half = 1 << spec.position_width - 1 + way.fine_bits
     widest = half << way.more_bits
-    resets = steps.index[: len(steps.index) * spec.front_end.index_resets]
-    jumps = np.concatenate([steps.presets, resets]) + spec.latency.tick
-    before = np.searchsorted(np.sort(jumps), updates.clock - spec.latency.datapath, side="right")
+    before = np.searchsorted(_sets(spec, steps), updates.clock - spec.latency.datapath, side="right")
     begins = [*(updates.clock + way.latency).tolist(), n_clocks]
     columns = (updates.velocity, updates.position_fine, np.diff(before, prepend=0))
     rows = zip(begins[:-1], begins[1:], *(column.tolist() for column in columns), strict=True)
@@ -117,22 +121,46 @@ def _table(found: Clocks) -> Table:
     return Table(clock + 1, {"compare_position": reached})
 
 
-def _computed(compare: Compare, ways: dict[str, _Passes], half: int) -> Iterator[tuple[int, int]]:
-    """Yield the clocks in which positions that lie equally apart are passed, and these."""
+def _computed(spec: TachometerSpec, compare: Compare, steps: Steps, end: int) -> Iterator[tuple[int, int]]:
+    """Yield the clocks in which positions that lie equally apart are passed, and these.
+
+    With both directions a position that is set is followed by one position a clock, until the shaft is between two.
+    """
+    ways, half = _ways(spec, compare, steps), 1 << spec.position_width - 1
+    sets = _sets(spec, steps).tolist() if compare.both else []
+    at = np.unique(np.append(sets, steps.clock + spec.latency.tick)) if sets else steps.clock[:0]
+    place = positions_at(spec, steps, at - spec.latency.tick, reset=True)
     number = compare.passed  # of those that lie behind
     clock = -1
-    while True:
-        following = []
+
+    def following() -> tuple[int, int, int]:
+        """Return the next clock with a pulse, its position, and by how much `number` changes."""
+        found = []
         for way, passes in ways.items():
             back = compare.direction == BOTH and way == BACKWARD
             if not compare.count or number != (0 if back else compare.count):
                 place = (compare.start + (number - back) * compare.apart + half) % (2 * half) - half
-                following.append((passes.first(place, clock + 1), place, -1 if back else 1))
-        clock, place, turn = min(following, default=(_NEVER, 0, 0))
-        if clock == _NEVER:
-            return
-        yield clock, place
-        number += turn
+                found.append((passes.first(place, clock + 1), place, -1 if back else 1))
+        return min(found, default=(_NEVER, 0, 0))
+
+    def aside() -> int:
+        """Return the same change if the shaft is not between two positions."""
+        here = int(place[np.searchsorted(at, clock + 1, side="right") - 1])
+        beyond = here - compare.start - number * compare.step
+        if not compare.count:
+            beyond = (beyond + half) % (2 * half) - half
+        above = beyond >= 0 and (number != compare.count or not compare.count)
+        return above - (beyond < -compare.step and (number > 0 or not compare.count))
+
+    for begin in [*sets, _NEVER]:
+        while (found := following())[0] < begin:
+            clock, number = found[0], number + found[2]
+            yield found[:2]
+        clock = max(clock, begin - 1)
+        while clock + 1 < end and (turn := aside()):
+            if (found := following())[0] == clock + 1:
+                yield found[:2]
+            clock, number = clock + 1, number + turn
 
 
 def _listed(depth: int, ways: dict[str, _Passes], trace: PinTrace, half: int) -> tuple[Clocks, Clocks]:

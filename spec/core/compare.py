@@ -86,6 +86,11 @@ class Compare:
         return -self.step if self.direction == BACKWARD else self.step
 
     @property
+    def both(self) -> bool:
+        """Whether positions lie equally apart, and count in both directions."""
+        return self.direction == BOTH and not self.depth
+
+    @property
     def passed(self) -> int:
         """Positions of those in both directions that lie behind position 0, where the shaft stands after a reset."""
         before = -self.start // self.step + 1 if self.direction == BOTH and self.step else 0
@@ -120,10 +125,11 @@ class Compare:
             if (self.start | self.step) % (1 << FINEST_BITS - fine_bits):
                 grid = f"multiples of 2^-{fine_bits} count, see --fine-bits"
                 raise ParameterError("compare", f"must have START and STEP in {grid}")
+        fit = (half - 1 - self.start) // self.step + 1 if self.both and self.step > 0 else 1 << COUNT_WIDTH
         ranges = (
             ("start", self.start, -half, half - 1),
             ("step", self.step, 1, half - 1),
-            ("count", self.count, 0, (1 << COUNT_WIDTH) - 1),
+            ("count", self.count, 0, min(fit, (1 << COUNT_WIDTH) - 1)),
         )
         for name, value, least, most in (
             *(() if self.depth else ranges),

@@ -237,15 +237,23 @@ def compared(settings: Settings, front: Front) -> list[tuple[int, int]]:
     number, position, rises = 0, 0, set(front.index)
     while both and number < int(count) and int(start) + number * int(step) <= 0:
         number += 1  # of those that lie behind
-    for clock in sorted({*front.steps, *rises}):
-        position = wrapped(position + front.steps.get(clock, 0), settings.position_bits)
-        position = 0 if clock in rises and settings.flag("index-reset") else position
+    resets = rises if settings.flag("index-reset") else set[int]()
+    # Both ways, it goes on by a position a clock after a reset, until all below the new position lie behind.
+    places = [int(start) + each * int(step) for each in range(int(count))]
+    aiming = False
+    for clock in sorted({*front.steps, *rises, *(reset + each for reset in resets for each in range(len(places) + 1))}):
+        position = 0 if clock in resets else wrapped(position + front.steps.get(clock, 0), settings.position_bits)
         turn = front.steps.get(clock, 0)
         back = both and turn < 0  # over the edge that the position is forward
-        if not turn or not (both or turn == sign) or (int(count) > 0 and number == (0 if back else int(count))):
-            continue
-        awaited = wrapped(int(start) + sign * (number - back) * int(step), settings.position_bits)
-        if wrapped(position + back, settings.position_bits) == awaited:
-            found.append((clock, awaited))
-            number += turn if both else 1
+        move, aiming = 0, both and (aiming or clock in resets)
+        if turn and (both or turn == sign) and not (int(count) > 0 and number == (0 if back else int(count))):
+            awaited = wrapped(int(start) + sign * (number - back) * int(step), settings.position_bits)
+            if wrapped(position + back, settings.position_bits) == awaited:
+                found.append((clock, awaited))
+                move = turn if both else 1
+        if aiming:
+            behind = sum(place <= position for place in places)
+            move = (behind > number) - (behind < number)
+            aiming = move != 0
+        number += move
     return found

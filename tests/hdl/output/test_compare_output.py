@@ -7,6 +7,10 @@ from support.nightly import nightly, only
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.output import compare_output
+from tachometry.sim.encoder.stress import stress
+from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.studies.lockstep import lockstep
+from tachometry.spec import of_texts
 from tachometry.spec.core.compare import Compare
 
 SEEN = ["compare", "compare_valid", "compare_position", "compare_count"]
@@ -110,9 +114,47 @@ def test_every_clock_is_as_the_rules_say(case: tuple[Compare, int], seed: int) -
     check(case, seed)
 
 
+AIMED = [Compare(-3, 2, 0, "1clk", "both"), Compare(-14, 3, 4, "1clk", "both"), Compare(-1, 14, 2, "1clk", "both")]
+
+
+def check_aimed(compare: Compare) -> None:
+    """Set the position anywhere, wait for all positions to be gone through, and walk: each that is met has a pulse."""
+    rng = np.random.default_rng(5)
+    rows, wanted = list[dict[str, int]](), list[int]()
+    for _ in range(60):
+        place = int(rng.choice([-14, 14, int(rng.integers(-14, 15))]))
+        rows += [{"step": 0, "moves": 1}, *({"step": 0, "moves": 0, "position": place} for _ in range(32))]
+        for step in map(int, rng.choice([1, 1, 1, 0, -1], 40) * (1 if place < 0 else -1)):
+            step *= -14 <= place + step <= 14
+            place += step
+            number, part = divmod(place + (step < 0) - compare.start, compare.step)
+            there = step and not part and (not compare.count or 0 <= number < compare.count)
+            wanted += [place + (step < 0)] if there else []
+            rows.append({"step": step, "position": place})
+    seen = clock_by_clock(compare_output.CompareOutput(compare, 1, WIDTH, aims=True), [*rows, {"step": 0}], SEEN)
+    assert [row["compare_position"] for row in seen if row["compare_valid"]] == wanted
+    assert len({*wanted}) > 1
+
+
+@pytest.mark.parametrize("compare", AIMED, ids=str)
+def test_a_position_that_is_set_moves_what_is_awaited(compare: Compare) -> None:
+    check_aimed(compare)
+
+
+@pytest.mark.parametrize("places", ["-20:7:0:1clk:both", "-90:3:50:2clk:both"])
+def test_presets_and_indices_aim_as_in_the_golden_model(places: str) -> None:
+    texts = {"ppr": "50", "clock": "1MHz", "tick": "6clk", "max-time": "60clk", "position-width": "8"}
+    spec = of_texts("m", texts | {"preset": "100", "index": "yes", "index-reset": "yes", "compare": places})
+    found = lockstep(spec, stress(spec, 0, 60), PySim())
+    assert found.n_mismatches == 0, found.first
+    assert len({*found.actual.tables["compare_valid"].compare_position.tolist()}) > 5
+
+
 def check_all() -> None:
     for case in CASES:
         check(case, 0)
+    for compare in AIMED:
+        check_aimed(compare)
 
 
 @nightly  # it asks what the test above notices
@@ -120,8 +162,12 @@ def check_all() -> None:
     ("right", "wrong"),
     [
         ("self.position + back", "self.position"),
-        ("Mux(back, number.any(), number != compare.count)", "number != compare.count"),
+        ("Mux(back, behind, left)", "left"),
         ("init=compare.passed", "init=0"),
+        ("self.moves | (aiming", "(self.moves & (beyond >= 0)) | (aiming"),
+        ("beyond < -compare.step", "beyond <= -compare.step"),
+        ("beyond >= 0", "beyond > 0"),
+        ("width + (compare.count > 0)", "width"),
         ("ResetInserter(self.compare_clear)(fifo)", "fifo"),
         ("self.compare_count != compare.count", "self.compare_count != compare.count + 1"),
         ("self.compare_position.eq(awaited)", "self.compare_position.eq(self._compare.start)"),

@@ -42,7 +42,7 @@ class Outputs(wiring.Component):
             "open": open_circuit.OpenCircuit(OPEN),
             "watch": encoder_watch.EncoderWatch(second=6, edges=2, errors=1),
             "compare": compare_output.CompareOutput(Compare(1, APART, 2, "2clk"), PULSE, _WIDTH),
-            "both": compare_output.CompareOutput(Compare(1, APART, 2, "2clk", "both"), PULSE, _WIDTH),
+            "both": compare_output.CompareOutput(Compare(1, APART, 2, "2clk", "both"), PULSE, _WIDTH, aims=True),
         }
         super().__init__(
             {

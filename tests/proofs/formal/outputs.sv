@@ -34,7 +34,7 @@ module outputs #(
       .watch_faults(faults),
       .compare_position(value), .compare_step(step), .compare_compare(compare), .compare_compare_valid(compare_valid),
       .compare_compare_position(compare_position), .compare_compare_count(compare_count),
-      .both_position(value), .both_step(step), .both_compare(both), .both_compare_valid(both_valid),
+      .both_position(value), .both_step(step), .both_moves(load), .both_compare(both), .both_compare_valid(both_valid),
       .both_compare_position(both_position)
   );
 
@@ -49,6 +49,7 @@ module outputs #(
   reg [2:0] modulo_ = 0, time_ = 0, since = 7, since_ = 7, health_ = 0;
   reg [7:0] faults_ = 0;
   reg [1:0] number = 0;
+  reg [2:0] stands = 0;  // clocks since the position was set, in which it did not change; 0: it did
   reg [OPEN:0] history = 0;  // of `equal`, as far back as it was not cleared, the latest clock lowest
   wire hit = step == 1 && value == awaited && number != 2;
   wire turns = ready && (edges[0] && level && !level_ || edges[1] && !level && level_);
@@ -72,6 +73,7 @@ module outputs #(
     hit_ <= !rst && hit;
     awaited <= rst ? 1 : hit ? awaited + APART : awaited;
     number <= rst ? 0 : number + hit;
+    stands <= rst ? 0 : load ? 1 : stands == 0 || step != 0 || (stands > 1 && value != value_) ? 0 : stands + (stands < 4);
     history <= rst || !equal || clear ? 0 : {history, 1'b1};
     fresh_open <= fresh_open || rst || !equal || clear;
     fresh_clocks <= {fresh_clocks, 1'b1};
@@ -82,11 +84,8 @@ module outputs #(
   wire signed [3:0] from = loaded ? value_ : position_;
   wire beyond = was_valid && (velocity_ > LIMIT || velocity_ < -LIMIT);
   wire restarts = was_reset || cleared;
-  wire [3:0] core_awaited, core_next;
-  wire [2:0] core_since;
-  wire [1:0] core_number;
-  wire core_armed;
-  wire [3:0] core_awaited, core_next;
+  wire [3:0] core_awaited;
+  wire [4:0] core_next;
   wire [2:0] core_since;
   wire [1:0] core_number;
   wire core_armed;
@@ -112,6 +111,7 @@ module outputs #(
     if (!UPSET) begin
       po_range: assert (modulo < MODULUS && (health[2] ? health == 4 : health != 3));
       po_due: assert (compare_valid == hit_ && compare_count == number);
+      po_aimed: assert (stands < 4 || core_number == (value_ >= 1) + (value_ >= 1 + APART));
       po_grid: assert (!both_valid || both_position == 1 || both_position == 1 + APART);
       // Lemmas: what the induction needs to know of the state.
       lemma_awaited: assert (core_awaited == awaited);
