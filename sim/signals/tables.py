@@ -103,7 +103,7 @@ def _of_updates(spec: TachometerSpec, run: Run, tick_to_velocity: int) -> dict[s
     columns = {
         "clock": updates.clock,
         "tick": tick,
-        "interval": updates.interval,
+        "interval": updates.interval.astype(np.int64),  # numbers, also of one bit
         "forced": updates.forced.astype(np.int64),
         "velocity_raw": updates.velocity,
         f"velocity_{unit.suffix}": unit.of(updates.velocity * spec.scale.rad_per_s_per_lsb),
@@ -135,7 +135,9 @@ def write_events(path: Path, run: Run) -> None:
     columns = [name for table in tables.values() for name in table.columns]
     rows: list[tuple[Any, ...]] = []
     for event, table in tables.items():
-        cells = [table[name].tolist() if name in table.columns else [None] * len(table) for name in columns]
+        cells = [
+            table[name].astype(np.int64).tolist() if name in table.columns else [None] * len(table) for name in columns
+        ]
         rows += [(clock, event, *values) for clock, *values in zip(table.clock.tolist(), *cells, strict=True)]
     rows.sort(key=itemgetter(0))
     write_csv(path, ("clock", "event", *columns), rows)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tachometry.sim.signals.run import Run, Table
-from tachometry.sim.signals.tables import held_velocity, velocity_error, write_counts, write_trace
+from tachometry.sim.signals.tables import held_velocity, velocity_error, write_counts, write_events, write_trace
 from tachometry.spec import Encoder, STachometer, Timing
 
 SPEC = STachometer(encoder=Encoder(100), timing=Timing(20_000, 20, 10))
@@ -60,3 +60,15 @@ def test_csv(tmp_path: Path) -> None:
     lines = (tmp_path / "m.csv").read_text().splitlines()
     assert [line.split(",")[6:] for line in lines] == [list(more), ["-7", "0"], ["8", "1"]]
     assert (tmp_path / "c.csv").read_bytes() == b"tick,pulse_count,position\n0,0,0\n1,1,1\n2,1,2\n3,-2,0\n4,-2,-2\n"
+
+
+def test_numbers_of_one_bit_are_numbers(tmp_path: Path) -> None:
+    one = np.array([True, False])
+    write_trace(tmp_path / "t.csv", SPEC, run_of(UPDATES.having(interval=one)))
+    assert [line.split(",")[2] for line in (tmp_path / "t.csv").read_text().splitlines()] == ["interval", "1", "0"]
+    write_events(tmp_path / "e.csv", Run(9, {"probe_valid_0": Table(np.array([3, 5]), {"probe_time_0": one})}))
+    assert (tmp_path / "e.csv").read_text().split() == [
+        "clock,event,probe_time_0",
+        "3,probe_valid_0,1",
+        "5,probe_valid_0,0",
+    ]
