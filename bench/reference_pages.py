@@ -80,8 +80,9 @@ With `--irq` a core on a bus has the output `irq`, active high, and these regist
 
 - An event waits in INTERRUPTS until 1 is written to its bit of INTERRUPT_CLEAR. One that comes in the clock of the
   write waits on, so none is lost.
-- `irq` is high while an event waits whose bit of INTERRUPT_ENABLE is set; after a reset none is. Events wait also while
-  they are not enabled: clear them first.
+- `irq` is high while an event waits whose bit of INTERRUPT_ENABLE is set; after a reset none is. It follows the bit a
+  clock later, up and down: a handler that has cleared the last event may see `irq` for one more clock. Events wait also
+  while they are not enabled: clear them first.
 - `overflow` is a speed beyond `--max-speed`. Of many axes, an event is that of any of them, and STATUS says which.
 
 In C `NAME_enable_interrupts` and `NAME_take_interrupts` of the driver do this.

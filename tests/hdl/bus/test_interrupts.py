@@ -139,6 +139,16 @@ def test_exported_verilog_in_icarus(core: str, tmp_path: Path) -> None:
     compare(core, [(data, error, irq) for data, error, irq in found])
 
 
+def test_irq_is_a_clock_behind_its_bit() -> None:
+    bus = bus_of("native", irq=True)
+    assert bus is not None
+    box = interrupts.Interrupts(registers_on(CORES["s"], bus))
+    rows = [{"irq_enable_fault": 1, "fault": 0}, {"fault": 1}, {"fault": 0}, {}, {"irq_clear_fault": 1}, {}, {}]
+    seen = clock_by_clock(box, rows, ["irq_pending_fault", "irq"])
+    assert [row["irq_pending_fault"] for row in seen] == [0, 0, 1, 1, 1, 0, 0]
+    assert [row["irq"] for row in seen] == [0, 0, 0, 1, 1, 1, 0]
+
+
 # What breaks it on purpose.
 WRONG = {
     "clear wins": ("comes | (pending & ~clear)", "(comes | pending) & ~clear"),

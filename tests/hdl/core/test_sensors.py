@@ -4,6 +4,7 @@ import subprocess
 from pathlib import Path
 from unittest.mock import patch
 
+import numpy as np
 import pytest
 from support.nightly import only
 from support.options import had_by
@@ -49,6 +50,17 @@ def test_every_step_in_verilator(sensor: str, tmp_path: Path) -> None:
     found = lockstep(spec, stress(spec, 1, 26), LintingVerilator(tmp_path, few=True))
     assert found.n_mismatches == 0, found.first
     assert {-1, 1} <= {*found.actual.ticks.pulse_count.tolist()} or sensor == "pulses"
+
+
+@pytest.mark.parametrize("level", [0, 1])
+def test_halls_that_are_equal_at_reset_are_one_error(level: int) -> None:
+    clock, lines = np.array([0, 200, 240]), np.array([[level] * 3, [1, 0, 1], [1, 0, 0]], dtype=np.uint8).T
+    trace = PinTrace(clock, lines[0], lines[1], 400, c=lines[2])
+    found = lockstep(of_texts("m", BASE | {"sensor": "hall"}), trace, PySim())
+    assert found.n_mismatches == 0
+    assert len(found.actual.errors) == 1
+    assert found.actual.errors[0] < 5
+    assert found.actual.ticks.position[-1] == 1
 
 
 @pytest.mark.parametrize("sensor", ["hall", "up-down"])

@@ -12,13 +12,21 @@ from amaranth.back.verilog import YosysError
 from tachometry.hdl.export import export
 from tachometry.hdl.export.files import CORE_FILES
 from tachometry.hdl.export.verilog import bundled_yosys
-from tachometry.spec import Encoder, Speed, STachometer, Timing
+from tachometry.spec import Encoder, Speed, STachometer, TachometerSpec, Timing, TrackTachometer
 
 VERSION = importlib.metadata.version("tachometry")
 
 
 def make_spec(tick: str = "20us", **options: object) -> STachometer:
     return STachometer(encoder=Encoder(500), timing=Timing.parse("48MHz", tick, "10ms"), **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("spec", "memories"), [(make_spec("20clk"), 1), (TrackTachometer(encoder=Encoder(500)), 3)])
+def test_memories_are_filled_by_initial(spec: TachometerSpec, memories: int) -> None:
+    text = export(spec)["tachometer.v"]
+    names = re.findall(r"^  reg \[\d+:0\] (\S+) +\[\d+:0\];\n  initial begin\n    (\S+) ?\[0\] = ", text, re.MULTILINE)
+    assert len(names) == len(re.findall(r"^  reg \[\d+:0\] \S+ +\[\d+:0\];", text, re.MULTILINE)) == memories
+    assert all(name == filled for name, filled in names)
 
 
 @pytest.mark.parametrize("spec", [make_spec(), make_spec("5us", max_speed=Speed.parse("400rad/s"), cancel=False)])

@@ -49,6 +49,16 @@ def test_an_index_that_is_high_from_the_start_has_not_risen() -> None:
     check(reset=True, z=np.array([1, 1, 0, 0, 0, 0, 0, 1, 1, 1], dtype=np.uint8))
 
 
+@pytest.mark.parametrize(("place", "first"), [("edge", []), ("A=0,B=0", [4]), ("A=1,B=1", [2])])
+def test_what_is_high_at_reset_is_an_index_when_it_comes_again(place: str, first: list[int]) -> None:
+    """Z stays high, and the shaft begins at A=0,B=0: in that state it has been from the start."""
+    trace = PinTrace(CLOCK, A, B, 140, np.ones(10, dtype=np.uint8))
+    spec = STachometer(encoder=Encoder(25), timing=Timing(1_000_000, 4, 4), index=Index(False, place))
+    run = PySim().run(spec, trace)
+    assert compare(golden.run(spec, trace), run) == (0, [])
+    assert run.index.index_position[:1].tolist() == first
+
+
 def test_a_glitch_on_the_index_is_swallowed_and_counted() -> None:
     clock = np.sort(np.append(CLOCK, [33, 35]))
     row = np.searchsorted(CLOCK, clock, side="right") - 1
