@@ -25,7 +25,7 @@ from tachometry.sim.signals.progress import Bar
 from tachometry.sim.signals.run import Mismatch, Run
 from tachometry.sim.signals.scratch import held_back
 from tachometry.sim.studies.lockstep import lockstep
-from tachometry.sim.studies.pairs import AXES, configurations, core_of
+from tachometry.sim.studies.pairs import AXES, WHEELS, configurations, core_of
 from tachometry.spec import CoreSpec
 
 Core = TypeVar("Core")
@@ -100,7 +100,9 @@ def verification(
     cores = [
         Configuration(f"{method}{number}", method, words)
         for method in methods
-        for number, words in enumerate([*configurations(method), *(axes for axes in AXES if axes[1] == method)], 1)
+        for number, words in enumerate(
+            [*configurations(method), *(one for one in (*AXES, *WHEELS) if one[1] == method)], 1
+        )
     ]
     check = partial(_check, engines=engines, n_clocks=-(-n_clocks // len(cores)), seed=seed)
     found = Verification([], len(cores))

@@ -146,6 +146,7 @@ def test_plan_tells_of_machines_and_of_a_velocity_that_is_narrow(capsys: pytest.
 def test_verify(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "configurations", lambda method: [])
     monkeypatch.setattr(study, "AXES", AXES[2:3])
+    monkeypatch.setattr(study, "WHEELS", ())
     assert run("verify", "--methods", "s", "--engines", "pysim", "--jobs", "1", "-o", tmp_path / "out") == 0
     assert rows(capsys)[1].split()[:3] == ["s", "pysim", "1"]
 

@@ -37,6 +37,7 @@ def few(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
 
     monkeypatch.setattr(study, "configurations", short)
     monkeypatch.setattr(study, "AXES", ())
+    monkeypatch.setattr(study, "WHEELS", ())
     return number
 
 
