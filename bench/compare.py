@@ -144,12 +144,15 @@ Their options follow the name and a colon, as in `--methods hostmot2:period=500u
 acceleration in rad/s² (order 2) or of its derivative in rad/s³ (order 3); a noise bound is in counts. `least-squares`
 is not faster than 2 counts in the time since the latest edge, which its papers do not have.
 """
-SINGLE = """## Single situations
+SINGLE = f"""## Single situations
 
 Each table from here on is the output of the command above it. The float models of other projects have the settings that
 these come with: they read the encoder every 1 ms, ODrive every 125 µs, moteus every 33 µs; those of the literature read
-it every 100 µs. Errors are those of the held velocity against the shaft's speed. The delay is the shift of the true
-speed that comes closest. It is left out where it says nothing: where the true speed is constant, and where noise or an
+it every 100 µs.
+
+{textwrap.fill(" ".join(situations.READ.split()), 120)}
+
+The delay is the shift of the true speed that comes closest. It is left out at constant speed, and where noise or an
 offset looks like a delay.
 """
 

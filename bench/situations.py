@@ -8,15 +8,15 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from motions import OTHERS, SITUATIONS, Situation
 from pages import markdown
 
 from tachometry.cli.options.methods import listed_methods
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.sim.studies.comparing.baselines import Steps
-from tachometry.sim.studies.comparing.compare import Curve, common_instants, core_curve
+from tachometry.sim.studies.comparing.compare import Curve, Judge, core_curve
+from tachometry.sim.studies.comparing.comparison import steps_beside
 from tachometry.sim.studies.comparing.rivals import BASELINES, settings, steps_curve
 from tachometry.sim.studies.comparing.tune import TUNED, core_settings, error_of
 from tachometry.spec import TachometerSpec, of_texts
@@ -27,8 +27,7 @@ RIVALS = (*TUNED, *BASELINES)
 CORE = {"clock": "48MHz", "tick": "20us", "max-time": "10ms", "max-speed": "400rad/s"}
 OF_METHOD = {"track": {"max-time": "100ms"}}  # so that a slow reversal is no rest, which it would forget all at
 
-_TICK_S = 1e-4
-_DECODING = 4
+_EVERY = 5  # ticks between the reads of float models, which take most of the time
 
 _SMALL = 0.01  # rad/s
 _ABOUT = """RMS errors in rad/s. The first columns are cores with one setting for all rows. Each of the others is
@@ -42,6 +41,10 @@ of 5 %, a nonuniformity of 0.1 and a phase error of 10°. A *bad* one has twice 
 _ABOUT_SINGLE = """A drive has one setting for all that it does. These are the situations of the first table, each rival
 with the setting that has the least geometric mean of the errors of all rows. For this mean, an error below {small:g}
 rad/s counts as {small:g} rad/s."""
+
+READ = """A value is read once a tick, at the clock in which the velocity of that tick is valid (`tick_to_velocity`
+clocks after the tick); float models are read with the first core, and `--read-delay TIME` moves all reads. The error is
+this value minus the speed of the shaft at that instant."""
 
 FIRST_SEED = 1001
 _WON = 0.99  # of another error, and it is less; what is nearer is a matter of seeds
@@ -88,9 +91,9 @@ def core(situation: Situation, method: str, given: Mapping[str, str]) -> Tachome
 def errors(situation: Situation, seed: int, names: Iterable[str]) -> Errors:
     """Return RMS errors (rad/s) of methods with one seed; those that are impossible are left out."""
     truth = situation.record(seed)
-    steps = Steps.of_recording(truth.recording, situation.counts_per_rev, _DECODING)
-    instants = common_instants([], truth.recording.duration, _TICK_S, situation.start_s)
-    speed = truth.true_speed(instants)
+    steps = steps_beside(core(situation, OURS[0], {}), truth.recording)
+    steps = replace(steps, reads=steps.reads[::_EVERY])
+    judge = Judge(truth.true_speed, situation.start_s, truth.recording.duration)
 
     def curve(name: str) -> Curve:
         ((_, method, given),) = listed_methods(name, BASELINES)
@@ -102,7 +105,7 @@ def errors(situation: Situation, seed: int, names: Iterable[str]) -> Errors:
     found = {}
     for name in names:
         with suppress(ValueError):  # such as a loop that is not stable
-            error = error_of(curve(name), instants, speed)
+            error = error_of(curve(name), judge)
             if error is not None:
                 found[name] = error
     return found
@@ -258,6 +261,7 @@ def part(n_seeds: int, jobs: int) -> tuple[str, str]:
 {_filled(_ABOUT)}
 
 - {_filled(seeds, "  ")}
+- {_filled(READ, "  ")} Float models are read at every fifth tick of `track`.
 {of_cores()}
 - {_filled(_ENCODERS, "  ")}
 

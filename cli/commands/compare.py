@@ -12,7 +12,7 @@ from tachometry.cli.files import Outputs
 from tachometry.cli.options.capture import CAPTURE_OPTIONS
 from tachometry.cli.options.core import COMMON_CORE_OPTIONS, Make
 from tachometry.cli.options.methods import named_methods
-from tachometry.cli.options.motion import FORMS, OPTIONAL_MOTION_OPTIONS
+from tachometry.cli.options.motion import FORMS, OPTIONAL_MOTION_OPTIONS, delay, read_delay
 from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
 from tachometry.cli.reports.compare import comparison_table, cost_table, print_comparison, shown_time
 from tachometry.cli.reports.terminal import progress_bar
@@ -85,6 +85,7 @@ Examples:
     help="Leave out errors after this time, in s, ms, us or ns. With --from, --plot shows a part of a long capture. "
     "[default: the end]",
 )
+@read_delay("Methods")
 @option(
     "Methods",
     "--size",
@@ -113,6 +114,7 @@ def compare(
     read: Callable[[Path, TachometerSpec], Recording],
     start: str | None,
     until: str | None,
+    read_delay: str,
     tune: bool,
     size: bool,
     plot: Path | None,
@@ -122,10 +124,11 @@ def compare(
     """Compare methods on the same edges, of a virtual encoder or a capture.
 
     Cores are run by their golden models, which the hardware equals bit for bit; the others are float models, those of
-    other projects with the settings that these come with unless options or --tune say otherwise. Errors are those of
-    the held velocity against the shaft's, from when every method has given its first value; the delay is the shift of
-    the true speed that comes closest. It is left out where it says nothing: at constant speed, and where noise hides
-    it. A capture does not tell the true speed, so there are no errors.
+    other projects with the settings that these come with unless options or --tune say otherwise. A velocity is read
+    once a tick, at the clock in which the velocity of that tick is valid, or --read-delay later; float models are read
+    with the first core. Its error is the difference from the shaft's speed at that instant, from when every method has
+    a value; the delay is the shift of the true speed that comes closest. It is left out at constant speed, and where
+    noise hides it. A capture does not contain the true speed, so there are no errors.
     """
     inputs = tables if capture is None else [capture]
     outputs = Outputs({"--plot": plot, "--csv": csv, "--tradeoff": tradeoff}, inputs=inputs)
@@ -135,9 +138,7 @@ def compare(
         if name in spec.options:
             raise ValueError(f"--{name} must be left out, or given together with --size: it changes no velocity")
     source = _source(record, capture, read, spec)
-    earliest = None if start is None else float(parse_time("start", start))
-    if earliest is not None and earliest < 0:
-        raise ValueError(f"--from must be at least 0, not {start}")
+    earliest = None if start is None else delay("start", start)
     latest = math.inf if until is None else float(parse_time("until", until))
     if latest <= (earliest or 0.0):
         raise ValueError(f"--until must be later than --from, {shown_time(earliest or 0.0)}, not {until}")
@@ -155,6 +156,7 @@ def compare(
             tune=tune,
             tradeoff=tradeoff is not None,
             bar=progress_bar,
+            read_delay=delay("read_delay", read_delay),
         )
         sizes = _sizes(result, tools) if size else {}
         _write(result, sizes, outputs)

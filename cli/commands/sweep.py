@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from tachometry.cli.files import Outputs
-from tachometry.cli.options.motion import FORMS
+from tachometry.cli.options.motion import FORMS, delay, read_delay
 from tachometry.cli.options.option import FilePath, option, output
 from tachometry.cli.options.points import points_of
 from tachometry.cli.options.settings import Settings
@@ -19,7 +19,6 @@ from tachometry.sim.engines.pick import pick
 from tachometry.sim.studies.sweeping.grid import Points
 from tachometry.sim.studies.sweeping.run import SweepResult, run_sweep
 from tachometry.spec import AUTO
-from tachometry.spec.language.units import parse_time
 
 # What a heat map can show: the column, what it is, and whether colours go by its logarithm. Columns of speeds are in
 # rad/s, and are shown in the unit of the cores.
@@ -71,6 +70,7 @@ Examples:
     "start",
     help="Leave out errors before this time, in s, ms, us or ns. [default: until there is a value]",
 )
+@read_delay("Sweep")
 @option(
     "Sweep",
     "--engine",
@@ -101,6 +101,7 @@ def sweep(
     file: Path | None,
     methods: str,
     start: str | None,
+    read_delay: str,
     engine: str | None,
     jobs: int | None,
     scheduler: str | None,
@@ -122,13 +123,11 @@ def sweep(
     Ctrl-C ends the sweep; what is done is in --results, and the same command goes on from there. Exit status 1 if
     hardware and golden model differ. Needs the extra `sweep`.
     """
-    earliest = 0.0 if start is None else float(parse_time("start", start))
-    if earliest < 0:
-        raise ValueError(f"--from must be at least 0, not {start}")
+    earliest, late = delay("start", start or "0s"), delay("read_delay", read_delay)
     if axes is not None and plot is None:
         raise ValueError("--axes must be given together with --plot")
     check_machines(jobs, scheduler)
-    grid = points_of(settings, methods, earliest, pick(engine).name if engine == "auto" else engine)
+    grid = points_of(settings, methods, earliest, pick(engine).name if engine == "auto" else engine, late)
     across = {} if plot is None else _axes(axes, grid)
     inputs = [*([] if file is None else [file]), *settings.tables]
     Outputs({"--results": results, "--plot": plot}, inputs=inputs)

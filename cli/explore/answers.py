@@ -268,7 +268,7 @@ def _response(core: TachometerSpec, methods: Methods, source: Source) -> Answer:
     )
     unit = typed_unit(core)
     heads, rows = shown_scores(found, unit)
-    at = found.instants[:: -(-len(found.instants) // _POINTS_OF_TIME)]
+    at = found.instants[0][:: -(-len(found.instants[0]) // _POINTS_OF_TIME)]
     each = zip(found.curves, rows, strict=True)
     return {
         "unit": unit.name,

@@ -11,6 +11,7 @@ from tachometry.cli.options.option import Group, declared, option, refuse_withou
 from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.spec import TachometerSpec
 from tachometry.spec.language.option import ParameterError, options_of
+from tachometry.spec.language.units import parse_time
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
@@ -46,6 +47,18 @@ def _motion(required: bool) -> Callable[[Any], Any]:
 _OPTIONS = [declared(about.group, about) for about in options_of(EncoderOptions)]
 # What may be wrong where a loop is closed about the encoder.
 _OF_LOOPS = ("jitter", "nonuniformity", "eccentricity", "phase-error", "duty-error", "seed")
+
+
+def read_delay(group: str) -> Callable[[Any], Any]:
+    """Return the option that moves the instants at which velocities are read."""
+    return option(group, "--read-delay TIME", default="0s", help="Read each velocity TIME after it is valid.")
+
+
+def delay(name: str, text: str) -> float:
+    """Return a time in seconds; ValueError if it is less than 0."""
+    if (seconds := float(parse_time(name, text))) < 0:
+        raise ParameterError(name, f"must be at least 0, not {text}")
+    return seconds
 
 
 def tables_of(motion: str) -> list[Path]:

@@ -30,11 +30,11 @@ _PLACE = re.compile(r"\{([^{}]*)\}")
 _UNITS = SPEED | TIME | FREQUENCY
 
 
-def points_of(settings: Settings, methods: str, earliest: float, engine: str | None) -> Points:
+def points_of(settings: Settings, methods: str, earliest: float, engine: str | None, read_delay: float = 0.0) -> Points:
     """Return all points of a sweep; ValueError if an axis is not known, or a point cannot be.
 
     An option that not all methods have is for those that have it; `tick` is not for a method that has its `dt`. If
-    `methods` is `all`, those that cannot be are left out. `earliest` is in seconds.
+    `methods` is `all`, those that cannot be are left out. `earliest` and `read_delay` are in seconds.
     """
     listed, everything = _listed(methods)
     _check_axes(settings, {method for _, method, _ in listed if method is not None})
@@ -42,7 +42,7 @@ def points_of(settings: Settings, methods: str, earliest: float, engine: str | N
     count = sum(math.prod(len(settings.vary[name]) for name in names) for names in own)
     if count > _MOST:
         raise ValueError(f"--vary must give at most {_MOST} points, not {count}")
-    maker = _Maker(earliest, engine)
+    maker = _Maker((earliest, engine, read_delay))
     grid = Points({}, {}, settings.axes)
     _fill(grid, settings, listed, maker.point, everything=everything)
     return grid
@@ -101,8 +101,8 @@ def _check_axes(settings: Settings, methods: set[str]) -> None:
 class _Maker:
     """Makes points; what many of them share is made once."""
 
-    def __init__(self, earliest: float, engine: str | None) -> None:
-        self._earliest, self._engine = earliest, engine
+    def __init__(self, run: tuple[float, str | None, float]) -> None:
+        self._run = run
         self._spec, self._encoder, self._motion = cache(_spec), cache(_parsed_encoder), cache(parse_motion)
 
     def point(self, name: str, method: str, given: Mapping[str, str], texts: Mapping[str, Text]) -> Point:
@@ -114,7 +114,7 @@ class _Maker:
         values = {key: read_nearest(f"{{{key}}}", text, _UNITS, "rad/s") for key, text in places.items()}
         motion = _PLACE.sub(lambda place: places[place[1]], motion)
         moved = self._motion(motion)
-        return Point(shown_name(name, spec), spec, encoder(spec), moved, motion, values, self._earliest, self._engine)
+        return Point(shown_name(name, spec), spec, encoder(spec), moved, motion, values, *self._run)
 
 
 def _words(texts: Mapping[str, Text], command: click.Command) -> Words:

@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from tachometry.sim.encoder.motion import FloatArray
 from tachometry.sim.plots.style import COLOURS, columns, in_words, place_panels, save_figure
-from tachometry.sim.studies.comparing.compare import Curve, Score, TrueSpeed
+from tachometry.sim.studies.comparing.compare import Curve, Instants, Score, TrueSpeed
 from tachometry.spec import TachometerSpec
 
 
@@ -16,29 +15,28 @@ def save_comparison(
     spec: TachometerSpec,
     curves: list[Curve],
     scores: list[Score],
-    instants: FloatArray,
+    instants: Instants,
     true_speed: TrueSpeed | None,
 ) -> None:
-    """Draw a comparison into a file whose kind its suffix tells: `.png` or `.pdf`; equal ones give equal files."""
+    """Draw a comparison into a `.png` or `.pdf`, each curve at its own instants (s); equal ones give equal files."""
     save_figure(path, lambda: _draw(spec, curves, scores, instants, true_speed))
 
 
 def _draw(
-    spec: TachometerSpec, curves: list[Curve], scores: list[Score], instants: FloatArray, true_speed: TrueSpeed | None
+    spec: TachometerSpec, curves: list[Curve], scores: list[Score], instants: Instants, true_speed: TrueSpeed | None
 ) -> Figure:
     heights = {"velocity": 2.6} | ({curve.name: 0.55 for curve in curves} if true_speed else {})
     figure, panels = place_panels(spec, heights, "Comparison")
     unit = spec.scale.shown_unit
-    truth = unit.of(true_speed(instants)) if true_speed else None
-    values = [unit.of(curve.estimate.at(instants)) for curve in curves]
+    values = [unit.of(curve.estimate.at(at)) for curve, at in zip(curves, instants, strict=True)]
     # What goes up and down most is drawn behind, as it would bury the others.
     calmest = sorted(range(len(curves)), key=lambda place: float(np.sum(np.abs(np.diff(values[place])))))
     least = min((result.rms for result in scores if result.rms is not None), default=None)
     for place, (curve, result, colour) in enumerate(zip(curves, scores, COLOURS * len(curves), strict=False)):
-        held = values[place]
-        kept = columns(instants, held)
+        at, held = instants[place], values[place]
+        kept = columns(at, held)
         panels["velocity"].plot(
-            instants[kept],
+            at[kept],
             held[kept],
             color=colour,
             linewidth=0.7,
@@ -46,23 +44,25 @@ def _draw(
             label=_words(curve).partition(":")[0],
             zorder=2 - calmest.index(place) / 100,
         )
-        if truth is None:
+        if true_speed is None:
             continue
-        axes, error = panels[curve.name], held - truth
-        kept = columns(instants, error)
+        axes, error = panels[curve.name], held - unit.of(true_speed(at))
+        kept = columns(at, error)
         axes.axhline(0, color="0.6", linewidth=0.7)
-        axes.plot(instants[kept], error[kept], color=colour, linewidth=0.6)
+        axes.plot(at[kept], error[kept], color=colour, linewidth=0.6)
         axes.text(0.005, 0.84, _words(curve), transform=axes.transAxes, fontsize=8, color=colour, weight="bold")
         words = f"RMS {unit.of(result.rms):.3g} {unit.name}"
         if result.rms == least:
             axes.set_facecolor("#fff4c2")
             words = f"least error: {words}"
         axes.text(0.995, 0.84, words, transform=axes.transAxes, ha="right", fontsize=8, weight="bold")
-    if truth is not None:
-        kept = columns(instants, truth)
+    first = instants[0]
+    if true_speed is not None:
+        truth = unit.of(true_speed(first))
+        kept = columns(first, truth)
         # A broad band, from which a curve that is wrong stands out.
         panels["velocity"].plot(
-            instants[kept],
+            first[kept],
             truth[kept],
             color="0.82",
             linewidth=5,
@@ -82,7 +82,7 @@ def _draw(
     last = list(panels.values())[-1]
     below = f"; below the velocities the errors in {unit.name}, at one scale" if true_speed else ""
     last.set_xlabel(f"time (s){below}")
-    last.set_xlim(instants[0], instants[-1])
+    last.set_xlim(first[0], first[-1])
     return figure
 
 

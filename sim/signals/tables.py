@@ -24,7 +24,8 @@ class HeldVelocity:
     Parameters
     ----------
     time : float64 array, shape (n,), seconds
-        Of each tick the clock in which an update that it causes is there.
+        Of each tick the clock in which an update that it causes is valid. A core that ends its ticks itself is read
+        after each nominal tick.
     velocity_rad_s : float64 array, shape (n,), rad/s
     """
 
@@ -49,7 +50,9 @@ class VelocityError:
 
 def held_velocity(spec: TachometerSpec, run: Run) -> HeldVelocity:
     """Return velocity at the end of every tick; empty if there was no update."""
-    clock = run.ticks.clock + spec.latency.tick_to_velocity
+    cycles, late = spec.timing.tick_cycles, spec.latency.tick_to_velocity
+    own = np.arange(cycles - 1, run.n_clocks, cycles) + spec.latency.tick
+    clock = (own if spec.facts.own_ticks else run.ticks.clock) + late
     return held_from(clock[clock < run.n_clocks], run.updates, spec)
 
 

@@ -1,13 +1,14 @@
 """Four methods in use are modelled in floats, from their published descriptions.
 
-Each reads the encoder once per control period, at period, 2 periods, ..., and gives a speed that holds until the next
-reading. Finite differences and the low-pass filter are as in SimpleFOC's documentation of its velocity filter, the
-timestamp method is that of LinuxCNC's hostmot2 driver (its manual page and driver), the mixed method that of
-SimpleFOC's encoder, and the tracking loop that of ODrive and of moteus. The models are at rest at time 0, at count 0.
+Each reads the encoder once per control period and gives a speed that holds until the next reading. Readings are at
+period, 2 periods, ..., or in step with the instants at which a loop reads the speed. Finite differences and the
+low-pass filter are as in SimpleFOC's documentation of its velocity filter, the timestamp method is that of LinuxCNC's
+hostmot2 driver (its manual page and driver), the mixed method that of SimpleFOC's encoder, and the tracking loop that
+of ODrive and of moteus. The models are at rest at time 0, at count 0.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import NamedTuple
 
@@ -34,6 +35,8 @@ class Steps:
     step: IntArray  # shape (n,), +1 or -1
     duration: float  # seconds: length of the recording
     counts_per_rev: int
+    reads: FloatArray = field(default_factory=lambda: np.empty(0))  # shape (n,), seconds: when a loop reads the speed
+    clock_s: float = 1e-7  # seconds: unit of timestamps
 
     def __post_init__(self) -> None:
         if len(self.time) != len(self.step) or np.any(np.abs(self.step) != 1):
@@ -70,8 +73,8 @@ class Estimate:
     velocity: FloatArray  # shape (n,), rad/s: holds from `time` on, until the next one
 
     def at(self, t: ArrayLike) -> FloatArray:
-        """Return speed in rad/s that holds at times `t` in seconds; 0 before the first."""
-        return np.append(0.0, self.velocity)[np.searchsorted(self.time, t, side="right")]
+        """Return speed in rad/s that holds at times `t` in seconds, up to rounding; 0 before the first."""
+        return np.append(0.0, self.velocity)[np.searchsorted(self.time, np.multiply(t, 1 + 1e-12), side="right")]
 
 
 class Readings(NamedTuple):
@@ -87,30 +90,37 @@ class Readings(NamedTuple):
         return np.diff(self.counts, prepend=0)
 
 
-def read(steps: Steps, period_s: float) -> Readings:
-    """Return readings at `period_s`, twice that, ..., up to the end.
+def read(steps: Steps, period_s: float | None) -> Readings:
+    """Return readings at `period_s`, twice that, ..., up to the end; in step with the reads of a loop, if it has any.
 
-    It raises ValueError if the period (s) is not more than 0, or there were more than `MAX_TICKS` readings.
+    Without a period (s) they are at these reads. It raises ValueError if the period is not more than 0, or there were
+    more than `MAX_TICKS` readings.
     """
+    if period_s is None:
+        return _readings(steps, steps.reads)
     if not period_s > 0:
         raise ValueError(f"control period must be more than 0 s, not {short_time(period_s)}")
     if not steps.duration / period_s <= MAX_TICKS:
         raise ValueError(
             f"what is compared must have at most {MAX_TICKS} control periods of {period_s:g} s: shorten it"
         )
-    n_periods = math.floor(steps.duration / period_s * (1 + 1e-12))
-    time = period_s * np.arange(1, n_periods + 1, dtype=np.float64)
+    phase = float(steps.reads[0] % period_s) if len(steps.reads) else 0.0
+    n_periods = math.floor((steps.duration - phase) / period_s * (1 + 1e-12))
+    return _readings(steps, phase + period_s * np.arange(1, n_periods + 1, dtype=np.float64))
+
+
+def _readings(steps: Steps, time: FloatArray) -> Readings:
     seen = np.searchsorted(steps.time, time, side="right")
     count = np.append(0, np.cumsum(steps.step))
     return Readings(time, count[seen], np.append(0.0, steps.time)[seen])
 
 
-def clocks(seconds: FloatArray, clock_s: float, period_s: float) -> IntArray:
+def clocks(seconds: FloatArray, clock_s: float, period_s: float | None = None) -> IntArray:
     """Return what a clock of `clock_s` (s) shows at some times; a time within rounding of a clock edge is at the edge.
 
-    It raises ValueError if the clock is not shorter than the control period.
+    It raises ValueError if the clock is not shorter than the control period, if there is one.
     """
-    if not 0 < clock_s < period_s:
+    if not 0 < clock_s < (period_s or math.inf):
         raise ValueError(f"clock must be more than 0 s and shorter than the control period, not {short_time(clock_s)}")
     return np.floor(seconds / clock_s + 1e-6).astype(np.int64)
 

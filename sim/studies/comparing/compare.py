@@ -1,4 +1,4 @@
-"""Several methods on the same edges: what each makes of them, and how far it is from the truth."""
+"""Several methods on the same edges: their velocities when a loop reads them, and the error at these instants."""
 
 from collections.abc import Callable, Iterable
 from contextlib import suppress
@@ -8,14 +8,16 @@ import numpy as np
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import FloatArray
+from tachometry.sim.golden.sampling import windows
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.comparing import baselines
 from tachometry.spec import TachometerSpec
 
 TrueSpeed = Callable[[FloatArray], FloatArray]
+Instants = list[FloatArray]  # seconds: those at which each curve is read
 
-_MOST_INSTANTS = 200_000
+_MOST_READS = 200_000
 _LONGEST_DELAY = 0.02  # seconds, that is looked for
 _ALIKE = 1e-9  # of a speed; a constant one has no delay
 # Shares of the mean square error that go with a delay: enough in any case, and at least.
@@ -32,12 +34,31 @@ class Curve:
         Velocity in rad/s, held from each time (s) on.
     measurement_time : float64 array, shape (n,), seconds
         Of each update; empty where the method has none.
+    reads : float64 array, shape (n,), seconds
+        See `read_times`.
     """
 
     name: str
     what: str
     estimate: baselines.Estimate
     measurement_time: FloatArray
+    reads: FloatArray
+
+
+@dataclass(frozen=True)
+class Judge:
+    """The true speed, and the instants at which values are compared with it."""
+
+    true_speed: TrueSpeed | None  # None: it is not known
+    begin: float  # seconds
+    end: float  # seconds
+    read_delay: float = 0.0  # seconds: from the valid velocity to its reading
+
+    def among(self, reads: FloatArray) -> FloatArray:
+        """Return the instants (s) of some reads that count: all, or an even choice of at most 200,000."""
+        reads = reads + self.read_delay
+        first, after = np.searchsorted(reads, self.begin), np.searchsorted(reads, self.end, side="right")
+        return reads[first : after : max(1, -(-(after - first) // _MOST_READS))]
 
 
 @dataclass(frozen=True)
@@ -67,11 +88,20 @@ class Score:
 
 def core_curve(name: str, spec: TachometerSpec, trace: PinTrace) -> Curve:
     """Return what a core shows, by its golden model, which the hardware equals bit for bit."""
-    return run_curve(name, spec, golden.run(spec, trace))
+    return run_curve(name, spec, golden.run(spec, trace), trace)
 
 
-def run_curve(name: str, spec: TachometerSpec, run: Run) -> Curve:
-    """Return what a core shows in a run."""
+def read_times(spec: TachometerSpec, trace: PinTrace) -> FloatArray:
+    """Return when the velocities of all ticks are valid, in seconds: `tick_to_velocity` clocks after each tick.
+
+    A method that updates by events, or that ends its ticks itself, is read at the end of each nominal tick as well.
+    """
+    clock = windows(spec, trace)[0] + (spec.latency.tick + spec.latency.tick_to_velocity)
+    return clock[clock < trace.n_clocks] / spec.timing.clock_hz
+
+
+def run_curve(name: str, spec: TachometerSpec, run: Run, trace: PinTrace) -> Curve:
+    """Return what a core shows in the run of a trace."""
     updates = run.updates
     clock_hz = spec.timing.clock_hz
     velocity = updates.velocity.astype(np.float64) * spec.scale.rad_per_s_per_lsb
@@ -80,15 +110,13 @@ def run_curve(name: str, spec: TachometerSpec, run: Run) -> Curve:
         f"{spec.method} method, tick {spec.timing.tick_cycles} clocks",
         baselines.Estimate(updates.clock / clock_hz, velocity),
         updates.interval.astype(np.float64) * (spec.times.interval_unit / clock_hz),
+        read_times(spec, trace),
     )
 
 
-def common_instants(curves: Iterable[Curve], duration: float, tick_seconds: float, earliest: float = 0.0) -> FloatArray:
-    """Return evenly spaced instants, a tick apart or more, from when all curves and `earliest` (s) have begun."""
-    begun = max((curve.estimate.time[0] for curve in curves if len(curve.estimate.time)), default=0.0)
-    begun = max(begun, earliest)
-    n = min(int((duration - begun) / tick_seconds), _MOST_INSTANTS)
-    return begun + (duration - begun) / max(n, 1) * np.arange(n, dtype=np.float64)
+def begun(curves: Iterable[Curve], earliest: float = 0.0) -> float:
+    """Return when all curves have a value, in seconds; at least `earliest`."""
+    return max([earliest, *(float(curve.estimate.time[0]) for curve in curves if len(curve.estimate.time))])
 
 
 def rms_error(curve: Curve, instants: FloatArray, truth: FloatArray) -> float:
@@ -98,7 +126,7 @@ def rms_error(curve: Curve, instants: FloatArray, truth: FloatArray) -> float:
 
 
 def score(curve: Curve, duration: float, instants: FloatArray, true_speed: TrueSpeed | None) -> Score:
-    """Tell how good a curve is at some evenly spaced instants (s)."""
+    """Return how good a curve is at the instants (s) at which it is read; only even ones show a delay."""
     times = curve.measurement_time
     rms = worst = delay = None
     if true_speed is not None and len(instants):

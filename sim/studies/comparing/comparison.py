@@ -7,12 +7,22 @@ from functools import partial
 
 import numpy as np
 
-from tachometry.sim.encoder.motion import FloatArray, parse_motion
+from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.progress import Bar
 from tachometry.sim.signals.recording import PinTrace, Recording
 from tachometry.sim.studies.comparing.baselines import Steps
-from tachometry.sim.studies.comparing.compare import Curve, Score, TrueSpeed, common_instants, core_curve, score
+from tachometry.sim.studies.comparing.compare import (
+    Curve,
+    Instants,
+    Judge,
+    Score,
+    TrueSpeed,
+    begun,
+    core_curve,
+    read_times,
+    score,
+)
 from tachometry.sim.studies.comparing.rivals import baseline_model, settings, steps_curve
 from tachometry.sim.studies.comparing.tune import (
     SETTLED_S,
@@ -25,7 +35,7 @@ from tachometry.sim.studies.comparing.tune import (
     possible,
     triangle,
 )
-from tachometry.spec import Encoder, TachometerSpec
+from tachometry.spec import TachometerSpec
 from tachometry.spec.language.units import format_time
 
 Specs = Mapping[str, TachometerSpec | None]  # by the name of the method; None: it is a baseline
@@ -48,11 +58,11 @@ class Comparison:
     Parameters
     ----------
     spec : TachometerSpec
-        Whose clock, tick and unit hold for all.
+        Whose clock, tick and unit hold for all, and with which float models are read.
     specs : mapping of str to TachometerSpec or None
         Of the methods that are compared, by their names with their settings.
-    instants : float64 array, shape (n,), seconds
-        At which they are compared.
+    instants : list of float64 array, shape (n,), seconds
+        See `Judge`.
     recording : Recording
         The edges.
     n_tried : dict of str to int
@@ -67,7 +77,7 @@ class Comparison:
     specs: Specs
     curves: list[Curve]
     scores: list[Score]
-    instants: FloatArray
+    instants: Instants
     true_speed: TrueSpeed | None
     recording: Recording
     n_tried: dict[str, int] = field(default_factory=dict)
@@ -97,13 +107,14 @@ def comparison(
     tune: bool,
     tradeoff: bool,
     bar: Bar,
+    read_delay: float = 0.0,
 ) -> Comparison:
     """Run methods on the same edges, and compare them with the truth.
 
     Parameters
     ----------
     spec : TachometerSpec
-        Whose encoder, clock and tick hold for all.
+        Whose encoder, clock and tick hold for all, and with which float models are read.
     specs : mapping of str to TachometerSpec or None
     make : callable
         Makes a core of a method and its own options.
@@ -115,6 +126,8 @@ def comparison(
         Each baseline, and M/T, takes part with the best of its settings.
     tradeoff : bool
         Measure what all settings cost.
+    read_delay : float, seconds
+        All values are read this much later.
 
     Raises
     ------
@@ -123,33 +136,33 @@ def comparison(
     """
     for name in (name for name, one in specs.items() if one is None):
         baseline_model(name)  # what is wrong is reported at once
-    recording, tick_s = source.recording, float(spec.timing.tick_seconds)
-    duration, begin = recording.duration, earliest or 0.0
-    end = min(duration, latest)
+    edges = source.recording, steps_beside(spec, source.recording)
+    duration, begin = source.recording.duration, earliest or 0.0
+    judge = Judge(source.true_speed, begin, min(duration, latest), read_delay)
     costs, speed, n_tried = dict[str, list[Cost]](), 0.0, dict[str, int]()
     if (tune or tradeoff) and source.true_speed is not None:
-        judged = common_instants([], end, tick_s, begin)
-        if len(judged) < 2:
+        if len(judge.among(edges[1].reads)) < 2:
             raise ValueError(f"{source.name} must last longer than --from, not {_time(duration)}")
-        trial = _Trial(spec.encoder, make, recording, judged, source.true_speed, bar)
+        trial = _Trial(spec, make, edges, judge, bar)
         if tradeoff:
             costs, speed = trial.costs(specs)
         if tune:
             specs, n_tried = trial.tuned(specs)
-    curves = [Setting(name, one, spec.encoder).curve(recording) for name, one in specs.items()]
-    instants = common_instants(curves, end, tick_s, begin)
-    if len(instants) < 2:
+    curves = [Setting(name, one).curve(*edges) for name, one in specs.items()]
+    judge = replace(judge, begin=begun(curves, begin))
+    instants = [judge.among(curve.reads) for curve in curves]
+    if min(map(len, instants)) < 2:
         beyond = "" if earliest is None else ", and beyond --from"
-        what = source.name if end == duration else "--until"
-        raise ValueError(f"{what} must last until every method has a value{beyond}, longer than {_time(end)}")
+        what = source.name if judge.end == duration else "--until"
+        raise ValueError(f"{what} must last until every method has a value{beyond}, longer than {_time(judge.end)}")
     return Comparison(
         spec=spec,
         specs=specs,
         curves=curves,
-        scores=[score(curve, duration, instants, source.true_speed) for curve in curves],
+        scores=[score(curve, duration, at, source.true_speed) for curve, at in zip(curves, instants, strict=True)],
         instants=instants,
         true_speed=source.true_speed,
-        recording=recording,
+        recording=source.recording,
         n_tried=n_tried,
         costs=costs,
         rms_speed=speed,
@@ -160,18 +173,23 @@ def _time(seconds: float) -> str:
     return format_time(Fraction(f"{seconds:.4g}"))
 
 
+def steps_beside(spec: TachometerSpec, recording: Recording) -> Steps:
+    """Return the steps for float models, which are read with a core, and stamp edges with its clock or with 0.1 us."""
+    steps, reads = Steps.of_sensor(recording, spec.encoder), read_times(spec, PinTrace.of(recording, spec))
+    return replace(steps, reads=reads, clock_s=min(steps.clock_s, 1 / spec.timing.clock_hz))
+
+
 @dataclass(frozen=True)
 class Setting:
     """Holds a method with its options; without a spec it is a baseline."""
 
     name: str
     spec: TachometerSpec | None
-    encoder: Encoder
 
-    def curve(self, recording: Recording) -> Curve:
+    def curve(self, recording: Recording, steps: Steps) -> Curve:
         """Return what it shows; ValueError if its options are wrong, or do not fit the recording."""
         if self.spec is None:
-            return steps_curve(self.name, Steps.of_sensor(recording, self.encoder))
+            return steps_curve(self.name, steps)
         return core_curve(self.name, self.spec, PinTrace.of(recording, self.spec))
 
 
@@ -179,11 +197,10 @@ class Setting:
 class _Trial:
     """Tries all settings of methods on a motion."""
 
-    encoder: Encoder
+    spec: TachometerSpec
     make: Make
-    recording: Recording
-    instants: FloatArray
-    true_speed: TrueSpeed
+    edges: tuple[Recording, Steps]
+    judge: Judge
     bar: Bar
 
     def tuned(self, specs: Specs) -> tuple[dict[str, TachometerSpec | None], dict[str, int]]:
@@ -200,8 +217,8 @@ class _Trial:
                 found[name] = specs[name]
                 next(tried)
                 continue
-            curves = possible(partial(setting.curve, self.recording) for setting in tried)
-            chosen = best(curves, self.instants, self.true_speed).name
+            curves = possible(partial(setting.curve, *self.edges) for setting in tried)
+            chosen = best(curves, self.judge).name
             found[chosen] = next(setting.spec for setting in settings[name] if setting.name == chosen)
             n_tried[chosen] = len(settings[name])
         return found, n_tried
@@ -212,28 +229,29 @@ class _Trial:
 
         It raises ValueError if the shaft does not move.
         """
-        speed = float(np.sqrt(np.mean(self.true_speed(self.instants) ** 2)))
+        assert self.judge.true_speed is not None
+        speed = float(np.sqrt(np.mean(self.judge.true_speed(self.judge.among(self.edges[1].reads)) ** 2)))
         if not speed:
             raise ValueError("--motion must move the shaft where there is a --tradeoff")
         found: dict[str, list[Cost]] = {}
         index = any(spec is not None and spec.index is not None for spec in specs.values())
-        moving = VirtualEncoder.of(self.encoder, index=index).record(parse_motion(triangle(speed)))
-        tick_s = float(self.instants[1] - self.instants[0])
-        after = common_instants([], moving.recording.duration, tick_s, SETTLED_S)
+        moving = VirtualEncoder.of(self.spec.encoder, index=index).record(parse_motion(triangle(speed)))
+        judge = replace(self.judge, true_speed=moving.true_speed, begin=SETTLED_S, end=moving.recording.duration)
+        edges = moving.recording, steps_beside(self.spec, moving.recording)
         for name, tried in self._counted(self._settings(specs, of_cores=True), "measuring"):
             found[name] = []
             for setting in tried:
                 try:
-                    curves = setting.curve(self.recording), setting.curve(moving.recording)
+                    curves = setting.curve(*self.edges), setting.curve(*edges)
                 except ValueError:
                     continue  # not with this clock, encoder or motion
-                measured = cost(name, *curves, (self.instants, self.true_speed), (after, moving.true_speed))
+                measured = cost(name, *curves, self.judge, judge)
                 if measured is not None:
                     found[name].append(measured)
         return found, speed
 
     def _settings(self, specs: Specs, *, of_cores: bool) -> dict[str, list[Setting]]:
-        return {name: self._tried(Setting(name, spec, self.encoder), of_cores=of_cores) for name, spec in specs.items()}
+        return {name: self._tried(Setting(name, spec), of_cores=of_cores) for name, spec in specs.items()}
 
     def _tried(self, setting: Setting, *, of_cores: bool) -> list[Setting]:
         """Return all settings of a method; one if it is given with options, and of a core that is not to be tuned."""

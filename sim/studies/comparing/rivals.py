@@ -206,7 +206,7 @@ def steps_curve(name: str, steps: Steps) -> Curve:
         raise ParameterError(
             "motion", f"must last at least two control periods of {name}, not {short_time(steps.duration)}"
         )
-    return Curve(name, what, estimate, np.empty(0))
+    return Curve(name, what, estimate, np.empty(0), steps.reads if len(steps.reads) else estimate.time)
 
 
 def settings(method: str) -> list[str]:

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tachometry.sim.encoder.motion import FloatArray
-from tachometry.sim.studies.comparing.compare import Curve, TrueSpeed, rms_error
+from tachometry.sim.studies.comparing.compare import Curve, Judge, rms_error
 from tachometry.spec.language.option import ParameterError
 
 # Settings of cores that are tried: an option with its values. Those of `TUNED` take part where the best is looked for.
@@ -27,7 +26,7 @@ class Cost:
     # method and name: the method, and its name with the setting
     method: str
     name: str
-    rms: float  # rad/s: error of the held velocity
+    rms: float  # rad/s: error when it is read
     delay: float  # seconds: see `equivalent_delay`
 
 
@@ -58,15 +57,14 @@ def possible(curves: Iterable[Callable[[], Curve]]) -> Iterable[Curve]:
         raise refused or ParameterError("methods", "must have settings")
 
 
-def best(curves: Iterable[Curve], instants: FloatArray, true_speed: TrueSpeed) -> Curve:
-    """Return the curve with the least RMS error at some instants (s), those before its first value left out.
+def best(curves: Iterable[Curve], judge: Judge) -> Curve:
+    """Return the curve with the least RMS error, what comes before its first value left out.
 
     It raises ValueError if no curve has a value by then.
     """
-    truth = true_speed(instants)
     found, least = None, np.inf
     for curve in curves:
-        error = error_of(curve, instants, truth)
+        error = error_of(curve, judge)
         if error is not None and error < least:
             found, least = curve, error
     if found is None:
@@ -74,10 +72,12 @@ def best(curves: Iterable[Curve], instants: FloatArray, true_speed: TrueSpeed) -
     return found
 
 
-def error_of(curve: Curve, instants: FloatArray, truth: FloatArray) -> float | None:
-    """Return RMS error from the first value on; None if there is none by then."""
-    begun = int(np.searchsorted(instants, curve.estimate.time[0])) if len(curve.estimate.time) else len(instants)
-    return rms_error(curve, instants[begun:], truth[begun:]) if begun < len(instants) else None
+def error_of(curve: Curve, judge: Judge) -> float | None:
+    """Return RMS error from the first value on, rad/s; None if there is none by then."""
+    instants = judge.among(curve.reads)
+    instants = instants[instants >= curve.estimate.time[0]] if len(curve.estimate.time) else instants[:0]
+    assert judge.true_speed is not None
+    return rms_error(curve, instants, judge.true_speed(instants)) if len(instants) else None
 
 
 def triangle(speed_rad_s: float) -> str:
@@ -91,33 +91,25 @@ def triangle(speed_rad_s: float) -> str:
     return "+".join([f"constant:{low}:{SETTLED_S:g}s", *[to_and_fro] * 3])
 
 
-def equivalent_delay(curve: Curve, instants: FloatArray, true_speed: TrueSpeed) -> float:
+def equivalent_delay(curve: Curve, judge: Judge) -> float:
     """Return the delay in seconds with which an otherwise perfect method would have the curve's RMS error.
 
     That is the RMS error over the RMS acceleration. On a ramp it is the lag; and it is defined as well for methods that
-    follow ramps without a lag, which pay where the acceleration changes.
-
-    Parameters
-    ----------
-    instants : float64 array, shape (n,), seconds, evenly spaced
-    true_speed : callable
-        Of a motion whose acceleration is not 0.
+    follow ramps without a lag, which pay where the acceleration changes. The acceleration must not be 0.
     """
-    truth = true_speed(instants)
+    instants = judge.among(curve.reads)
+    assert judge.true_speed is not None
+    truth = judge.true_speed(instants)
     acceleration = np.gradient(truth, instants)
     return rms_error(curve, instants, truth) / float(np.sqrt(np.mean(acceleration * acceleration)))
 
 
-Judged = tuple[FloatArray, TrueSpeed]  # instants in seconds, and the true speed there
-
-
-def cost(method: str, still: Curve, moving: Curve, judged: Judged, judged_moving: Judged) -> Cost | None:
+def cost(method: str, still: Curve, moving: Curve, judge: Judge, judge_moving: Judge) -> Cost | None:
     """Return what a setting costs: its error in one motion, its delay in another; None if it has no value by then."""
-    instants, true_speed = judged
-    rms = error_of(still, instants, true_speed(instants))
+    rms = error_of(still, judge)
     if rms is None or not len(moving.estimate.time):
         return None
-    return Cost(method, still.name, rms, equivalent_delay(moving, *judged_moving))
+    return Cost(method, still.name, rms, equivalent_delay(moving, judge_moving))
 
 
 def front(costs: Iterable[Cost]) -> list[Cost]:

@@ -20,7 +20,7 @@ from tachometry.sim.encoder.motion import Motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines.pick import pick
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.sim.studies.comparing.compare import common_instants, run_curve, score
+from tachometry.sim.studies.comparing.compare import Judge, begun, run_curve, score
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import METHODS, Option, TachometerSpec, own_options
 from tachometry.spec.language.option import ParameterError
@@ -42,7 +42,7 @@ _RESULTS: dict[str, tuple[str, str]] = {
     "mean_time_s": ("float", "s, mean measurement time"),
     "worst_time_s": ("float", "s, longest measurement time"),
     "true_rms_rad_s": ("float", "rad/s, RMS of the true speed while it is compared"),
-    "rms_error_rad_s": ("float", "rad/s, RMS error of the held velocity"),
+    "rms_error_rad_s": ("float", "rad/s, RMS error of the velocity when it is read"),
     "max_error_rad_s": ("float", "rad/s, greatest error"),
     "relative_error": ("float", "RMS error over RMS of the true speed"),
     "delay_s": ("float", "s, shift of the true speed that comes closest"),
@@ -87,7 +87,10 @@ _ENCODER: dict[str, tuple[str, str, Callable[[VirtualEncoder], Any]]] = {
     "illegal": ("float", "probability", attrgetter("illegal")),
     "seed": ("int", "as the option", attrgetter("seed")),
 }
-_FROM = {"from_s": ("float", "s, errors before are left out")}
+_FROM = {
+    "from_s": ("float", "s, errors before are left out"),
+    "read_delay_s": ("float", "s, from the valid velocity to its reading"),
+}
 _KINDS = {bool: "bool", int: "int", str: "text"}
 
 
@@ -138,6 +141,7 @@ class Point:
     values: dict[str, float] = field(default_factory=dict)
     earliest: float = 0.0  # seconds: errors before it are left out
     engine: str | None = None  # what runs the hardware; None: the golden model alone, which it equals
+    read_delay: float = 0.0  # seconds: a loop reads each value this much later
 
     def __post_init__(self) -> None:
         needed = self.spec.times.longest_tick + self.spec.latency.tick
@@ -155,7 +159,7 @@ class Point:
     def digest(self) -> str:
         """Digest of all that decides the row, the code that makes it included."""
         motion = [array.tobytes() for array in vars(self.motion).values()]
-        rest = (self.method, self.spec, self.encoder, self.values, self.earliest, self.engine)
+        rest = (self.method, self.spec, self.encoder, self.values, self.earliest, self.engine, self.read_delay)
         return digest(self.code, motion, *rest)
 
     @property
@@ -232,10 +236,11 @@ def run_point(point: Point) -> Row:
     mismatches = None
     if point.engine is not None:
         mismatches = lockstep(spec, trace, pick(point.engine), expected=run).n_mismatches
-    curve = run_curve(point.method, spec, run)
+    curve = run_curve(point.method, spec, run, trace)
     instants = np.empty(0)
     if len(run.updates.clock):
-        instants = common_instants([curve], duration, float(spec.timing.tick_seconds), point.earliest)
+        judge = Judge(encoding.true_speed, begun([curve], point.earliest), duration, point.read_delay)
+        instants = judge.among(curve.reads)
     found = score(curve, duration, instants, encoding.true_speed)
     truth = encoding.true_speed(instants)
     true_rms = float(np.sqrt(np.mean(truth * truth))) if len(truth) else None
@@ -257,6 +262,7 @@ def run_point(point: Point) -> Row:
         "relative_error": found.rms / true_rms if found.rms is not None and true_rms else None,
         "delay_s": found.delay,
         "from_s": point.earliest,
+        "read_delay_s": point.read_delay,
     }
     return dict.fromkeys(COLUMNS) | figures | _core(spec) | _encoder(point.encoder) | point.values
 

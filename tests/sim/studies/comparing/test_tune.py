@@ -8,7 +8,7 @@ import pytest
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.plots.tradeoff import save_tradeoff
 from tachometry.sim.studies.comparing.baselines import Estimate
-from tachometry.sim.studies.comparing.compare import Curve
+from tachometry.sim.studies.comparing.compare import Curve, Judge
 from tachometry.sim.studies.comparing.tune import (
     CORES,
     SETTLED_S,
@@ -24,32 +24,29 @@ from tachometry.sim.studies.comparing.tune import (
 from tachometry.spec import METHODS, Encoder, STachometer, Timing, of_texts
 
 INSTANTS = np.arange(0.1, 0.4, 1e-4)
+JUDGE = Judge(lambda t: np.full(len(t), 5.0), 0.1, 0.4)
 
 
 def curve(name: str, time: np.ndarray, velocity: np.ndarray) -> Curve:
-    return Curve(name, "a curve", Estimate(time, velocity), np.empty(0))
+    return Curve(name, "a curve", Estimate(time, velocity), np.empty(0), INSTANTS)
 
 
 def constant(name: str, velocity: float, begin: float = 0.0) -> Curve:
     return curve(name, np.array([begin]), np.array([velocity]))
 
 
-def five(t: np.ndarray) -> np.ndarray:
-    return np.full(len(t), 5.0)
-
-
 def test_the_best_has_the_least_error() -> None:
     curves = [constant("a", 7), constant("b", 4.5), constant("c", 5.7)]
-    assert best(curves, INSTANTS, five).name == "b"
-    assert best(iter(curves[::2]), INSTANTS, five).name == "c"
+    assert best(curves, JUDGE).name == "b"
+    assert best(iter(curves[::2]), JUDGE).name == "c"
 
 
 def test_a_setting_is_judged_from_its_first_value_on() -> None:
-    assert best([constant("a", 5.2), constant("late", 5.1, begin=0.3)], INSTANTS, five).name == "late"
+    assert best([constant("a", 5.2), constant("late", 5.1, begin=0.3)], JUDGE).name == "late"
     never, too_late = curve("never", np.empty(0), np.empty(0)), constant("too late", 5, begin=0.5)
-    assert best([never, too_late, constant("a", 9)], INSTANTS, five).name == "a"
+    assert best([never, too_late, constant("a", 9)], JUDGE).name == "a"
     with pytest.raises(ValueError, match=r"^motion must last until a setting of every method has a value$"):
-        best([never, too_late], INSTANTS, five)
+        best([never, too_late], JUDGE)
 
 
 def test_settings_that_cannot_be_are_left_out() -> None:
@@ -68,15 +65,15 @@ def test_the_equivalent_delay_of_a_late_curve_is_its_delay(delay: float) -> None
     motion = parse_motion(triangle(80))
     time = np.arange(0, motion.duration, 1e-5)
     late = curve("late", time, motion.speed(np.maximum(time - delay, 0)))
-    instants = np.arange(SETTLED_S + 0.01, 0.39, 1e-4)
-    assert np.min(motion.speed(instants)) == pytest.approx(40, abs=0.1)
-    assert np.max(motion.speed(instants)) == pytest.approx(80, abs=0.1)
-    assert equivalent_delay(late, instants, motion.speed) == pytest.approx(delay, rel=0.05)
-    found = cost("method", constant("still", 5.25), late, (INSTANTS, five), (instants, motion.speed))
+    moving = Judge(motion.speed, SETTLED_S + 0.01, 0.39)
+    assert np.min(motion.speed(moving.among(INSTANTS))) == pytest.approx(40, abs=0.1)
+    assert np.max(motion.speed(moving.among(INSTANTS))) == pytest.approx(80, abs=0.1)
+    assert equivalent_delay(late, moving) == pytest.approx(delay, rel=0.05)
+    found = cost("method", constant("still", 5.25), late, JUDGE, moving)
     assert found is not None
     assert (found.method, found.name) == ("method", "still")
     assert found.rms == pytest.approx(0.25)
-    assert cost("m", constant("still", 5, begin=1), late, (INSTANTS, five), (instants, motion.speed)) is None
+    assert cost("m", constant("still", 5, begin=1), late, JUDGE, moving) is None
 
 
 def test_the_front_has_what_nothing_is_better_than() -> None:
