@@ -5,7 +5,9 @@ in its steady state. They read the encoder as those of `baselines` do, at period
 time 0, at count 0.
 """
 
+import functools
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,34 +20,65 @@ QUANTISATION = 1 / math.sqrt(12)
 _MOST_EDGES = _LONGEST = 10_000  # edges of a polynomial, and periods of a window
 _MOST_ORDER = 5  # beyond that, digits are lost
 _LEAST_INDEX, _GREATEST_INDEX = 1e-15, 1e6
-_MOST_SILENT = 2  # counts that the shaft may go without one: the slots of a bad disc are that uneven
-_AT_ONCE = 1 << 20  # edges of polynomials, for which memory is needed at once
+_BACK, _AT_ONCE = 64, 1 << 15  # edges of each polynomial, and of all, that are summed at once
+_SHARED_ORDER = 3  # sums up to it serve all lower ones
 _READINGS = 1 << 14  # whose windows grow at once: they stay in the cache of a processor
 _RIDGE = 1e-12  # of the normal equations: edges with one timestamp do not make them singular
 
 
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """Time-stamped edges, and the readings of a method that uses them."""
+
+    count_rad: float
+    time: FloatArray  # shape (n,), seconds: of each reading
+    latest: IntArray  # shape (n,): the latest edge of each reading, -1 before the first
+    silence: FloatArray  # shape (n,), seconds since that edge
+    stamp: FloatArray  # shape (m,), seconds: of each edge
+    place: FloatArray  # shape (m,), counts: half a count before the new count, as a reversal meets the same edge
+
+    @staticmethod
+    @functools.lru_cache(maxsize=2)  # for all settings of a method
+    def of(steps: Steps, period_s: float | None) -> "Edges":
+        """Return the edges of an encoder; without a period (s), each read of a loop is a reading."""
+        readings, unit = read(steps, period_s), steps.clock_s
+        latest = np.searchsorted(steps.time, readings.time, side="right") - 1
+        stamp = (clocks(steps.time, unit, period_s) * unit).astype(np.float64)
+        silence = clocks(readings.time, unit, period_s) * unit - np.append(stamp, -np.inf)[latest]
+        place = (np.cumsum(steps.step) - steps.step / 2).astype(np.float64)
+        return Edges(steps.count_rad, readings.time, latest, silence, stamp, place)
+
+    def estimate(self, slope: FloatArray, bound: float, timeout_s: float) -> Estimate:
+        """Return the speed of slopes (counts/s): at most `bound` counts in the silence, and 0 after the timeout."""
+        if not bound > 0:
+            raise ValueError(f"bound must be more than 0 counts, not {bound:g}")
+        most = np.divide(bound, self.silence, out=np.full(len(slope), np.inf), where=self.silence > 0)
+        speed = np.where(self.silence > timeout_s, 0.0, np.clip(slope, -most, most))
+        return Estimate(self.time, speed * self.count_rad)
+
+
 def least_squares(
-    steps: Steps, period_s: float, edges: int = 16, order: int = 2, timeout_s: float = 0.1, clock_s: float = 1e-7
+    steps: Steps, period_s: float | None, edges: int = 16, order: int = 2, timeout_s: float = 0.1, bound: float = 2.0
 ) -> Estimate:
     """Return a polynomial of time through the latest edges by least squares; its slope at the reading is the speed.
 
     Brown, Schneider, Mulligan: Analysis of algorithms for velocity estimation from discrete position versus time data,
     IEEE Trans. Industrial Electronics 39(1), 1992; Merry, van de Molengraft, Steinbuch: Velocity and acceleration
-    estimation for optical incremental encoders, Mechatronics 20(1), 2010. The position of an edge is half a count
-    before the count it makes: a reversal meets the same edge again. With fewer edges the order is at most one less than
-    their number. Two things are added here, without which the polynomial runs on after a stop: a silence bounds the
-    speed to 2 counts in that time, and after `timeout_s` the speed is 0 and the next edge begins anew.
+    estimation for optical incremental encoders, Mechatronics 20(1), 2010. With fewer edges the order is at most one
+    less than their number. Two things are added, without which the polynomial runs on after a stop: a silence bounds
+    the speed to `bound` counts in that time, and after `timeout_s` the speed is 0 and the next edge begins anew.
 
     Parameters
     ----------
-    period_s : float, seconds
+    period_s : float, seconds, or None
+        Control period; None: each read of a loop is a reading.
     edges : int, more than `order`, at most 10,000
         Number of edges that the polynomial is fitted to.
     order : int, from 1 to 5
         Of the polynomial: 1 for a straight line, which lags by half of its length, 2 with acceleration.
     timeout_s : float, seconds
-    clock_s : float, seconds
-        Unit of the timestamps.
+    bound : float, counts
+        Distance that the shaft may go without an edge: the slots of a bad disc are uneven.
 
     Raises
     ------
@@ -58,65 +91,64 @@ def least_squares(
         raise ValueError(
             f"number of edges must be more than the order, {order}, and at most {_MOST_EDGES}, not {edges}"
         )
-    readings = read(steps, period_s)
-    now = clocks(readings.time, clock_s, period_s) * clock_s
-    speed = np.zeros(len(now))
-    latest = np.searchsorted(steps.time, readings.time, side="right") - 1
-    moved = np.flatnonzero(latest >= 0)
-    if not len(moved):
-        return Estimate(readings.time, speed)
-    stamp = (clocks(steps.time, clock_s, period_s) * clock_s).astype(np.float64)
-    position = (np.cumsum(steps.step) - steps.step / 2).astype(np.float64)
-    place = np.arange(len(stamp))
-    anew = np.maximum.accumulate(np.where(np.diff(stamp, prepend=stamp[0]) > timeout_s, place, 0))
-    # A fit is needed for each edge that is the latest of a reading.
-    last, which = np.unique(latest[moved], return_inverse=True)
-    n_used = np.minimum(edges, last - anew[last] + 1)
-    silence = now[moved] - stamp[latest[moved]]
-    slope = np.zeros(len(moved))
-    for degree in range(1, order + 1):
-        fitted = np.minimum(order, n_used - 1) == degree
-        if not np.any(fitted):
-            continue
-        row = (np.cumsum(fitted) - 1)[which]
-        coefficient, span = _fit(stamp, position, last[fitted], n_used[fitted], degree)
-        mine = np.flatnonzero(fitted[which])
-        powers = np.arange(degree)
-        ahead = (silence[mine] / span[row[mine]])[:, np.newaxis] ** powers
-        slope[mine] = np.sum(coefficient[row[mine], 1:] * (powers + 1) * ahead, axis=1) / span[row[mine]]
-    bound = np.divide(_MOST_SILENT, silence, out=np.full(len(moved), np.inf), where=silence > 0)
-    slope = np.clip(slope, -bound, bound)
-    speed[moved] = np.where(silence > timeout_s, 0.0, slope)
-    return Estimate(readings.time, speed * steps.count_rad)
+    seen = Edges.of(steps, period_s)
+    return seen.estimate(_windows(seen, timeout_s, max(order, _SHARED_ORDER)).slopes(edges, order), bound, timeout_s)
 
 
-def _fit(
-    stamp: FloatArray, position: FloatArray, last: IntArray, n_used: IntArray, degree: int
-) -> tuple[FloatArray, FloatArray]:
-    """Return polynomials through the edges up to each of `last`, and the unit of time (s) of each, which is what they
-    span.
+class _Windows:
+    """Sums over the latest edges of each fit, which grow from one number of edges to the next.
 
-    Time 0 is the latest edge, and the coefficient of the k-th power is in column k.
+    A fit is needed for each edge that is the latest of a reading. Time 0 is that edge.
     """
-    span = stamp[last] - stamp[last - n_used + 1]
-    span[span == 0] = np.inf  # of edges at one instant nothing is told
-    back = np.arange(int(np.max(n_used)))
-    moment = np.empty((len(last), 2 * degree + 1))  # sums of time^k, and of position times time^k
-    known = np.empty((len(last), degree + 1))
-    for part in np.array_split(np.arange(len(last)), 1 + len(last) * len(back) // _AT_ONCE):
-        place = np.maximum(last[part, np.newaxis] - back, 0)
-        time = (stamp[place] - stamp[last[part], np.newaxis]) / span[part, np.newaxis]
-        moved = position[place] - position[last[part], np.newaxis]
-        power = (back < n_used[part, np.newaxis]).astype(np.float64)
-        time *= power
-        for k in range(2 * degree + 1):
-            moment[part, k] = np.sum(power, axis=1)
-            if k <= degree:
-                known[part, k] = np.einsum("ei,ei->e", power, moved)
-            power *= time
-    row = np.arange(degree + 1)
-    matrix = moment[:, row[:, np.newaxis] + row] + _RIDGE * np.eye(degree + 1)
-    return np.linalg.solve(matrix, known[:, :, np.newaxis])[:, :, 0].astype(np.float64), span
+
+    def __init__(self, seen: Edges, timeout_s: float, order: int) -> None:
+        self._seen, self._moved = seen, np.flatnonzero(seen.latest >= 0)
+        self._last, self._which = np.unique(seen.latest[self._moved], return_inverse=True)
+        begins = np.where(np.diff(seen.stamp, prepend=seen.stamp[:1]) > timeout_s, np.arange(len(seen.stamp)), 0)
+        self._most = self._last - np.maximum.accumulate(begins)[self._last] + 1
+        self._n, self._powers = 0, np.zeros((len(self._last), 2 * order + 1))  # sums of time^k
+        self._known = np.zeros((len(self._last), order + 1))  # of place times time^k
+
+    def _grow(self, edges: int) -> None:
+        if edges < self._n:
+            self._n, self._powers[:], self._known[:] = 0, 0, 0
+        end = min(edges, int(np.max(self._most, initial=0)))
+        for begin in range(self._n, end, _BACK):
+            back = np.arange(begin, min(begin + _BACK, end))
+            for part in np.array_split(np.arange(len(self._last)), 1 + len(self._last) * len(back) // _AT_ONCE):
+                last = self._last[part, np.newaxis]
+                place = np.maximum(last - back, 0)
+                power = (back < self._most[part, np.newaxis]).astype(np.float64)
+                time = (self._seen.stamp[place] - self._seen.stamp[last]) * power
+                moved = self._seen.place[place] - self._seen.place[last]
+                for k in range(self._powers.shape[1]):
+                    self._powers[part, k] += np.sum(power, axis=1)
+                    if k < self._known.shape[1]:
+                        self._known[part, k] += np.einsum("ei,ei->e", power, moved)
+                    power *= time
+        self._n = edges
+
+    def slopes(self, edges: int, order: int) -> FloatArray:
+        """Return the slope of the polynomial at each reading, counts/s; 0 where there is none."""
+        self._grow(edges)
+        n_used, stamp = np.minimum(edges, self._most), self._seen.stamp
+        span = stamp[self._last] - stamp[self._last - n_used + 1]
+        span[span == 0] = np.inf  # edges at one instant have no slope
+        coefficient, slope = np.zeros((len(span), order)), np.zeros(len(self._seen.time))
+        for degree in range(1, order + 1):
+            fitted = np.flatnonzero(np.minimum(order, n_used - 1) == degree)
+            row, scale = np.arange(degree + 1), span[fitted, np.newaxis] ** -np.arange(2 * degree + 1.0)
+            matrix = (self._powers[fitted, : 2 * degree + 1] * scale)[:, row[:, np.newaxis] + row]
+            known = self._known[fitted, : degree + 1] * scale[:, : degree + 1]
+            of = np.linalg.solve(matrix + _RIDGE * np.eye(degree + 1), known[:, :, np.newaxis])
+            coefficient[fitted, :degree] = of[:, 1:, 0]
+        powers, span = np.arange(order), span[self._which]
+        ahead = (self._seen.silence[self._moved] / span)[:, np.newaxis] ** powers
+        slope[self._moved] = np.sum(coefficient[self._which] * (powers + 1) * ahead, axis=1) / span
+        return slope
+
+
+_windows = functools.lru_cache(maxsize=1)(_Windows)  # for all settings on the same edges
 
 
 def adaptive_window(

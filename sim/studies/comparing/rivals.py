@@ -52,6 +52,7 @@ class Parameter:
 _PERIOD = Parameter("period_s", _time)
 _FILTER = Parameter("filter_s", _time)
 _ORDER = Parameter("order", parse_whole)
+_BOUND = {"bound": Parameter("bound", _number)}
 
 
 @dataclass(frozen=True)
@@ -81,6 +82,7 @@ def _moteus(steps: Steps, period_s: float, pll_filter_hz: float) -> Estimate:
 
 _PERIODS = "33us 100us 250us 500us 1ms 2ms 4ms 8ms"
 _FILTERS = "0us 500us 1ms 2ms 5ms 10ms 20ms 50ms"
+_EDGES = "4 6 8 12 16 24 32 48 64 96 128 192 256 512 1024 2048 4096 8192"
 
 BASELINES: dict[str, Baseline] = {
     "difference": Baseline(
@@ -136,15 +138,14 @@ BASELINES: dict[str, Baseline] = {
     ),
     "least-squares": Baseline(
         "polynomial through the latest edges (Brown 1992, Merry 2010)",
-        "16 edges, order 2, 100 us",
+        "16 edges, order 2",
         estimators.least_squares,
-        {"period": _PERIOD, "edges": Parameter("edges", parse_whole), "order": _ORDER},
+        {"period": _PERIOD, "edges": Parameter("edges", parse_whole), "order": _ORDER, **_BOUND},
         (
-            {"edges": "2 3 4 6 8 12 16 24 32 48 64 96 128 192 256 512 1024", "order": "1"},
-            {"edges": "4 6 8 12 16 24 32 48 64 96 128 192 256 512 1024", "order": "2"},
-            {"edges": "8 16 32 64 128 256 512", "order": "3"},
+            {"edges": "2 3", "order": "1", "bound": "1 2"},
+            {"edges": _EDGES, "order": "1 2 3", "bound": "1 2"},
         ),
-        {"period_s": 100e-6},
+        {"period_s": None},
     ),
     "foaw": Baseline(
         "adaptive window (Janabi-Sharifi 2000)",
