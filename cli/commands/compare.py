@@ -53,7 +53,7 @@ Examples:
     default="all",
     help="Methods to compare: all, or names with commas between. Methods take options, as in m:average=10 or "
     "hostmot2:period=500us. difference, hostmot2, simplefoc, odrive and moteus are float models of what is in use; "
-    "least-squares, foaw and kalman are float models of estimators in the literature. "
+    "least-squares, foaw, kalman, kf-cv, kf-ca and imm are float models of estimators in the literature. "
     "docs/measured/compare.md has their options.",
 )
 @option(
@@ -132,7 +132,8 @@ def compare(
     """
     inputs = tables if capture is None else [capture]
     outputs = Outputs({"--plot": plot, "--csv": csv, "--tradeoff": tradeoff}, inputs=inputs)
-    named = named_methods(methods, make, BASELINES)
+    missing = {name: one.missing for name, one in BASELINES.items() if methods.strip() == "all" and one.missing}
+    named = named_methods(methods, make, [name for name in BASELINES if name not in missing])
     spec = next((spec for spec in named.specs.values() if spec is not None), None) or make("s", {})
     for name in () if size else _NO_VELOCITY:
         if name in spec.options:
@@ -160,7 +161,7 @@ def compare(
         )
         sizes = _sizes(result, tools) if size else {}
         _write(result, sizes, outputs)
-    print_comparison(result, sizes, named.left_out)
+    print_comparison(result, sizes, named.left_out | missing)
     return 0
 
 

@@ -262,7 +262,8 @@ def size(options: Texts) -> Answer:
 
 
 def _response(core: TachometerSpec, methods: Methods, source: Source) -> Answer:
-    specs = {core.method: core} | methods.specs | {core.method: core} | dict.fromkeys(BASELINES)
+    rivals = [name for name, one in BASELINES.items() if not one.missing]
+    specs = {core.method: core} | methods.specs | {core.method: core} | dict.fromkeys(rivals)
     found = comparison(
         core, specs, of_texts, source, earliest=None, latest=math.inf, tune=False, tradeoff=False, bar=no_bar
     )

@@ -12,9 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from tachometry.sim import build
 from tachometry.sim.studies.comparing import baselines, estimators
 from tachometry.sim.studies.comparing.baselines import Estimate, Steps
 from tachometry.sim.studies.comparing.compare import Curve
+from tachometry.sim.studies.comparing.edge_filters import edge_kalman
 from tachometry.spec.language.option import ParameterError, parse_flag, parse_whole
 from tachometry.spec.language.units import FREQUENCY, TIME, parse_bandwidth, read_nearest, short_time
 
@@ -52,7 +54,9 @@ class Parameter:
 _PERIOD = Parameter("period_s", _time)
 _FILTER = Parameter("filter_s", _time)
 _ORDER = Parameter("order", parse_whole)
+_NOISE = Parameter("process_noise", _number)
 _BOUND = {"bound": Parameter("bound", _number)}
+_PLACES = {"edge-noise": Parameter("edge_noise", _number), **_BOUND}
 
 
 @dataclass(frozen=True)
@@ -69,6 +73,11 @@ class Baseline:
     # values of arguments that are left out, where they are not those of the model
     fixed: Mapping[str, Any] = field(default_factory=dict)
 
+    @property
+    def missing(self) -> str:
+        """Reason why it does not run on this machine: the filters on edges need a C++ compiler."""
+        return "it needs a C++ compiler" if "edge-noise" in self.parameters and not build.find_compiler() else ""
+
 
 def _simplefoc(steps: Steps, period_s: float, filter_s: float) -> Estimate:
     raw = baselines.mixed_method(steps, period_s)
@@ -83,6 +92,7 @@ def _moteus(steps: Steps, period_s: float, pll_filter_hz: float) -> Estimate:
 _PERIODS = "33us 100us 250us 500us 1ms 2ms 4ms 8ms"
 _FILTERS = "0us 500us 1ms 2ms 5ms 10ms 20ms 50ms"
 _EDGES = "4 6 8 12 16 24 32 48 64 96 128 192 256 512 1024 2048 4096 8192"
+_NOISES = "0.01 0.03 0.1 0.3 1 3 10 30 100 300 1e3 3e3"
 
 BASELINES: dict[str, Baseline] = {
     "difference": Baseline(
@@ -174,6 +184,33 @@ BASELINES: dict[str, Baseline] = {
             },
         ),
         {"period_s": 100e-6},
+    ),
+    "kf-cv": Baseline(
+        "Kalman filter on time-stamped edges, constant velocity",
+        "process noise 10 rad/s^1.5",
+        partial(edge_kalman, order=2),
+        {"process-noise": _NOISE, **_PLACES},
+        ({"process-noise": f"0 1e-4 3e-4 1e-3 3e-3 {_NOISES} 1e4", "bound": "1 2"},),
+        {"process_noise": 10.0},
+    ),
+    "kf-ca": Baseline(
+        "Kalman filter on time-stamped edges, constant acceleration",
+        "process noise 1e3 rad/s^2.5",
+        edge_kalman,
+        {"process-noise": _NOISE, **_PLACES},
+        ({"process-noise": f"0 {_NOISES} 50 200 500 2e3 5e3 1e4 2e4 3e4 5e4 1e5 2e5 3e5 5e5 1e6 3e6", "bound": "1 2"},),
+        {"process_noise": 1e3},
+    ),
+    "imm": Baseline(
+        "two Kalman filters as kf-ca, as interacting multiple model",
+        "process noise 3 and 3e4 rad/s^2.5, dwell 100 ms",
+        edge_kalman,
+        {"calm": _NOISE, "agile": Parameter("agile", _number), "dwell": Parameter("dwell_s", _time), **_PLACES},
+        (
+            {"calm": "0 3 300", "agile": "10 1e3 3e4 1e6", "dwell": "10ms 100ms 1s", "edge-noise": "0.05 0.15"}
+            | {"bound": "1 2"},
+        ),
+        {"process_noise": 3.0, "agile": 3e4},
     ),
 }
 

@@ -128,7 +128,7 @@ def test_a_faster_clock_does_not_read_worse() -> None:
 
 def test_a_read_delay_makes_all_values_of_a_ramp_older() -> None:
     truth = record("ramp:0:100rad/s:200ms", pulses_per_rev=500)
-    methods = ["track", "m", "least-squares", "hostmot2"]
+    methods = ["track", "m", "least-squares", "kf-ca", "hostmot2"]
     at_once, late = (compared(truth, methods, read_delay=delay) for delay in (0.0, 90e-6))
     for name in methods:
         assert np.mean(late[name]) - np.mean(at_once[name]) == pytest.approx(-500 * 90e-6, rel=0.02), name
