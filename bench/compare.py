@@ -56,10 +56,10 @@ LinuxCNC's timestamps of 0.5 µs are the best by far.""",
     ),
     Situation(
         "Ramp",
-        """Times in clocks of 0.1 µs are better than a lattice of 100 µs. The tracking method does not lag behind a
-ramp: its error is that of holding a value for a tick. Least squares over 16 edges are nearly as good, and M/T (T_c is a
-tick) has five times its error. T and LinuxCNC's timestamps follow. The tracking loops lag by a constant 2 ms. On a
-lattice of ticks S is the best.""",
+        """Times in clocks of 0.1 µs are better than a lattice of 100 µs. Tracking and the
+Kalman filters with acceleration (`kf-ca`, `imm`) do not lag behind a ramp, and have the least errors. Least squares
+over 16 edges, M/T (T_c is a tick) and T are next, before LinuxCNC's timestamps. The tracking loops lag by a constant
+2 ms. On a lattice of ticks S is the best.""",
         "--motion ramp:0:100rad/s:400ms --from 40ms",
     ),
     Situation(
@@ -67,16 +67,16 @@ lattice of ticks S is the best.""",
         """T measures one count, so its result contains every error of the disc and all jitter. The same is true of
 M/T while its windows are short. With windows of 1 ms it is as good as LinuxCNC's timestamps. Methods that
 average over more keep their errors and their delays. The memory of the tracking method grows on a ramp
-as it does at constant speed, and it learns where the edges of the disc are. So its error is as small as with an ideal
-encoder, and a sixtieth of theirs.""",
+as it does at constant speed, and it learns where the edges of the disc are. Its error is about a hundredth of
+theirs.""",
         f"--methods {WITH_LONG_MT} "
         "--motion ramp:0:100rad/s:400ms --from 40ms --jitter 0.05 --nonuniformity 0.1 --phase-error 10 --seed 1",
     ),
     Situation(
         "Reversals",
-        """Here delay matters: filters of 5 ms are worse than all others but M. The tracking method has less than
-a third of the error of least squares, which is second. LinuxCNC's timestamps and M/T follow with eleven and thirteen
-times its error.""",
+        """Here delay matters: filters of 5 ms are worse than all others but M. Tracking and the
+Kalman filters with acceleration have the least errors, less than half of that of least squares over 16 edges.
+LinuxCNC's timestamps and M/T follow.""",
         "--motion sine:50rad/s:5Hz:1s --from 100ms --jitter 0.05 --seed 1",
     ),
 )
@@ -93,12 +93,11 @@ for bit, and float models of what other projects use and of estimators in the li
 - [single situations](#single-situations) with everything as it comes.
 
 {verdict}
-
 **When to use what**, according to the tables below:
 
-- *Tracking* (`--method track`): use it where its tick and its area are to be had. It has no settings, and the least
-  error of the cores in all situations but few where lines are at fault. It says the acceleration and the position
-  between counts. It needs a timer, block RAMs, and ticks of about 830 clocks, or of 250 with a multiplier of the FPGA.
+- *Tracking* (`--method track`): use it if the tick has 830 clocks (250 with a multiplier of the FPGA), and 800 cells
+  and block RAMs are free. It has no settings. Of our cores it has the smallest error, except with faulty lines. It also
+  outputs the acceleration and the position between counts.
 - *S*: use it if there is no timer faster than the tick, or if ticks are shorter than 18 µs, down to a clock; it is the
   smallest but for M, it has no divider, and its steady error is least around multiples of the unit velocity. After
   a step to just such a speed it shows the speed before for the maximum time, though
@@ -116,9 +115,8 @@ for bit, and float models of what other projects use and of estimators in the li
   1 ms is fast enough and software divides.
 - *Tracking loops* (ODrive, moteus): they are smooth, with a delay that is constant and known, 2 ms with their defaults.
 - *Filtered differences, SimpleFOC*: they are good at constant speed, and have 5 ms of delay everywhere else.
-- *Least squares over edges* (float, with a matrix solved for each value): tuned for each situation it is as good as
-  tracking on ramps and slow shafts, and worse on reversals, sines and at speed. With one setting for all it is far
-  worse on a ramp and at speed with a real disc.
+- *Least squares and Kalman filters on edges* (float): use them if software has the time of every edge and each drive
+  can be tuned. The first table has the best setting for each row, the one with one setting for all what is left of it.
 
 """
 
@@ -140,15 +138,19 @@ delay; cores without a setting to be tuned are single points.
 ABOUT_MODELS = """## The float models
 
 Their options follow the name and a colon, as in `--methods hostmot2:period=500us,kalman:order=3:process-noise=1e5`.
-`period` is the control period, at which the encoder is read. Process noise is the standard deviation of the
-acceleration in rad/s² (order 2) or of its derivative in rad/s³ (order 3); a noise bound is in counts. `least-squares`
-is not faster than 2 counts in the time since the latest edge, which its papers do not have.
+`period` is the control period, at which the encoder is read; a control period begins when a loop reads the value.
+`least-squares`, `kf-cv`, `kf-ca` and `imm` use the time of each edge, and have a new value for each read. The process
+noise of `kalman` is the standard deviation of the acceleration in rad/s² (order 2) or of its derivative in rad/s³
+(order 3). That of the filters on edges is the root of the density of white acceleration in rad/s^1.5 (`kf-cv`) or of
+its white derivative in rad/s^2.5 (`kf-ca`; `calm` and `agile` of `imm`). `edge-noise` is the standard deviation of the
+place of an edge, in counts. The speed is at most `bound` counts over the time since the latest edge, which the papers
+do not have. A noise bound is in counts.
 """
 SINGLE = f"""## Single situations
 
 Each table from here on is the output of the command above it. The float models of other projects have the settings that
-these come with: they read the encoder every 1 ms, ODrive every 125 µs, moteus every 33 µs; those of the literature read
-it every 100 µs.
+these come with: they read the encoder every 1 ms, ODrive every 125 µs, moteus every 33 µs; `foaw` and `kalman` read it
+every 100 µs.
 
 {textwrap.fill(" ".join(situations.READ.split()), 120)}
 
