@@ -23,12 +23,12 @@ from tachometry.spec.formats.tracking import (
     POWER_BITS,
     POWERS,
     RESULT_BITS,
+    TABLE_BITS,
     WIDTH,
 )
 from tachometry.spec.formats.tracking_code import BY_FACTOR, HOW_BITS, Program
 from tachometry.spec.formats.tracking_units import Start
 
-TABLE_BITS = 18
 _LOW = CHANCE_BITS - DROPPED  # zeros below a product
 _GAIN_LOW = LOG_BITS - (GAIN_STEPS - 1).bit_length()
 

@@ -27,6 +27,7 @@ CHANCE_BITS = 8  # bits below the LSB that decide which way a result is rounded
 RESULT_BITS = WIDTH - 4  # a product or a power is held below 2^36, so that sums of some fit the word
 DROPPED = 5  # no product is shifted by less
 LOG_INDEX, EXP_INDEX = 7, 8  # bits of the index of the tables of log2 and of 2^x
+TABLE_BITS = 18  # of what is read from a table, as a block RAM has: a logarithm in it is less than 64
 GAIN_STEPS, GAIN_OCTAVES = 16, 8  # entries of a table of gains: an octave has 16
 GAINS = GAIN_STEPS * GAIN_OCTAVES
 GAINS_FROM = 2 * GAIN_STEPS  # they begin at X = 1/4
@@ -112,7 +113,8 @@ class Tracking:
     def acceleration_bits(self) -> int:
         """Fraction bits of the acceleration."""
         greatest = greatest_acceleration(self.counts_per_rev) * self.counts_per_rev / (2 * math.pi) / self.clock_hz**2
-        return WIDTH - 2 - math.ceil(math.log2(greatest))
+        in_table = (1 << TABLE_BITS - LOG_BITS) - 6 + PLACE_BITS - 2 * self.time_bits  # the greatest gain: 60 < 2^6
+        return min(WIDTH - 2 - math.ceil(math.log2(greatest)), in_table)
 
     @cached_property
     def shifts(self) -> dict[str, int]:
