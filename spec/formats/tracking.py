@@ -112,7 +112,10 @@ class Tracking:
     @cached_property
     def acceleration_bits(self) -> int:
         """Fraction bits of the acceleration."""
-        greatest = greatest_acceleration(self.counts_per_rev) * self.counts_per_rev / (2 * math.pi) / self.clock_hz**2
+        greatest = min(
+            greatest_acceleration(self.counts_per_rev) * self.counts_per_rev / (2 * math.pi) / self.clock_hz**2,
+            8 * self.max_count / self.longest_tick**2,  # within a tick to what the velocity's word holds
+        )
         in_table = (1 << TABLE_BITS - LOG_BITS) - 6 + PLACE_BITS - 2 * self.time_bits  # the greatest gain: 60 < 2^6
         return min(WIDTH - 2 - math.ceil(math.log2(greatest)), in_table)
 
