@@ -175,7 +175,7 @@ class Tracking:
             "least_noise": one >> 10, "most_noise": 1 << RESULT_BITS - 2,  # which no error reaches
             "slope": round(self.slope * (1 << self.shifts["acceleration"])),
             "clock": 1 << t, "tick": self.tick_cycles,
-            "most_since": self.most_since, "most_memory": int(self.memory_seconds * self.clock_hz) << t,
+            "most_since": self.most_since, "most_memory": min(int(self.memory_seconds * self.clock_hz) << t, most),
             "max_time": self.max_time << t, "forget": forget << t,
             "most_quality": (1 << self.quality_bits) - 1,
             "most": most, "most_shown": shown, "least_shown": -shown,

@@ -251,6 +251,14 @@ class TrackTachometer(TachometerSpec):
                 f"needs a tick of {shortest} clocks",
                 self,
             )
+        most = (self.form.constants["most"] >> self.form.time_bits) // self.timing.tick_cycles
+        if self.timing.max_ticks > most:
+            typed = self.timing.time_of(most)
+            raise ParameterError(
+                "max_ticks",
+                f"must be from 2 to {most} with method track, not {self.timing.max_ticks}: try --max-time {typed}",
+                f"takes at most {most} ticks",
+            )
         self._check_fine()
 
     @cached_property
