@@ -47,8 +47,9 @@ def prepared(core: "wiring.Component", board: Board) -> Any:
     """Return Amaranth's build plan of a component on a board: equal components give equal files with equal tools."""
     from tachometry.boards.fpga.top import BoardTop
 
+    options = "" if board.flow is None else board.flow.synthesis
     with bundled_yosys():
-        return board.platform().prepare(BoardTop(core, board), TOP, emit_src=False)
+        return board.platform().prepare(BoardTop(core, board), TOP, emit_src=False, synth_opts=options)
 
 
 def build(core: "wiring.Component", board: Board, say: Callable[[str], None]) -> Built:

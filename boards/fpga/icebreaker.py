@@ -1,7 +1,7 @@
 """The iCEBreaker has an iCE40UP5K and three PMODs."""
 
 from tachometry.boards.fpga.board import Board, Header, pins, platform
-from tachometry.boards.fpga.flow import ice40
+from tachometry.boards.fpga.flow import ice40_up
 
 ICEBREAKER = Board(
     name="icebreaker",
@@ -24,7 +24,7 @@ ICEBREAKER = Board(
     attributes={"IO_STANDARD": "SB_LVCMOS"},
     pull_up={"PULLUP": 1},
     leds=2,
-    flow=ice40("--up5k", "--package", "sg48"),
+    flow=ice40_up("--up5k", "--package", "sg48"),
     # Its jumpers are such that the FPGA reads the flash memory; its own memory cannot be written.
     loader=("-b", "ice40_generic", "-f"),
 )

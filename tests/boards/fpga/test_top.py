@@ -164,6 +164,7 @@ def test_every_board_has_pins_for_every_port(name: str, bus: str) -> None:
             assert (PULL_UP[name].format(signal) in lines) == (port in inputs), port
     if name == "icebreaker":
         assert plan.files["top.il"].count("parameter \\PULLUP 1\n") == len(inputs) + 2 * (bus == "uart")
+        assert "synth_ice40 -device u -dsp -top top" in plan.files["top.ys"]
     assert any("uart_0__tx__io" in line for line in lines) == (bus == "uart")
     assert not any("/site-packages/" in str(content) for content in plan.files.values())
 
