@@ -33,6 +33,7 @@ AUTO = "auto"
 _PREFERRED = ("track", "mt", "s")  # the first of them that can be is what `auto` takes
 # Where none is given, the tick is the first of these with which the method can be.
 _TICKS = "20us 25us 40us 50us 100us 125us 160us 200us 250us 320us 500us 1ms".split()
+_MOST_MACHINES = 2  # with which tracking of many axes is taken: each has multipliers of the FPGA, and takes 800 cells
 _OF_TICK = ("tick", "tick_cycles", "max_time", "max_ticks")  # parameters that another tick may suit
 
 
@@ -94,22 +95,28 @@ def of_texts(
     given = {name: text for name, text in texts.items() if text is not None}
     method = method_named(method)
 
-    def made(name: str) -> TachometerSpec:
-        return _with_tick(given, lambda texts: _of_method(name, texts), within)
+    def made(name: str, build_core: Callable[[TachometerSpec], object] | None) -> TachometerSpec:
+        return _with_tick(given, lambda texts: _of_method(name, texts), build_core)
+
+    def few_machines(spec: TachometerSpec) -> None:
+        core = spec if within is None else within(spec)
+        if isinstance(core, AxesSpec):
+            _check_machines(core)
 
     if method != AUTO:
-        return made(method)
+        try:
+            return made(method, few_machines)
+        except _Crowded:  # it was asked for
+            return made(method, within)
     methods, asked = _able(given)
     refused: list[str] = []
     for name in methods:
         try:
-            spec = made(name)
+            spec = made(name, within if name == methods[-1] else few_machines)
             core = spec if within is None else within(spec)
             of_axes = core if isinstance(core, AxesSpec) else None
             if name != methods[-1]:
                 _check_division(spec)
-                if of_axes is not None:
-                    _check_machines(of_axes)
         except ParameterError as error:
             if name == methods[-1]:
                 raise
@@ -143,7 +150,7 @@ def _with_tick(
             if error.parameter not in _OF_TICK:
                 raise
             refused.append(_of_whole(error, within))
-    raise refused[0]
+    raise next((error for error in refused if isinstance(error, _Crowded)), refused[0])
 
 
 def _of_whole(error: ParameterError, within: Callable[[TachometerSpec], object] | None) -> ParameterError:
@@ -176,11 +183,15 @@ def _able(given: Mapping[str, str]) -> tuple[list[str], list[str]]:
     return [name for name in _PREFERRED if name in able] or able, asked
 
 
+class _Crowded(ParameterError):
+    """The turns of many axes take more machines than tracking is taken with."""
+
+
 def _check_machines(core: AxesSpec) -> None:
-    """Refuse tracking of many axes with a ParameterError where one machine has no time for all turns of a tick."""
-    if (machines := core.plan.machines) > 1:
-        other = f"--tick {core.words.tick_of_one_machine}"
-        raise ParameterError("tick_cycles", f"must be longer: try {other}", f"needs {machines} machines or {other}")
+    """Refuse tracking of many axes with a ParameterError where the turns of a tick take more than two machines."""
+    if (machines := core.plan.machines) > _MOST_MACHINES:
+        other = f"--tick {core.words.tick_of(_MOST_MACHINES)}"
+        raise _Crowded("tick_cycles", f"must be longer: try {other}", f"needs {machines} machines or {other}")
 
 
 def _check_division(spec: TachometerSpec) -> None:

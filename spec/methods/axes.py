@@ -160,16 +160,15 @@ class AxesWords(Follows["AxesSpec"]):
             f"greatest speed: an axis is looked at {spec.rounds} times in a tick, so it has at most as many counts",
         )
 
-    @property
-    def tick_of_one_machine(self) -> str:
-        """The shortest tick from that of the core on in which one datapath has time for the turns of all axes."""
+    def tick_of(self, machines: int) -> str:
+        """Return the shortest tick from that of the core on in which so many datapaths end the turns of all axes."""
         spec, slots, timing = self.spec.tachometer, self.spec.slots, self.spec.timing
 
         def enough(cycles: int) -> bool:
             axis = _possible(spec, self.spec.axes, cycles)
-            return axis is not None and axis.plan.machines == 1
+            return axis is not None and axis.plan.machines <= machines
 
-        turns = (1 + spec.external_tick) * (self.spec.axes * self.spec.turn_cycles + slots)
+        turns = (1 + spec.external_tick) * (-(-self.spec.axes // machines) * self.spec.turn_cycles + slots)
         return next_written_time(max(turns, timing.tick_cycles), timing.clock_hz, enough)
 
     @property

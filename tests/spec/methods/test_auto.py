@@ -14,22 +14,30 @@ from tachometry.spec.registers.map import RegisterMap
 PPR = {"ppr": "500", "max-speed": "400rad/s"}
 # Clocks of its program, serial and with multipliers of the FPGA.
 SERIAL, QUICK = (of_texts("track", PPR | {"multiplier": kind}).latency.busy for kind in ("serial", "block"))
-# A tick for four turns of the quick program, a clock longer than that, and a round; and one for a turn of each machine.
-FOUR, ONE = (next_written_time(clocks, 48_000_000) for clocks in (4 * (QUICK + 1) + 4, QUICK + 1 + 3 * 2 + 4))
+# Ticks for one, two and four turns of the quick program on each machine: a turn has a clock more than the program, the
+# machines begin two clocks apart, and a round is left.
+ONE, TWO, FOUR = (
+    next_written_time(turns * (QUICK + 1) + (4 // turns - 1) * 2 + 4, 48_000_000) for turns in (1, 2, 4)
+)
+
+
+def clocks(tick: str) -> int:
+    """Return the clocks of a tick at 48 MHz."""
+    return whole_clocks("tick", tick, 48_000_000)
+
+
 CHOICES = [
     ({}, "track", f"as its {SERIAL} clocks fit the tick of 960 clocks"),
     ({"tick": "10us"}, "track", f"as its {QUICK} clocks fit the tick of 480 clocks"),
     ({"tick": "10us", "external-tick": "yes"}, "track", f"as its {QUICK} clocks fit the tick of 480 clocks"),
     ({"tick": "5us"}, "mt", f"as track needs a tick of {QUICK} clocks"),
     ({"tick": "250ns"}, "s", f"as track needs a tick of {QUICK} clocks and mt needs a tick of 20 clocks"),
-    ({"axes": "4"}, "s", f"as track needs 2 machines or --tick {FOUR} and mt is of one axis"),
-    (
-        {"axes": "4", "tick": FOUR},
-        "track",
-        f"as the turns of 4 axes fit the tick of {whole_clocks('tick', FOUR, 48_000_000)} clocks",
-    ),
+    ({"axes": "4", "tick": ONE}, "s", f"as track needs 4 machines or --tick {TWO} and mt is of one axis"),
+    ({"axes": "4", "tick": TWO}, "track", f"as the turns of 4 axes fit the tick of {clocks(TWO)} clocks"),
+    ({"axes": "4", "tick": FOUR}, "track", f"as the turns of 4 axes fit the tick of {clocks(FOUR)} clocks"),
+    ({"axes": "32"}, "track", "as the turns of 32 axes fit the tick of 4800 clocks"),
     ({"axes": "4", "tick": "5us"}, "s", f"as track needs --tick {ONE} and mt is of one axis"),
-    ({"axes": "64", "clock": "12MHz"}, "s", "as track needs 11 machines or --tick 1424us and mt is of one axis"),
+    ({"axes": "64", "clock": "12MHz"}, "s", "as track needs 11 machines or --tick 720us and mt is of one axis"),
     ({"bounds": "yes"}, "mt", "as it has --bounds"),
     ({"bounds": "yes", "tick": "250ns"}, "s", "as mt needs a tick of 23 clocks"),
     ({"max-memory": "5ms"}, "track", "as it has --max-memory"),
@@ -99,6 +107,8 @@ TICKS = [
     ({"clock": "200kHz"}, "s", 4),  # track would need 2 ms
     ({"clock": "12MHz", "method": "s"}, "s", 240),
     ({"clock": "12MHz", "method": "track", "multiplier": "serial"}, "track", 1200),
+    ({"axes": "32"}, "track", 4800),
+    ({"axes": "8"}, "track", 1200),
     ({"clock": "12MHz", "axes": "32", "tick": "40us"}, "s", 480),
     ({"clock": "12MHz", "tick": "20us"}, "mt", 240),
 ]

@@ -203,8 +203,8 @@ def test_times_are_in_clocks_of_the_core() -> None:
     assert {port.unit for port in held.ports if port.name.startswith("interval")} == {"1000 clocks"}
 
 
-@pytest.mark.parametrize(("axes", "method"), [(8, "track"), (32, "s")])
-def test_auto_takes_tracking_where_one_machine_has_time_for_all_axes(axes: int, method: str) -> None:
+@pytest.mark.parametrize(("axes", "method"), [(8, "track"), (32, "track"), (64, "s")])
+def test_auto_takes_tracking_where_two_machines_have_time_for_all_axes(axes: int, method: str) -> None:
     texts = {"ppr": "500", "max-speed": "1000rad/s", "tick": "100us", "max-time": "100ms"}
     assert of_texts("auto", texts, lambda spec: with_axes(spec, axes, parallel=False)).method == method
 
