@@ -228,6 +228,8 @@ class VirtualEncoder(EncoderOptions):
 
     def absent(self, quarter: IntArray) -> NDArray[np.bool_]:
         """Tell which quarters belong to teeth that are not there."""
+        if self.missing_teeth is None:
+            return np.zeros(quarter.shape, dtype=np.bool_)
         missing = Encoder(self.pulses_per_rev, sensor=self.sensor, missing_teeth=self.missing_teeth).missing
         absent: NDArray[np.bool_] = quarter // 4 % self.pulses_per_rev >= self.pulses_per_rev - missing
         return absent
