@@ -137,7 +137,8 @@ class Tracking:
     @cached_property
     def most_since(self) -> int:
         """Longest time from an event on that is told from longer ones: a product by it needs no left shift."""
-        return (1 << (min(self.shifts["velocity"], self.shifts["place"]) + DROPPED + 6)) - 1
+        bits = min(self.shifts["velocity"], self.shifts["place"]) + DROPPED + 6
+        return (1 << min(bits, WIDTH - 2)) - 1
 
     @property
     def memory_seconds(self) -> Fraction:

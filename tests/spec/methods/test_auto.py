@@ -16,9 +16,7 @@ PPR = {"ppr": "500", "max-speed": "400rad/s"}
 SERIAL, QUICK = (of_texts("track", PPR | {"multiplier": kind}).latency.busy for kind in ("serial", "block"))
 # Ticks for one, two and four turns of the quick program on each machine: a turn has a clock more than the program, the
 # machines begin two clocks apart, and a round is left.
-ONE, TWO, FOUR = (
-    next_written_time(turns * (QUICK + 1) + (4 // turns - 1) * 2 + 4, 48_000_000) for turns in (1, 2, 4)
-)
+ONE, TWO, FOUR = (next_written_time(turns * (QUICK + 1) + (4 // turns - 1) * 2 + 4, 48_000_000) for turns in (1, 2, 4))
 
 
 def clocks(tick: str) -> int:
