@@ -42,7 +42,7 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     turns.append(np.full(4 * edges, rng.choice([1, -1])))
     clock = np.append(0, np.cumsum(np.maximum(1 + steps, np.rint(np.concatenate(gaps))).astype(np.int64)))
     turn = np.concatenate(turns)
-    went = np.interp(np.arange(int(clock[-1])), clock[1:], np.cumsum(turn) * spec.encoder.decoding / per_period)
+    edge, counts = clock[1:], np.cumsum(turn) * spec.encoder.decoding / per_period
     if steps:
         at, level = pulsed(clock.astype(np.float64), turn, float(clock[-1] + 2), directed=sensor.name == "step-dir")
         clock = at.astype(np.int64)
@@ -62,7 +62,7 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     trace = _probed(spec, PinTrace(clock, a, b, n_clocks, z, c=c if "c" in sensor.lines else None), seed)
     trace = _open(spec, trace, seed)
     if spec.compare is not None and spec.compare.depth:
-        trace = _listed(spec, trace, went, seed)
+        trace = _listed(spec, trace, np.interp(np.arange(edge[-1]), edge, counts), seed)
     for name in spec.front_end.controls:
         few = 30 if name == "preset" else 6
         high = spec.filter_clocks + int(rng.integers(1, 30))

@@ -64,7 +64,7 @@ def _filled(text: str, **parts: str | int) -> str:
 
 
 def _changes(pins: list[Port], trace: Trace) -> np.ndarray:
-    return np.stack([trace.clock, *(trace.lines[pin.name] for pin in pins)], axis=1).astype(np.int64)
+    return np.stack([trace.clock, *(trace.lines[pin.name].astype(np.int64) for pin in pins)], axis=1)
 
 
 class LintingVerilator(Verilator):
