@@ -1,0 +1,119 @@
+"""Speeds at which ticks meet the same edges again and again: tracking locks to no wrong speed, whatever the disc.
+
+A tick takes some edges together. Where their displacements cancel, the noise that is learned is less than the error of
+an edge that comes alone.
+"""
+
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.nightly import nightly, only
+from support.track_grid import PHASES, RATES, SETTLE, TICKS, clocks_of, search
+from support.tracking import core
+from support.verilog import LintingVerilator
+
+from tachometry.sim import build, golden
+from tachometry.sim.engines.cxxrtl import Cxxrtl
+from tachometry.sim.engines.engine import Engine
+from tachometry.sim.signals.recording import PinTrace, quadrature
+from tachometry.sim.signals.run import Run
+from tachometry.sim.studies.lockstep import lockstep
+from tachometry.spec import TrackTachometer, of_texts
+
+Pattern = tuple[float, ...]
+QUADRATURE = core(clock="48MHz", tick="20us", max_speed="1000rad/s")
+SLOW = core(ppr="16", clock="1MHz", tick="1ms")  # which tests/sim/engines/test_idle.py compiles, too
+HALLS = of_texts("track", {"sensor": "hall", "pole-pairs": "10", "tick": "1ms", "max-speed": "700rad/s"})
+assert isinstance(HALLS, TrackTachometer)
+# The edges of halls have a period of six, and tracking learns four kinds: a period of three is noise to it.
+HALL_PATTERNS = [(0, 1), (1, 0, 0), (1, 1, 1, 0, 0, 0)]
+MORE_HALLS = [*HALL_PATTERNS, (0.5, -0.5, 0), (1, 0, 0, 0, 0, 0), (1, 1, 0, 0, 0, 0), (0.5, -0.2, 0.3, -0.5, 0.2, 0)]
+DISCS = [(0, 1), (0, 1, 0, 0), (1, 1, 0, 0), (0.5, -0.5, 0.5, -0.2)]
+
+
+def check(spec: TrackTachometer, pattern: Pattern, phases: int, drift: float = 0) -> int:
+    """Search the grid; the error is at most a tenth of that of M/T, or 0.2 % of the speed. Return the number of cells.
+
+    Rates are `drift` of them faster than fractions.
+    """
+    speeds = [float(rate) * (1 + drift) for rate in RATES]
+    cycles = spec.form.tick_cycles
+    found = np.array([search(spec, clocks_of(speed, cycles, pattern, phases), speed) for speed in speeds])
+    tracked, divided = np.moveaxis(found, -1, 0)
+    wrong = np.argwhere(tracked > np.maximum(divided / 10, 0.002))
+    assert not len(wrong), [(str(RATES[rate]), int(cell), tracked[rate, cell]) for rate, cell in wrong[:10]]
+    assert divided.max() > 0.3
+    return int(tracked.size)
+
+
+def test_no_wrong_speed_is_locked_to_in_quadrature() -> None:
+    assert check(QUADRATURE, (0, 1), PHASES) == 28_896
+
+
+@pytest.mark.parametrize("pattern", only(HALL_PATTERNS, MORE_HALLS), ids=str)
+def test_no_wrong_speed_is_locked_to_with_halls(pattern: Pattern) -> None:
+    check(HALLS, pattern, 2)
+
+
+@nightly
+@pytest.mark.parametrize("pattern", MORE_HALLS, ids=str)
+def test_no_wrong_speed_is_locked_to_with_halls_in_more_phases(pattern: Pattern) -> None:
+    check(HALLS, pattern, PHASES)
+
+
+@nightly
+@pytest.mark.parametrize("drift", [0, 5e-4, -2e-3])
+@pytest.mark.parametrize("pattern", DISCS, ids=str)
+def test_no_wrong_speed_is_locked_to_on_other_discs(pattern: Pattern, drift: float) -> None:
+    check(QUADRATURE, pattern, PHASES, drift)
+    check(SLOW, pattern, PHASES // 2, drift)
+
+
+# Rates, and cells of these. The first ones once read half of the speed; the last two are the worst of all now.
+CELLS = [
+    *((Fraction(1), cell) for cell in (107, 92, 46)), (Fraction(4, 5), 108), (Fraction(15, 7), 109),
+    *((Fraction(1, 5), cell) for cell in (114, 117)),
+]  # fmt: skip
+REST = 10  # ticks before
+
+
+def played(rate: Fraction, cell: int, engine: Engine | None) -> Run:
+    """Return what pins show of a cell of `SLOW`; with an engine, the core must show all that the golden model does."""
+    cycles = SLOW.form.tick_cycles
+    clock = clocks_of(float(rate), cycles)[cell] + REST * cycles - SLOW.latency.pin_to_count
+    level = quadrature(np.arange(len(clock) + 1) * (-1) ** cell)
+    ends = (TICKS + REST) * cycles + SLOW.latency.tick_to_velocity + 10
+    trace = PinTrace(np.append(0, clock), level & np.uint8(1), level >> np.uint8(1), ends).until(ends)
+    if engine is None:
+        return golden.run(SLOW, trace)
+    found = lockstep(SLOW, trace, engine)
+    assert found.n_mismatches == 0, found.first
+    return found.actual
+
+
+def error(rate: Fraction, cell: int, engine: Engine | None = None) -> float:
+    """Return the greatest error after `SETTLE` ticks, in parts of the speed."""
+    velocity = played(rate, cell, engine).updates.velocity[REST + SETTLE : REST + TICKS]
+    assert len(velocity) == TICKS - SETTLE
+    return float(np.abs((-1) ** cell * velocity * 2.0**-SLOW.form.velocity_out / float(rate) - 1).max())
+
+
+@pytest.mark.parametrize(("rate", "cell"), CELLS)
+def test_pins_show_the_errors_of_the_search(rate: Fraction, cell: int) -> None:
+    """In the golden model, which needs no compiler."""
+    wrong = error(rate, cell)
+    assert wrong < 0.002
+    if build.find_compiler():
+        assert wrong == search(SLOW, clocks_of(float(rate), SLOW.form.tick_cycles), float(rate))[cell, 0]
+
+
+def test_the_core_plays_the_cell_that_was_worst() -> None:
+    assert error(*CELLS[0], Cxxrtl()) < 0.002
+
+
+@nightly
+def test_the_exported_core_plays_the_worst_cells(tmp_path: Path) -> None:
+    for rate, cell in CELLS:
+        assert error(rate, cell, LintingVerilator(tmp_path, few=False)) < 0.002
