@@ -29,7 +29,7 @@ SPEC = TrackTachometer(
 EXTERNAL = replace(
     SPEC, timing=Timing(1_000_000, 1400, 10), external_tick=True, max_tick_cycles=1400, multiplier="serial"
 )
-NAMES = ["velocity", "acceleration", "position_fine", "quality", "interval", "forced"]
+NAMES = ["velocity", "acceleration", "position_fine", "quality", "interval", "forced", "stalled"]
 COMPILED = compiled.clock_by_clock
 Update = tuple[int, ...]  # clock, and what the update says
 

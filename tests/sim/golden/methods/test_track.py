@@ -14,7 +14,7 @@ from support.tracking import core, windows
 from tachometry.sim import build, golden
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.methods import track
-from tachometry.sim.golden.methods.track_recursion import Recursion
+from tachometry.sim.golden.methods.track_recursion import TRACKS, Recursion
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.spec import TrackTachometer
 from tachometry.spec.formats.tracking import GAIN_STEPS, LOG_BITS, PLACE_BITS, WIDTH, Tracking
@@ -79,6 +79,39 @@ def test_twins_on_more_motions(seed: int) -> None:
     spec = CORES[[*CORES][seed % len(CORES)]]
     held = windows(spec, seed, 20_000)
     assert np.array_equal(compiled(spec, held), track.rows(spec.form, spec.program.lead)(held))
+
+
+@pytest.mark.parametrize("seed", only([1], range(12)))
+def test_the_fine_position_stays_at_an_edge_that_no_count_has_shown(seed: int) -> None:
+    """In ticks without a count, on all motions; the place of the edge is the one that was learned."""
+    spec = CORES["default"]
+    state, held = Recursion(spec.form, spec.program.lead), 0
+    for row in windows(spec, seed, 3000).rows():
+        number, end = row[0], row[7]
+        place = state.tick(*row)[1]
+        if not number and state.phase == TRACKS:
+            upper = max((1 << PLACE_BITS - 1) - state.offsets[end], 0)
+            lower = min(-(1 << PLACE_BITS - 1) - state.offsets[(end - 1) & 3], 0)
+            assert lower <= place <= upper
+            held += place in (lower, upper)
+    assert held > 100
+
+
+@pytest.mark.parametrize("name", only(["external"], CORES))
+def test_a_stalled_shaft_has_no_velocity(name: str) -> None:
+    """Both come with the first tick that ends when the last count, or the reset, is the maximum time ago.
+
+    Ticks of the first core come from outside, and their lengths differ.
+    """
+    spec = CORES[name]
+    spec = replace(spec, timing=replace(spec.timing, max_ticks=40))
+    held = windows(spec, 1, 2500)
+    end = np.cumsum(held.length)
+    latest = np.maximum.accumulate(np.where(held.number > 0, end - held.last, 0))
+    velocity, *_, stalled = compiled(spec, held).T
+    assert np.array_equal(stalled, (held.number == 0) & (end - latest >= spec.form.max_time))
+    assert not velocity[stalled > 0].any()
+    assert velocity[np.flatnonzero(np.diff(stalled) > 0)].any()
 
 
 def test_gains_are_those_of_least_squares() -> None:
