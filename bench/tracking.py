@@ -3,7 +3,11 @@
 import argparse
 import math
 import sys
+from collections.abc import Callable, Iterator
+from functools import partial
+from itertools import product
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from motions import OTHERS, REAL, SITUATIONS, Situation
@@ -13,82 +17,133 @@ from situations import Cell, core
 
 from tachometry.sim import golden
 from tachometry.sim.signals.recording import PinTrace, quadrature
-from tachometry.spec import TachometerSpec
+from tachometry.spec import TachometerSpec, TrackTachometer
 
-# What the recursion has in floating point with seeds 301 to 310, in rad/s, at each tick; the rest is rounding alone.
-IN_FLOAT = {
-    "100us": {
-        "ramp": 5.1e-4, "ramp, real": 2.1e-3, "ramp, bad": 4.1e-3, "very slow, real": 7.5e-5,
-        "slow, jitter": 3.9e-5, "slow, real": 7e-5, "fast, jitter": 2.5e-5, "fast, real": 2.4e-5, "fast, bad": 4.3e-5,
-        "unit velocity, vibration": 0.157, "unit velocity, vibration, real": 0.157,
-        "reversals, jitter": 0.114, "reversals, real": 0.137, "reversals, bad": 0.198,
-        "slow sine": 0.0116, "slow sine, real": 0.0447, "fast sine": 0.277, "fast sine, real": 1.31,
-        "trapezoid": 0.18, "trapezoid, real": 0.261, "stop": 0.702, "stop, real": 0.828,
-    },
-    "20us": {
-        "ramp": 5.1e-4, "ramp, real": 2.07e-3, "ramp, bad": 4.1e-3, "very slow, real": 7.5e-5,
-        "slow, jitter": 3.9e-5, "slow, real": 7e-5, "fast, jitter": 7e-5, "fast, real": 7e-5, "fast, bad": 1e-4,
-        "unit velocity, vibration": 0.152, "unit velocity, vibration, real": 0.152,
-        "reversals, jitter": 0.11, "reversals, real": 0.137, "reversals, bad": 0.201,
-        "slow sine": 0.0116, "slow sine, real": 0.0447, "fast sine": 0.18, "fast sine, real": 1.19,
-        "trapezoid": 0.176, "trapezoid, real": 0.281, "stop": 0.651, "stop, real": 0.757,
-    },
-}  # fmt: skip
+sys.path.append(str(Path(__file__).parents[1] / "tests"))
+from support.tracking import in_float
+
+TICKS = ("100us", "20us")
 FIRST_SEED = 401
 ALARM = 0.002  # more of the speed than noise makes while the memory is long
+BURST = 0.01  # more than the disc makes that is off centre
+SWINGS = ((220, 60, 5), (300, 50, 3), (250, 40, 7))  # mean and amplitude in rad/s, frequency in Hz
+STARTS = 200
 # The speed leaves its constant value so slowly that one error hardly differs from the next.
 GENTLE = Situation("gentle S-curve", "constant:100rad/s:300ms+s-curve:100rad/s:0:300ms+stop:60ms", "50ms", REAL)
 
 
-def found(situation: Situation, seed: int, tick: str) -> tuple[float, float]:
-    """Return RMS error (rad/s) at the clocks in which updates appear, and how many errors are within `quality` (%)."""
-    spec = core(situation, "track", {"tick": tick})
+class Errors(NamedTuple):
+    """Errors of all updates of a situation, in rad/s, and what `quality` shows there."""
+
+    core: NDArray[np.float64]
+    quality: NDArray[np.float64]
+    model: NDArray[np.float64] | None  # of the independent model in floating point
+
+    @property
+    def covered(self) -> float:
+        """Updates whose error is within `quality`, in %."""
+        return 100 * float(np.mean(np.abs(self.core) <= self.quality))
+
+
+def errors(spec: TachometerSpec, situation: Situation, seed: int, beside: bool = False) -> Errors:
+    """Return the errors at the clocks in which updates appear; `beside` them those of the model."""
+    assert isinstance(spec, TrackTachometer)
     truth = situation.record(seed)
-    updates = golden.run(spec, PinTrace.of(truth.recording, spec)).updates
+    trace = PinTrace.of(truth.recording, spec)
+    updates = golden.run(spec, trace).updates
     seconds = updates.clock / spec.timing.clock_hz
     judged = (seconds > situation.start_s) & (seconds <= truth.recording.duration)
-    lsb = spec.scale.rad_per_s_per_lsb
-    wrong = updates.velocity[judged] * lsb - truth.true_speed(seconds[judged])
-    covered = np.abs(wrong) <= updates.quality[judged] * lsb
-    return math.sqrt(float(np.mean(wrong * wrong))), 100 * float(np.mean(covered))
+    right, lsb = truth.true_speed(seconds[judged]), spec.scale.rad_per_s_per_lsb
+    model = in_float(spec, trace, updates.clock)[judged] - right if beside else None
+    return Errors(updates.velocity[judged] * lsb - right, updates.quality[judged] * lsb, model)
 
 
-def row(situation: Situation, n_seeds: int) -> list[str]:
+def rms(wrong: NDArray[np.float64] | None) -> float:
+    """Return the root of the mean square."""
+    return math.nan if wrong is None else math.sqrt(float(np.mean(wrong * wrong)))
+
+
+def row(situation: Situation, n_seeds: int, beside: bool = True) -> list[str]:
     """Return a situation's row: at each tick the error, that of floating point, and the share within `quality`."""
     seeds = range(FIRST_SEED, FIRST_SEED + (n_seeds if situation.random else 1))
     cells = [situation.name]
-    for tick, in_float in IN_FLOAT.items():
-        errors, covered = zip(*(found(situation, seed, tick) for seed in seeds), strict=True)
-        expected = in_float.get(situation.name)
-        cells += [str(Cell.of("", [*errors])), f"{expected:.3g}" if expected else "", f"{np.mean(covered):.0f}"]
+    for tick in TICKS:
+        found = [errors(core(situation, "track", {"tick": tick}), situation, seed, beside) for seed in seeds]
+        model = np.mean([rms(one.model) for one in found])
+        cells += [str(Cell.of("", [rms(one.core) for one in found])), f"{model:.3g}"]
+        cells.append(f"{np.mean([one.covered for one in found]):.0f}")
     return cells
 
 
-def steady(spec: TachometerSpec, rate: float, jitter: float, seed: int) -> NDArray[np.float64]:
-    """Return the errors of all updates in a million counts, in parts of the speed, which is `rate` counts a tick.
-
-    Each edge is off by chance, by `jitter` counts (standard deviation). The first 2000 updates are left out.
+def disc(rng: np.random.Generator, off_centre: float, real: bool) -> NDArray[np.float64]:
+    """Return the displacements of the edges of a disc of 500 lines, in counts; also those of a real one. It begins
+    anywhere.
     """
-    n, rng = 1_000_000, np.random.default_rng(seed)
-    place = np.arange(1, n) + rng.normal(0, jitter, n - 1)
+    edges = np.arange(2000)
+    displaced = off_centre * np.sin(2 * np.pi * edges / 2000)
+    if real:
+        displaced += rng.uniform(-0.1, 0.1, 2000) + (edges % 2) / 9
+    return np.roll(displaced, rng.integers(2000))
+
+
+def steady(
+    spec: TachometerSpec,
+    rate: float,
+    jitter: float,
+    seed: int,
+    *,
+    off_centre: float = 0,
+    real: bool = False,
+    n: int = 1_000_000,
+    first: int = 2000,
+) -> NDArray[np.float64]:
+    """Return the errors of all updates but the first ones, in parts of the speed, which is `rate` counts a tick.
+
+    There are n counts. Each edge is off by chance, by `jitter` counts (standard deviation). See `disc` for the others.
+    """
+    rng = np.random.default_rng(seed)
+    place = np.arange(3, n + 2) + rng.normal(0, jitter, n - 1) + np.resize(disc(rng, off_centre, real), n - 1)
     clock = np.maximum.accumulate(np.round(place * spec.timing.tick_cycles / rate).astype(np.int64))
     level = quadrature(np.arange(n))
     trace = PinTrace(np.append(0, clock), level & np.uint8(1), level >> np.uint8(1), int(clock[-1]) + 10)
-    velocity = golden.run(spec, trace).updates.velocity[2000:] * spec.scale.rad_per_s_per_lsb
+    velocity = golden.run(spec, trace).updates.velocity[first:] * spec.scale.rad_per_s_per_lsb
     right = rate / spec.timing.tick_cycles * spec.timing.clock_hz * 2 * math.pi / spec.encoder.counts_per_rev
     return np.abs(velocity / right - 1)
 
 
-def alarms(millions: int) -> str:
-    """Return the table of false alarms, in so many millions of counts each."""
-    spec, rows = core(GENTLE, "track", {"tick": "20us"}), []
-    for rate in (0.5, 1.0, 2.0):
-        for jitter in (0.05, 0.1):
-            worst = [float(steady(spec, rate, jitter, seed).max()) for seed in range(millions)]
-            false = sum(error > ALARM for error in worst)
-            rows.append([f"{rate:g}", f"{jitter:g}", str(millions), str(false), f"{100 * max(worst):.1g}"])
-    heads = ["counts a tick", "jitter (counts)", "millions of counts", "of them with an alarm", "greatest error (%)"]
-    return markdown(heads, rows)
+def swinging(mean: float, amplitude: float, hertz: float, off_centre: float, seed: int) -> NDArray[np.float64]:
+    """Return the errors of all updates where a speed (rad/s) swings for 12 s, in parts of its mean, on a real disc."""
+    vibration = f"{amplitude / (2 * math.pi * hertz):.5f}rad:{hertz}Hz"
+    faults = {**REAL, "eccentricity": str(off_centre), "vibration": vibration}
+    situation = Situation("", f"constant:{mean}rad/s:12s", "1s", faults)
+    return np.abs(errors(core(situation, "track", {"tick": "20us"}), situation, seed).core) / mean
+
+
+def alarm_cases(runs: int) -> Iterator[tuple[str, str, float, int, Callable[[int], NDArray[np.float64]]]]:
+    """Yield motion, encoder, error of an alarm, number of runs, and the errors of a run by its seed."""
+    steadily = partial(steady, core(GENTLE, "track", {"tick": "20us"}))
+    for rate, jitter in product((0.5, 1.0, 2.0), (0.05, 0.1)):
+        yield f"{rate:g} counts a tick", f"jitter {jitter:g}", ALARM, runs, partial(steadily, rate, jitter)
+    for rate, off, real in product((1.0, 1.5, 1.7, 2.5), (0.0, 0.25, 1.0), (False, True)):
+        encoder = f"{'real' if real else 'jitter 0.05'}, {off:g} off centre"
+        run = partial(steadily, rate, 0.05, off_centre=off, real=real, first=50_000)
+        yield f"{rate:g} counts a tick", encoder, BURST, runs, run
+    for (mean, amplitude, hertz), off in product(SWINGS, (0.0, 0.25)):
+        name = f"{mean} ± {amplitude} rad/s at {hertz} Hz"
+        yield name, f"real, {off:g} off centre", BURST, runs, partial(swinging, mean, amplitude, hertz, off)
+    start = partial(steadily, 0.318, 0.05, off_centre=0.25, real=True, n=16_000, first=5000)
+    yield "start at 50 rad/s", "real, 0.25 off centre", BURST, STARTS, start
+
+
+def alarms(runs: int) -> str:
+    """Return the table of false alarms."""
+    rows = []
+    for motion, encoder, limit, n, run in alarm_cases(runs):
+        worst = [float(run(seed).max()) for seed in range(n)]
+        false = sum(error > limit for error in worst)
+        rows.append([motion, encoder, f"{100 * limit:g}", str(n), str(false), f"{100 * max(worst):.1g}"])
+    heads = ["motion", "encoder", "alarm from (%)", "runs", "of them with an alarm", "greatest error (%)"]
+    return markdown(heads, rows, left=range(2))
 
 
 def main() -> None:
@@ -96,9 +151,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=20, metavar="N", help="seeds of what is random (%(default)s)")
     parser.add_argument("-o", "--output", type=Path, metavar="PAGE", help="page whose table is replaced")
-    parser.add_argument("--alarms", type=int, metavar="N", help="count false alarms in N million counts instead")
+    parser.add_argument("--alarms", type=int, metavar="N", help="count false alarms in N runs of each motion instead")
     given = parser.parse_args()
-    ticks = [f"{tick[:-2]} µs" for tick in IN_FLOAT]
+    ticks = [f"{tick[:-2]} µs" for tick in TICKS]
     heads = ["situation", *(head for tick in ticks for head in (f"ticks of {tick}", "in float", "within quality (%)"))]
     rows = [] if given.alarms else [row(situation, given.seeds) for situation in (*SITUATIONS, *OTHERS, GENTLE)]
     table = alarms(given.alarms) if given.alarms else markdown(heads, rows)

@@ -4,10 +4,12 @@ from collections import Counter
 
 import numpy as np
 from numpy.typing import NDArray
+from reference.tracker import Tracker
 
-from tachometry.sim.golden.front_end import Steps
+from tachometry.sim.golden.front_end import Steps, decoded
 from tachometry.sim.golden.methods.track import Windows
 from tachometry.sim.golden.methods.track_recursion import Recursion, log2
+from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TrackTachometer, of_texts
 from tachometry.spec.formats.tracking import CHANCE_BITS, GAIN_STEPS, GAINS, LOG_BITS, PLACE_BITS, WIDTH
 from tachometry.spec.formats.tracking_code import OUTPUTS, Instruction, Jump, Left, Program
@@ -175,3 +177,20 @@ def motions(spec: TrackTachometer, rng: np.random.Generator, n_ticks: int) -> tu
 def windows(spec: TrackTachometer, seed: int, n_ticks: int) -> Windows:
     """Return what the ticks of such motions hold."""
     return Windows.of(*motions(spec, np.random.default_rng(seed), n_ticks), spec.form.most_number)
+
+
+def in_float(spec: TrackTachometer, trace: PinTrace, updates: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the velocities in rad/s that the independent model shows for the updates in these clocks."""
+    form, steps = spec.form, decoded(spec, trace)
+    memory, forget, longest = (form.constants[name] >> form.time_bits for name in ("most_memory", "forget", "max_time"))
+    model = Tracker(memory, forget, longest, spec.program.lead)
+    ends = updates - spec.latency.datapath
+    counted = steps.step != 0
+    clocks, ways = steps.clock[counted], steps.step[counted]
+    places = np.searchsorted(clocks, np.append(-1, ends), side="right").tolist()
+    counts = list(zip(clocks.tolist(), ways.tolist(), strict=True))
+    shown = [
+        model.tick(end, counts[first:until])
+        for end, first, until in zip(ends.tolist(), places, places[1:], strict=False)
+    ]
+    return np.array(shown) * (2 * np.pi / spec.encoder.counts_per_rev * spec.timing.clock_hz)

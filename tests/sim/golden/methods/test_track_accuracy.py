@@ -1,73 +1,40 @@
-"""The errors of the tracking method, beside those of an independent model in floating point, and those promised."""
+"""The errors of the tracking method, beside those of an independent model in floating point."""
 
-import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from motions import SITUATIONS, Situation
-from reference.tracker import Tracker
+from numpy.typing import NDArray
 from support.nightly import nightly, only, only_rows
 from support.script import load
 from support.tracking import core
 
-from tachometry.sim import golden
-from tachometry.sim.golden.front_end import decoded
-from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TrackTachometer
 
 SPEC = core(tick="100us", max_time="100ms", max_speed="1000rad/s")
 ROWS = {situation.name: situation for situation in SITUATIONS}
 BENCH = load("tracking")
-PROMISED = BENCH.IN_FLOAT["100us"]
 
 
 def errors(situation: Situation, seed: int, beside: bool = False, spec: TrackTachometer = SPEC) -> tuple[float, float]:
     """Return the RMS in rad/s of the golden model at its updates, and that of the independent one."""
-    truth = situation.record(seed)
-    trace = PinTrace.of(truth.recording, spec)
-    updates = golden.run(spec, trace).updates
-    seconds = updates.clock / spec.timing.clock_hz
-    judged = (seconds > situation.start_s) & (seconds <= truth.recording.duration)
-    right = truth.true_speed(seconds[judged])
-
-    def rms(velocity: np.ndarray) -> float:
-        return math.sqrt(float(np.mean((velocity[judged] - right) ** 2)))
-
-    own = rms(updates.velocity * spec.scale.rad_per_s_per_lsb)
-    if not beside:
-        return own, math.nan
-    form, steps = spec.form, decoded(spec, trace)
-    memory, forget, longest = (form.constants[name] >> form.time_bits for name in ("most_memory", "forget", "max_time"))
-    model = Tracker(memory, forget, longest, spec.program.lead)
-    ends = updates.clock - spec.latency.datapath
-    counted = steps.step != 0
-    clocks, ways = steps.clock[counted], steps.step[counted]
-    places = np.searchsorted(clocks, np.append(-1, ends), side="right").tolist()
-    counts = list(zip(clocks.tolist(), ways.tolist(), strict=True))
-    shown = [
-        model.tick(end, counts[first:until])
-        for end, first, until in zip(ends.tolist(), places, places[1:], strict=False)
-    ]
-    count = 2 * np.pi / spec.encoder.counts_per_rev * spec.timing.clock_hz
-    return own, rms(np.array(shown) * count)
+    found = BENCH.errors(spec, situation, seed, beside)
+    return BENCH.rms(found.core), BENCH.rms(found.model)
 
 
 @pytest.mark.parametrize("name", ["reversals, real", "slow sine, real", "fast sine, real"])
 def test_quality_covers_the_error_in_about_two_ticks_of_three(name: str) -> None:
-    truth = ROWS[name].record(401)
-    updates = golden.run(SPEC, PinTrace.of(truth.recording, SPEC)).updates
-    seconds = updates.clock / SPEC.timing.clock_hz
-    right = truth.true_speed(seconds) / SPEC.scale.rad_per_s_per_lsb
-    covered = (np.abs(updates.velocity - right) <= updates.quality)[seconds > ROWS[name].start_s]
-    assert 0.58 < np.mean(covered) < 0.78
+    assert 58 < BENCH.errors(SPEC, ROWS[name], 401).covered < 78
 
 
 # One of each kind of motion; where a speed is constant and the disc ideal only the rounding is left.
 QUICK = ["ramp, real", "fast, jitter", "reversals, real", "slow sine, real", "fast sine", "trapezoid, real", "stop"]
+ROUNDED = ["very slow", "fast", "rest on an edge"]
 
 
-@pytest.mark.parametrize("name", only(QUICK, PROMISED))
+@pytest.mark.parametrize("name", only(QUICK, [name for name in ROWS if name not in ROUNDED]))
 def test_the_errors_are_those_of_an_independent_model(name: str) -> None:
     seeds = (401,) if name in QUICK else (401, 402, 403)
     own, other = np.mean(np.square([errors(ROWS[name], seed, beside=True) for seed in seeds]), axis=0) ** 0.5
@@ -125,14 +92,6 @@ def test_a_memory_that_keeps_falling_grows_again() -> None:
     assert own < 1.1 * other
 
 
-@nightly
-@pytest.mark.parametrize("name", PROMISED)
-def test_the_errors_are_those_that_are_promised(name: str) -> None:
-    """In the median of twenty seeds, as one of them may have a false alarm."""
-    seeds = range(401, 421) if ROWS[name].random else (1,)
-    assert np.median([errors(ROWS[name], seed)[0] for seed in seeds]) < 1.1 * PROMISED[name]
-
-
 @pytest.mark.parametrize("share", only([1, 1.001], [0.999, 1, 1.001]))
 def test_the_greatest_speed_is_measured_as_well_as_others(share: float) -> None:
     """On a bad disc, whose edges are nearer to each other than at the greatest speed, and up to the full scale."""
@@ -155,3 +114,21 @@ def test_a_speed_that_begins_to_change_gently_is_followed() -> None:
 def test_no_noise_of_a_disc_is_taken_for_a_change_of_the_speed(rate: float) -> None:
     """In a million counts whose edges are off by chance, of which a threshold of 4·D_s takes some for a change."""
     assert BENCH.steady(SPEC, rate, 0.05, 2).max() < BENCH.ALARM
+
+
+def test_a_disc_off_centre_raises_no_alarm() -> None:
+    """Nor in a swing, which is followed within twice the error of an alarm."""
+    spec = core(tick="20us", max_time="100ms", max_speed="400rad/s")
+    assert BENCH.steady(spec, 1.5, 0.05, 2, off_centre=0.25, n=500_000, first=50_000).max() < BENCH.BURST
+    assert BENCH.swinging(220, 60, 5, 0.25, 2).max() < 2 * BENCH.BURST
+
+
+@nightly
+@pytest.mark.parametrize("case", list(BENCH.alarm_cases(10)), ids=lambda case: f"{case[0]}, {case[1]}")
+def test_false_alarms_are_few(case: tuple[str, str, float, int, Callable[[int], NDArray[np.float64]]]) -> None:
+    """None in 10^7 counts at a constant speed; few in swings and starts, and these are small."""
+    motion, _, limit, runs, run = case
+    worst = np.array([run(seed).max() for seed in range(runs)])
+    share = 0.5 if "±" in motion else 0.04 if "start" in motion else 0
+    assert np.mean(worst > limit) <= share
+    assert worst.max() < (2.5 if share else 1) * limit

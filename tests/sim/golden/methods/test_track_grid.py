@@ -5,11 +5,12 @@ an edge that comes alone.
 """
 
 from fractions import Fraction
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support.nightly import nightly, only
+from support.nightly import nightly, only_rows
 from support.track_grid import PHASES, RATES, SETTLE, TICKS, clocks_of, search
 from support.tracking import core
 from support.verilog import LintingVerilator
@@ -18,7 +19,6 @@ from tachometry.sim import build, golden
 from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.sim.engines.engine import Engine
 from tachometry.sim.signals.recording import PinTrace, quadrature
-from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import TrackTachometer, of_texts
 
@@ -28,8 +28,14 @@ SLOW = core(ppr="16", clock="1MHz", tick="1ms")  # which tests/sim/engines/test_
 HALLS = of_texts("track", {"sensor": "hall", "pole-pairs": "10", "tick": "1ms", "max-speed": "700rad/s"})
 assert isinstance(HALLS, TrackTachometer)
 # The edges of halls have a period of six, and tracking learns four kinds: a period of three is noise to it.
-HALL_PATTERNS = [(0, 1), (1, 0, 0), (1, 1, 1, 0, 0, 0)]
-MORE_HALLS = [*HALL_PATTERNS, (0.5, -0.5, 0), (1, 0, 0, 0, 0, 0), (1, 1, 0, 0, 0, 0), (0.5, -0.2, 0.3, -0.5, 0.2, 0)]
+QUICK_HALLS = [((0, 1), 2), ((1, 0, 0), 2), ((1, 1, 1, 0, 0, 0), 2)]
+MORE_HALLS = [
+    *(pattern for pattern, _ in QUICK_HALLS),
+    (0.5, -0.5, 0),
+    (1, 0, 0, 0, 0, 0),
+    (1, 1, 0, 0, 0, 0),
+    (0.5, -0.2, 0.3, -0.5, 0.2, 0),
+]
 DISCS = [(0, 1), (0, 1, 0, 0), (1, 1, 0, 0), (0.5, -0.5, 0.5, -0.2)]
 
 
@@ -52,15 +58,9 @@ def test_no_wrong_speed_is_locked_to_in_quadrature() -> None:
     assert check(QUADRATURE, (0, 1), PHASES) == 28_896
 
 
-@pytest.mark.parametrize("pattern", only(HALL_PATTERNS, MORE_HALLS), ids=str)
-def test_no_wrong_speed_is_locked_to_with_halls(pattern: Pattern) -> None:
-    check(HALLS, pattern, 2)
-
-
-@nightly
-@pytest.mark.parametrize("pattern", MORE_HALLS, ids=str)
-def test_no_wrong_speed_is_locked_to_with_halls_in_more_phases(pattern: Pattern) -> None:
-    check(HALLS, pattern, PHASES)
+@pytest.mark.parametrize(("pattern", "phases"), only_rows(QUICK_HALLS, [*QUICK_HALLS, *product(MORE_HALLS, [PHASES])]))
+def test_no_wrong_speed_is_locked_to_with_halls(pattern: Pattern, phases: int) -> None:
+    check(HALLS, pattern, phases)
 
 
 @nightly
@@ -79,23 +79,21 @@ CELLS = [
 REST = 10  # ticks before
 
 
-def played(rate: Fraction, cell: int, engine: Engine | None) -> Run:
-    """Return what pins show of a cell of `SLOW`; with an engine, the core must show all that the golden model does."""
+def error(rate: Fraction, cell: int, engine: Engine | None = None) -> float:
+    """Return the greatest error that pins show of a cell of `SLOW` after `SETTLE` ticks, in parts of the speed.
+
+    With an engine, the core must show all that the golden model does.
+    """
     cycles = SLOW.form.tick_cycles
     clock = clocks_of(float(rate), cycles)[cell] + REST * cycles - SLOW.latency.pin_to_count
     level = quadrature(np.arange(len(clock) + 1) * (-1) ** cell)
     ends = (TICKS + REST) * cycles + SLOW.latency.tick_to_velocity + 10
     trace = PinTrace(np.append(0, clock), level & np.uint8(1), level >> np.uint8(1), ends).until(ends)
-    if engine is None:
-        return golden.run(SLOW, trace)
-    found = lockstep(SLOW, trace, engine)
-    assert found.n_mismatches == 0, found.first
-    return found.actual
-
-
-def error(rate: Fraction, cell: int, engine: Engine | None = None) -> float:
-    """Return the greatest error after `SETTLE` ticks, in parts of the speed."""
-    velocity = played(rate, cell, engine).updates.velocity[REST + SETTLE : REST + TICKS]
+    run = golden.run(SLOW, trace)
+    if engine is not None:
+        found = lockstep(SLOW, trace, engine, expected=run)
+        assert found.n_mismatches == 0, found.first
+    velocity = run.updates.velocity[REST + SETTLE : REST + TICKS]
     assert len(velocity) == TICKS - SETTLE
     return float(np.abs((-1) ** cell * velocity * 2.0**-SLOW.form.velocity_out / float(rate) - 1).max())
 
