@@ -20,13 +20,12 @@ from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.sim.engines.engine import Engine
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.sim.studies.lockstep import lockstep
-from tachometry.spec import TrackTachometer, of_texts
+from tachometry.spec import TachometerSpec, TrackTachometer, of_texts
 
 Pattern = tuple[float, ...]
 QUADRATURE = core(clock="48MHz", tick="20us", max_speed="1000rad/s")
 SLOW = core(ppr="16", clock="1MHz", tick="1ms")  # which tests/sim/engines/test_idle.py compiles, too
 HALLS = of_texts("track", {"sensor": "hall", "pole-pairs": "10", "tick": "1ms", "max-speed": "700rad/s"})
-assert isinstance(HALLS, TrackTachometer)
 # The edges of halls have a period of six, and tracking learns four kinds: a period of three is noise to it.
 QUICK_HALLS = [((0, 1), 2), ((1, 0, 0), 2), ((1, 1, 1, 0, 0, 0), 2)]
 MORE_HALLS = [
@@ -39,11 +38,12 @@ MORE_HALLS = [
 DISCS = [(0, 1), (0, 1, 0, 0), (1, 1, 0, 0), (0.5, -0.5, 0.5, -0.2)]
 
 
-def check(spec: TrackTachometer, pattern: Pattern, phases: int, drift: float = 0) -> int:
+def check(spec: TachometerSpec, pattern: Pattern, phases: int, drift: float = 0) -> int:
     """Search the grid; the error is at most a tenth of that of M/T, or 0.2 % of the speed. Return the number of cells.
 
     Rates are `drift` of them faster than fractions.
     """
+    assert isinstance(spec, TrackTachometer)
     speeds = [float(rate) * (1 + drift) for rate in RATES]
     cycles = spec.form.tick_cycles
     found = np.array([search(spec, clocks_of(speed, cycles, pattern, phases), speed) for speed in speeds])
