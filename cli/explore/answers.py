@@ -41,6 +41,7 @@ from tachometry.sim.signals.recording import Recording
 from tachometry.sim.signals.scratch import scratch
 from tachometry.sim.studies.comparing.comparison import Source, comparison
 from tachometry.sim.studies.comparing.rivals import BASELINES
+from tachometry.sim.studies.estimate import FAMILIES
 from tachometry.sim.studies.plan import Plan, Plans, cells_of, default_range
 from tachometry.sim.studies.size import CORE, SEEDS, TARGETS, measure_core, versions
 from tachometry.sim.theory.performance import REAL_DISC
@@ -243,15 +244,20 @@ def replay(options: Texts, capture: Texts, name: str, data: str) -> Answer:
             raise Refused(str(error).replace(str(file), name)) from error
 
 
+def estimate(options: Texts) -> Answer:
+    """Return the estimated cells and greatest clock of a core, as `generate` prints them."""
+    return _run(_generate, options, lambda asked: {"size": "; ".join(f"{name} {text}" for name, text in asked.size)})
+
+
 def size(options: Texts) -> Answer:
-    """Return cells and Fmax of a core on an ECP5, as `compare --size` measures them in half a minute."""
+    """Return cells and Fmax of a core on its family, as `compare --size` measures them in half a minute."""
 
     def of(asked: Asked) -> Answer:
         try:
             tools = versions()
             verilog = replace(asked, name=CORE).texts()[f"{CORE}.v"]
             ports = ports_on(asked.spec, asked.on)
-            found = measure_core(asked.spec, TARGETS["ECP5"], verilog, tools, ports, SEEDS[:3])
+            found = measure_core(asked.spec, TARGETS[FAMILIES[asked.family].target], verilog, tools, ports, SEEDS[:3])
         except RuntimeError as error:
             raise click.ClickException(f"the size cannot be measured: {error}") from error
         figures = {name: f"{value:.0f}" for name, value in found.figures.items() if value and name != "latency"}
@@ -379,5 +385,5 @@ def _typed(texts: Texts) -> str:
 
 
 FUNCTIONS: dict[str, Callable[..., Answer]] = {
-    function.__name__: function for function in (options, check, curves, files, respond, replay, size)
+    function.__name__: function for function in (options, check, curves, files, respond, replay, estimate, size)
 }

@@ -9,6 +9,7 @@ import click
 from click.core import ParameterSource
 
 from tachometry.cli.options.option import Group, Option, default_of, kind_of, later, option
+from tachometry.sim.studies.estimate import FAMILIES
 from tachometry.spec import (
     AUTO,
     METHODS,
@@ -23,7 +24,7 @@ from tachometry.spec import (
 from tachometry.spec.language import option as declaration
 from tachometry.spec.language.option import options_of
 from tachometry.spec.language.units import parse_frequency
-from tachometry.spec.registers.buses import DEFAULT_BAUD
+from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD
 
 _PREFIX = "core_"
 _CLOCK = "clock"
@@ -234,6 +235,26 @@ def core_click_options() -> dict[str, click.Option]:
     """Return all options of cores and methods by their names."""
     return {option.opts[0].removeprefix("--"): option for option in (*_common(), *own_click_options())}
 
+
+BUS = option(
+    "Files",
+    "--bus",
+    type=click.Choice(["none", *BUSES], case_sensitive=False),
+    help="Give the core registers on a bus: "
+    + "; ".join(f"{bus.name}: {bus.help}" for bus in BUSES.values())
+    + ". Files that describe and read the registers are written, too. Without it: none, or what --for needs.",
+)
+
+FAMILY = option(
+    "Files",
+    "--family",
+    type=click.Choice([*FAMILIES], case_sensitive=False),
+    default="ecp5",
+    help="FPGA of the estimated cells and greatest clock: "
+    + ", ".join(f"{name} for {family.title}" for name, family in FAMILIES.items())
+    + ". Nothing that is written depends on it.",
+)
+"""Handed over as the name of the family."""
 
 BAUD = option(
     "Files",

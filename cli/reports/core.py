@@ -2,12 +2,13 @@
 
 import numpy as np
 
+from tachometry.sim.studies.estimate import SPREAD, Estimate
 from tachometry.sim.studies.plan import Plans
 from tachometry.sim.theory.performance import REAL_DISC
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control import AnySpec
 from tachometry.spec.formats.velocity_output import NATIVE
-from tachometry.spec.language.units import SpeedUnit, plural, short_time
+from tachometry.spec.language.units import SpeedUnit, parse_frequency, plural, short_time
 from tachometry.spec.registers.buses import Bus, registers_on
 from tachometry.spec.registers.field import WORD
 from tachometry.spec.registers.manifest import manifest
@@ -120,6 +121,21 @@ def advice(plans: Plans) -> list[tuple[str, str]]:
         error = f"{1 / gain:.1f} times the error" if gain < 1 / 1.05 else "no more error"
     cells = f"{float(f'{abs(found.cells):.2g}'):,.0f} cells {'more' if found.cells > 0 else 'fewer'}"
     return [("advice", f"{found.method}: {error}, {cells} (--method {found.method})")]
+
+
+def size_rows(found: Estimate) -> list[tuple[str, str]]:
+    """Return rows of the estimated cells and greatest clock, and a warning if the clock of the core is above it."""
+    clock = f"about {found.clock_hz / 1e6:.0f} MHz ({found.title}); seeds of the router differ by {SPREAD:.0%}"
+    rows = [
+        ("cells", f"about {found.cells:,}, with {found.flip_flops:,} flip-flops ({found.title})"),
+        ("greatest clock", clock),
+    ]
+    if found.is_too_slow:
+        remedy = "take a lower --clock, or route it with several seeds"
+        if found.remedy is not None:
+            remedy = f"{found.remedy[0]} reaches about {found.remedy[1] / 1e6:.0f} MHz"
+        rows.append(("warning", f"--clock {parse_frequency.written(found.wanted_hz)} is above that: {remedy}"))
+    return rows
 
 
 def typed_unit(spec: TachometerSpec) -> SpeedUnit:

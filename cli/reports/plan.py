@@ -6,20 +6,23 @@ from collections.abc import Mapping
 from rich.text import Text
 
 from tachometry.cli.reports.axes import axes_rows
-from tachometry.cli.reports.core import advice, configuration, measured
+from tachometry.cli.reports.core import advice, configuration, measured, registers_row, size_rows
 from tachometry.cli.reports.terminal import print_rows, print_table, stdout_console
+from tachometry.sim.studies.estimate import Estimate
 from tachometry.sim.studies.plan import Plan, Plans
 from tachometry.spec import AxesSpec, CoreSpec
 from tachometry.spec.language.units import SpeedUnit, short_time
+from tachometry.spec.registers.buses import Bus
 
 
-def print_plan(core: CoreSpec, plans: Plans, unit: str) -> None:
+def print_plan(core: CoreSpec, plans: Plans, unit: str, bus: Bus | None, size: Estimate) -> None:
     """Print the configuration of a core, what it or an axis of it measures and its plan, speeds in `unit`."""
     expected, spec = plans.table, plans.spec
+    more = [*([] if bus is None else [registers_row(core, bus)]), *size_rows(size)]
     if isinstance(core, AxesSpec):
-        print_rows(axes_rows(core))
+        print_rows([*axes_rows(core), *more])
     else:
-        print_rows([*configuration(spec), *measured(spec, plans), *advice(plans)])
+        print_rows([*configuration(spec), *measured(spec, plans), *advice(plans), *more])
     per_unit = SpeedUnit(unit).rad_per_s
     heads = (f"speed ({unit})", "counts/tick", "m_s (ticks)", "T_m", f"Q_V ({unit})", "error/V (%)", "update by")
     rows = []

@@ -13,7 +13,7 @@ from tachometry.hdl.export.targets.target import TARGETS, bus_for, check_core, t
 from tachometry.hdl.export.verilog import verilog_of
 from tachometry.spec.control import AnySpec
 from tachometry.spec.language.provenance import entries
-from tachometry.spec.registers.buses import bus_of, manifest_on, registers_on
+from tachometry.spec.registers.buses import Bus, bus_of, manifest_on, registers_on
 from tachometry.spec.registers.manifest import manifest
 
 # The files of every core, and what --help says of them.
@@ -62,17 +62,18 @@ def export(
     """
     on = bus_of(bus_for(target, bus), baud, irq=irq)
     described = manifest_of(spec, name, bus, baud, target, irq)
-    files: dict[str, str] = {}
-    top: wiring.Component
-    if on is None:
-        top = core_of(spec)
-    else:
-        registers = registers_on(spec, on)
-        top = BusTachometer(registers, on)
-        files = register_files(registers, name)
-    core = {f"{name}.v": verilog_of(top, described), f"{name}.json": json.dumps(described, indent=2) + "\n"}
+    files = {} if on is None else register_files(registers_on(spec, on), name)
+    core = {
+        f"{name}.v": verilog_of(top_of(spec, on), described),
+        f"{name}.json": json.dumps(described, indent=2) + "\n",
+    }
     core |= kit(spec, name, on) | files
     return core | target_files(target, spec, name, on, core)
+
+
+def top_of(spec: AnySpec, bus: Bus | None) -> wiring.Component:
+    """Return the core, with its registers if it is on a bus."""
+    return core_of(spec) if bus is None else BusTachometer(registers_on(spec, bus), bus)
 
 
 def file_names(name: str) -> list[str]:

@@ -1,5 +1,6 @@
-"""Modules as Verilog-2001."""
+"""Modules as Verilog-2001, and as netlists."""
 
+import json
 import os
 import re
 import sys
@@ -8,7 +9,7 @@ from contextlib import contextmanager
 from typing import Any
 from unittest.mock import patch
 
-from amaranth.back import verilog
+from amaranth.back import rtlil, verilog
 from amaranth.back.verilog import YosysError
 from amaranth.lib import wiring
 
@@ -17,6 +18,24 @@ from tachometry.spec.language.tools import complaint
 
 # Yosys wakes `always @*` by giving a register its value; SystemVerilog does that too early where it is declared.
 _WAKE = re.compile(r"^(  reg) (\\\$auto\$\S+)  = 0;$", re.MULTILINE)
+
+# Passes of Yosys: what a synthesis does first, but for sums, which families make in their own way.
+_GATES = """
+hierarchy -auto-top
+proc
+flatten
+opt
+wreduce
+opt -full
+memory_collect
+opt_mem
+select -set kept t:$add t:$sub t:$neg t:$lt t:$le t:$ge t:$gt t:$mul t:$mem_v2
+select -set rest * @kept %d
+simplemap @rest
+opt
+opt_clean
+write_json
+"""
 
 # Amaranth's name for what it leads through the boundary of a box; viewers of waveforms show it as it stands.
 _LED = re.compile(r"\\port\$(\d+)\$(\d+) ")
@@ -43,3 +62,12 @@ def verilog_of(top: wiring.Component, described: Mapping[str, Any]) -> str:
         text = verilog.convert(top, name=name, emit_src=False)
     text = _LED.sub(r"port_\1_\2 ", _WAKE.sub(r"\1 \2 ;\n  initial \2 = 0;", text))
     return render("NAME.v", **described, name=name, verilog=text.removesuffix("\n"))
+
+
+def netlist_of(top: wiring.Component) -> dict[str, Any]:
+    """Return a module as JSON of Yosys, before it has cells of a family: gates and flip-flops, sums and memories."""
+    text = rtlil.convert(top, name="top", emit_src=False)
+    with bundled_yosys():
+        made = verilog.find_yosys(lambda version: True).run(["-q", "-"], f"read_rtlil <<rtlil\n{text}\nrtlil{_GATES}")
+    module: dict[str, Any] = json.loads(made[made.index("{") :])["modules"]["top"]
+    return module

@@ -165,7 +165,7 @@ class Plans:
         if here is None or own is None:
             return None
         better, smaller = [], []
-        for spec in _others(self.spec):
+        for spec in others(self.spec):
             error, cells = _error(spec, self._worst(spec)), cells_of(spec)
             if error is None or cells is None:
                 continue
@@ -206,7 +206,7 @@ class Advice:
     cells: int  # how many more cells it takes
 
 
-def _others(spec: TachometerSpec) -> Iterator[TachometerSpec]:
+def others(spec: TachometerSpec) -> Iterator[TachometerSpec]:
     """Yield the cores of other methods that can be, with all that methods have alike as in this one."""
     common = {one.name: getattr(spec, one.name) for one in fields(TachometerSpec) if one.name != "chosen"}
     for other in METHODS.values():

@@ -346,6 +346,11 @@ $("measure").addEventListener("click", async () => {
   $("measure").disabled = false;
 });
 
+const estimate = latest(async () => {
+  if (!checked) return;
+  $("size").textContent = (await ask("estimate", { options: part("core") })).size;
+});
+
 const refresh = latest(async () => {
   try {
     checked = await ask("check", { options: part("core") });
@@ -362,6 +367,7 @@ const refresh = latest(async () => {
   $("download").disabled = $("copy").disabled = $("measure").disabled = !checked;
   await over();
   await respond();
+  await estimate();
 });
 
 let timer;

@@ -4,6 +4,7 @@ import base64
 import io
 import json
 import os
+import re
 import shlex
 import tempfile
 from collections.abc import Iterator
@@ -284,6 +285,13 @@ def test_captures_that_are_wrong(client: TestClient, name: str, data: bytes, sai
 def test_motions_that_suit_a_core_are_answered(client: TestClient) -> None:
     for motion in asked(client, "check", options=CORE)["motions"].values():
         assert "error" not in asked(client, "respond", options=CORE, motion={"motion": motion})
+
+
+def test_cells_and_clock_are_estimated_as_generate_prints_them(client: TestClient) -> None:
+    found = asked(client, "estimate", options=CORE | {"family": "ice40up"})
+    assert re.fullmatch(
+        r"cells about [\d,]+, with .*; greatest clock about \d+ MHz \(iCE40 UltraPlus\).*", found["size"]
+    )
 
 
 def test_size_says_what_it_needs(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,110 @@
+"""Estimates of cells and greatest clock: of small netlists by hand, and of cores beside those that nextpnr made."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import pytest
+import size
+from cores import CONFIGURATIONS
+
+from tachometry.sim.studies.estimate import FAMILIES, SPREAD, Estimate, Timing
+from tachometry.sim.studies.mapping import ECP5, ICE40, Fabric, Logic, Mapped
+from tachometry.spec import AxesSpec, STachometer, of_texts
+from tachometry.spec.registers.buses import bus_of
+
+LEVELS = Timing(0, 0, 0, 1, 0, 0, 0, 0, 100, 0)  # a period is the number of tables on the longest path
+CORE = {"ppr": "500", "max-speed": "1000rad/s", "tick": "20us", "max-time": "10ms"}
+
+
+def mapped(fabric: Fabric, cells: Sequence[Mapping[str, Any]], output: list[int]) -> Mapped:
+    ports = {"o": {"direction": "output", "bits": output}}
+    each = [{"parameters": {}, "attributes": {}, **cell} for cell in cells]
+    return Mapped(Logic({"ports": ports, "cells": dict(enumerate(each))}, fabric))
+
+
+def gate(kind: str, a: int, b: int, y: int) -> dict[str, Any]:
+    return {"type": kind, "connections": {"A": [a], "B": [b], "Y": [y]}}
+
+
+def add(kind: str, a: list[int], b: list[int], y: list[int]) -> dict[str, Any]:
+    signs = {"A_SIGNED": "0", "B_SIGNED": "0"}
+    return {"type": kind, "connections": {"A": a, "B": b, "Y": y}, "parameters": signs}
+
+
+def memory(words: int, width: int, **pins: list[int]) -> dict[str, Any]:
+    numbers = {"SIZE": words, "WIDTH": width, "RD_PORTS": 1, "RD_CLK_ENABLE": 1}
+    address = [*range(2, 2 + (words - 1).bit_length())]
+    return {
+        "type": "$mem_v2",
+        "parameters": {name: f"{number:b}" for name, number in numbers.items()},
+        "connections": {"RD_ADDR": address, "RD_DATA": [*range(100, 100 + width)], "WR_DATA": [], **pins},
+    }
+
+
+def test_a_chain_of_gates_becomes_a_tree_of_tables() -> None:
+    """Sixteen bits take five tables of four inputs, two on any path; XOR of AND cannot be put in another order."""
+    chain = [gate("$_AND_", 2, 3, 50), *(gate("$_AND_", 48 + k, 2 + k, 49 + k) for k in range(2, 16))]
+    found = mapped(ICE40, chain, [64])
+    assert (len(found.tables), LEVELS.period(found)) == (5, 2)
+    turns = [gate(("$_AND_", "$_XOR_")[k % 2], 50 + k, 2 + k, 51 + k) for k in range(6)]
+    found = mapped(ICE40, turns, [56])
+    assert (len(found.tables), LEVELS.period(found)) == (2, 2)
+    assert len(mapped(ECP5, turns[:4], [54]).tables) == 1  # of five inputs
+
+
+def test_sums_are_carry_chains_but_for_short_ones() -> None:
+    a, b, y = ([*range(start, start + 8)] for start in (2, 12, 22))
+    found = mapped(ECP5, [add("$add", a, b, y)], y)
+    assert (found.logic.chains, len(found.tables)) == ([8], 0)
+    found = mapped(ECP5, [add("$sub", a[:3], b[:3], y[:3])], y[:3])
+    assert (found.logic.chains, len(found.tables)) == ([], 3)
+    found = mapped(ECP5, [add("$lt", a, b, y[:1])], y[:1])
+    assert (found.logic.chains, len(found.tables)) == ([8], 0)
+
+
+def test_memories_are_blocks_tables_or_constants() -> None:
+    constants = mapped(ECP5, [memory(16, 5)], [*range(100, 105)])
+    assert (len(constants.tables), len(constants.logic.flip_flops), constants.logic.late) == (5, 5, set())
+    written = mapped(ECP5, [memory(16, 5, WR_DATA=[90])], [*range(100, 105)])
+    assert (written.logic.small, written.logic.late) == ([(16, 5)], set())
+    block = mapped(ECP5, [memory(1024, 18)], [*range(100, 118)])
+    assert (len(block.logic.late), LEVELS.period(block)) == (18, 100)
+
+
+def test_what_is_not_known_is_not_left_out() -> None:
+    with pytest.raises(ValueError, match=r"\$div"):
+        mapped(ECP5, [{"type": "$div", "connections": {}}], [])
+
+
+@pytest.mark.parametrize("name", ["reference", "track", "bus-apb"])
+def test_estimates_are_near_what_was_measured(name: str) -> None:
+    rows = size.kept(size.PAGE.read_text(encoding="utf-8"), {})
+    (core,) = (one for one in CONFIGURATIONS if one.name == name)
+    for family, about in FAMILIES.items():
+        if row := rows.get((name, about.target)):
+            found, figures = Estimate.of(core.spec, bus_of(core.bus), family), row.figures
+            assert found.cells == pytest.approx(figures.get("COMB", figures.get("LC")), rel=0.2), family
+            assert found.flip_flops == figures.get("FF", found.flip_flops)
+            if "Fmax" in figures:
+                assert found.clock_hz == pytest.approx(1e6 * figures["Fmax"], rel=0.2), family
+
+
+def test_a_clock_out_of_reach_has_a_remedy_that_reaches_it() -> None:
+    slow = of_texts("track", {**CORE, "clock": "125MHz"})
+    found = Estimate.of(slow, None, "ecp5")
+    assert found.is_too_slow
+    assert found.remedy is not None
+    options, reached = found.remedy
+    other = of_texts(options.removeprefix("--method "), {**CORE, "clock": "125MHz"})
+    assert reached == Estimate.of(other, None, "ecp5").clock_hz >= 125e6
+
+
+def test_a_bus_and_axes_take_cells() -> None:
+    spec = of_texts("s", CORE)
+    assert isinstance(spec, STachometer)
+    alone = Estimate.of(spec, None, "ecp5")
+    on_bus = Estimate.of(spec, bus_of("apb"), "ecp5")
+    axes = Estimate.of(AxesSpec(tachometer=spec, axes=8), None, "ecp5")
+    assert alone.cells + 100 < on_bus.cells < alone.cells + 250
+    assert alone.cells < axes.cells < 4 * alone.cells
+    assert 0 < SPREAD < 0.1
