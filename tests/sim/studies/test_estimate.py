@@ -84,7 +84,7 @@ def test_estimates_are_near_what_was_measured(name: str) -> None:
         if row := rows.get((name, about.target)):
             found, figures = Estimate.of(core.spec, bus_of(core.bus), family), row.figures
             assert found.cells == pytest.approx(figures.get("COMB", figures.get("LC")), rel=0.2), family
-            assert found.flip_flops == figures.get("FF", found.flip_flops)
+            assert found.flip_flops == pytest.approx(figures.get("FF", found.flip_flops), rel=0.05)
             if "Fmax" in figures:
                 assert found.clock_hz == pytest.approx(1e6 * figures["Fmax"], rel=0.2), family
 
