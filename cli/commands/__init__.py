@@ -1,6 +1,7 @@
 """The command `tachometry` with all of its commands, and what their errors say."""
 
 import os
+import subprocess
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from difflib import get_close_matches
@@ -138,6 +139,8 @@ def refusals() -> Iterator[None]:
         raise Refused(_of_system(error)) from error
     except ValueError as error:
         raise Refused(message_of(error)) from error
+    except subprocess.TimeoutExpired as error:
+        raise Refused(f"{os.path.basename(error.cmd[0])} takes longer than {error.timeout:g} s") from error
     except (OverflowError, MemoryError) as error:
         raise Refused(f"a number is too large for this computer: {error or type(error).__name__}") from error
 

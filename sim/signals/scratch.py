@@ -14,11 +14,13 @@ from pathlib import Path
 
 if sys.platform != "win32":
     import fcntl
+    import resource
 
 _running: set["subprocess.Popen[str]"] = set()
 # What ends a command in order. A terminal that is closed says so by SIGHUP, where there is this signal.
 STOPS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _PREFIX, _SUFFIX = ".tachometry-", ".tmp"
+_LONGEST = 4 * 3600.0  # seconds of a tool, of which none takes an hour on a slow computer
 _ABANDONED = 24 * 3600.0  # seconds after which a folder is nobody's, where there are no locks
 
 
@@ -117,19 +119,23 @@ def _lock(folder: Path, *, wait: bool) -> int | None:
 
 
 def run_tool(
-    command: Sequence[str], folder: Path | None = None, text: str = "", seconds: float | None = None
+    command: Sequence[str],
+    folder: Path | None = None,
+    text: str = "",
+    seconds: float | None = None,
+    memory: int | None = None,
 ) -> "subprocess.CompletedProcess[str]":
     """Run a tool with a text as its input; it ends with all of its processes, whatever ends the wait for it.
 
     Its temporary files are in `folder`, in which it runs, if that is given. A signal from the terminal does not reach
-    it.
+    it. It has at most `memory` bytes, by default those of the computer, where Linux keeps it to them.
 
     Raises
     ------
     OSError
         If it cannot be run.
     subprocess.TimeoutExpired
-        If it takes longer than so many seconds.
+        If it takes longer than `seconds`, by default four hours.
     """
     ours = {} if folder is None else dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(folder))
     started: list[subprocess.Popen[str]] = []
@@ -149,7 +155,8 @@ def run_tool(
                 )
             )
         _running.update(started)
-        out, err = started[0].communicate(text, seconds)
+        _limit_memory(started[0].pid, memory)
+        out, err = started[0].communicate(text, _LONGEST if seconds is None else seconds)
     except BaseException:
         with held_back():
             for process in started:
@@ -158,6 +165,15 @@ def run_tool(
     finally:
         _running.difference_update(started)
     return subprocess.CompletedProcess(command, started[0].returncode, out, err)
+
+
+def _limit_memory(pid: int, memory: int | None) -> None:
+    if sys.platform == "linux":
+        wanted = memory or os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+        with suppress(OSError):  # it has ended
+            _, hard = resource.prlimit(pid, resource.RLIMIT_DATA)
+            most = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+            resource.prlimit(pid, resource.RLIMIT_DATA, (most, most))
 
 
 def end_tools() -> None:

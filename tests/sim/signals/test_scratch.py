@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import sys
 import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -12,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from tachometry.cli.commands import Refused, refusals
 from tachometry.sim.signals.scratch import STOPS, end_tools, held_back, run_tool, scratch
 
 
@@ -108,6 +110,14 @@ def test_a_tool_ends_with_all_that_it_has_started(stop: signal.Signals, tmp_path
 def test_a_tool_that_takes_too_long_is_ended() -> None:
     with pytest.raises(subprocess.TimeoutExpired):
         run_tool(["sleep", "1000"], seconds=0.01)
+    with pytest.raises(Refused, match="^sleep takes longer than 0 s$"), refusals():
+        run_tool(["/bin/sleep", "1000"], seconds=0)
+
+
+def test_a_tool_that_takes_too_much_memory_fails() -> None:
+    greedy = [sys.executable, "-c", "import sys; sys.stdin.read(); bytearray(1 << 30)"]
+    assert "MemoryError" in run_tool(greedy, memory=1 << 29).stderr
+    assert run_tool(greedy).returncode == 0
 
 
 def test_tools_of_other_threads_are_ended() -> None:
