@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from tachometry.sim.captures.file import NONE, CaptureError, Channel, OptionError, opened_bytes, reading
-from tachometry.sim.captures.waveform import Changes, Variable
+from tachometry.sim.captures.waveform import Changes, Names, Variable
 from tachometry.sim.signals.recording import Recording
 
 _PIECE = 1 << 20  # bytes read at once
@@ -112,6 +112,7 @@ def _declarations(path: Path, words: _Words) -> tuple[list[Variable], set[bytes]
     variables: list[Variable] = []
     codes: set[bytes] = set()
     unit: Fraction | None = None
+    names = Names(path)
     for word in words.rest:
         if word[:1] != b"$" or word == b"$end":
             raise _incomplete(path, f"{_shown(word)} must be a declaration, such as $var")
@@ -120,10 +121,12 @@ def _declarations(path: Path, words: _Words) -> tuple[list[Variable], set[bytes]
             unit = _unit(path, said)
         elif word == b"$scope":
             scopes.append(said[-1].decode("utf-8", "replace") if len(said) == 2 else "")
+            _check_length(path, ".".join(scopes))
         elif word == b"$upscope" and scopes:
             scopes.pop()
         elif word == b"$var":
             variable = _variable(path, said, scopes)
+            names.add(variable.name, said[2])
             codes.add(said[2])
             variables += [] if said[0] in _NO_BITS else [variable]
         elif word == b"$enddefinitions":
@@ -153,9 +156,13 @@ def _variable(path: Path, said: list[bytes], scopes: list[str]) -> Variable:
         if abs(high - low) + 1 != size:
             raise CaptureError(f"{own} of {path} must have as many bits as its declaration says, {size}")
     name = ".".join([*scopes, name])
+    _check_length(path, name)
+    return Variable(name, size, said[2], high, low)
+
+
+def _check_length(path: Path, name: str) -> None:
     if len(name) > _LONGEST_NAME:
         raise CaptureError(f"names of {path} with their scopes must have at most {_LONGEST_NAME} characters")
-    return Variable(name, size, said[2], high, low)
 
 
 def _read_changes(path: Path, words: _Words, codes: set[bytes], changes: Changes) -> bytes:

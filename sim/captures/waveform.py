@@ -12,6 +12,8 @@ from tachometry.sim.signals.recording import Recording
 from tachometry.spec.language.units import plural
 
 Code = bytes | int  # what a file calls a variable
+_MOST_NAMED = 1 << 25  # characters of the names of all variables
+_EACH = 64  # more, for each: what else is kept of it
 _LEVELS = {"0": 0, "1": 1, "l": 0, "h": 1}
 _ALLOWED = "".join(_LEVELS) + "xzuw-"  # what VHDL and Verilog have beside levels: the one before holds
 
@@ -33,6 +35,22 @@ class Variable(NamedTuple):
         if not min(self.high, self.low) <= bit <= max(self.high, self.low):
             raise CaptureError(f"bits of {self.name} of {path} must be from {self.high} to {self.low}, not {bit}")
         return abs(bit - self.low)
+
+
+class Names:
+    """Counts what a head of a waveform takes in memory."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._left = path, _MOST_NAMED
+
+    def add(self, *names: str | bytes) -> None:
+        """Count a variable; CaptureError if there are too many."""
+        self._left -= _EACH + sum(map(len, names))
+        if self._left < 0:
+            raise CaptureError(
+                f"{self._path} must have names of variables of at most {_MOST_NAMED} characters, each with {_EACH} "
+                "more: dump only the scope of the encoder"
+            )
 
 
 class Changes:
