@@ -73,7 +73,7 @@ def _read(
     def read(capture: Path, spec: CoreSpec, axis: int = 0) -> Recording:
         from tachometry.sim.captures.cells import parse_threshold
         from tachometry.sim.captures.count_log import read_count_log
-        from tachometry.sim.captures.file import SAME, OptionError
+        from tachometry.sim.captures.file import SAME, CaptureError, OptionError, is_stream
         from tachometry.sim.captures.header import TextOptions
         from tachometry.sim.captures.other_sensors import fitted
         from tachometry.sim.captures.read import read_capture, with_last_tick
@@ -87,6 +87,8 @@ def _read(
             None if threshold is None else parse_threshold("threshold", threshold),
             slowest_s=float(alone.times.seconds(alone.times.longest)),
         )
+        if axes and is_stream(capture):
+            raise CaptureError(f"{capture} must be a regular file with --axes: it is read anew for each axis")
         if count is not None:
             more = {"sensor": None if alone.encoder.plain else sensor, "index": alone.index}
             _refuse_lines({**lines, **more, "complements": alone.front_end.complemented or None})

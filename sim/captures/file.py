@@ -4,12 +4,14 @@ import difflib
 import gzip
 import itertools
 import re
+import stat
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from io import BufferedReader
 from pathlib import Path
-from typing import BinaryIO, NamedTuple, cast
+from typing import NamedTuple, cast
 
 from tachometry.sim.signals.files import replacing
 from tachometry.sim.signals.recording import MAX_EDGES, Recording
@@ -50,13 +52,30 @@ def reading(path: Path) -> Iterator[None]:
 
 
 def kind_of(path: Path) -> str:
-    """Return the suffix that tells the kind of a file, in lower case; that before `.gz`."""
-    return (path.with_suffix("") if path.suffix.lower() == ".gz" else path).suffix.lower()
+    """Return the suffix that names the kind of a file, in lower case: the one before `.gz`; `.csv` for a bare pipe."""
+    named = (path.with_suffix("") if path.suffix.lower() == ".gz" else path).suffix.lower()
+    return ".csv" if not named and is_stream(path) else named
 
 
-def opened_bytes(path: Path) -> BinaryIO:
+def is_stream(path: Path) -> bool:
+    """Return whether a path is a pipe or a device: it is read once, from its beginning to its end."""
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):  # its reader refuses it
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
+def check_regular(path: Path) -> None:
+    """Check that a capture of which a reader needs any part at any time, or its size, is a regular file."""
+    if is_stream(path):
+        kinds = ".csv, .txt, .tsv, .teeth and .vcd, also with .gz,"
+        raise CaptureError(f"{path} must be a regular file: only {kinds} are read from a pipe or a device")
+
+
+def opened_bytes(path: Path) -> BufferedReader:
     """Open a file; what ends in `.gz` is unpacked."""
-    return cast(BinaryIO, gzip.open(path)) if path.suffix.lower() == ".gz" else path.open("rb")
+    return cast(BufferedReader, gzip.open(path)) if path.suffix.lower() == ".gz" else path.open("rb")
 
 
 def check_edges(path: Path, n: int) -> None:

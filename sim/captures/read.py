@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
-from tachometry.sim.captures.file import NONE, SAME, CaptureError, Channel, OptionError, kind_of
+from tachometry.sim.captures.file import NONE, SAME, CaptureError, Channel, OptionError, is_stream, kind_of
 from tachometry.sim.captures.fst import read_fst
 from tachometry.sim.captures.header import PLAIN, TextOptions
 from tachometry.sim.captures.sigrok import read_sr
@@ -101,6 +101,8 @@ def read_capture(
     others = {name: channel for name, channel in (("c", c), ("z", z), ("tick_in", tick_in)) if channel is not None}
     others |= {f"{line}_n": f"{line}_n" for line in complemented}
     recording = reader(path, a, b, samplerate_hz, others)
+    if is_stream(path):
+        return recording
     return _with_moving(recording, lambda number: reader(path, number, SAME, samplerate_hz, NONE))
 
 

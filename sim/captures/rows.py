@@ -28,8 +28,7 @@ COUNTERS = (16, 32)  # bits of counters whose times wrap
 def opened(path: Path) -> Iterator[TextIO]:
     """Open a text: UTF-16 if its first bytes say so, else UTF-8; anything else is the reader's to refuse."""
     with opened_bytes(path) as file:
-        encoding = "utf-16" if file.read(2) in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
-        file.seek(0)
+        encoding = "utf-16" if file.peek(2)[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
         yield io.TextIOWrapper(file, encoding, errors="replace", newline="\n")
 
 

@@ -25,6 +25,7 @@ from tachometry.sim.captures.file import (
     CaptureError,
     Channel,
     check_edges,
+    check_regular,
     choose_channels,
     named,
     reading,
@@ -71,8 +72,7 @@ def read_sr(
     path = Path(path)
     if samplerate_hz is not None and not 0 < samplerate_hz < float("inf"):
         raise CaptureError(f"samplerate must be above 0 Hz and finite, not {samplerate_hz} Hz")
-    if path.exists() and not (path.is_file() or path.is_dir()):
-        raise CaptureError(f"{path} must be a regular file")
+    check_regular(path)
     with reading(path), _damage_named(path), _Bounded(path) as file, zipfile.ZipFile(file) as archive:
         session = _read_session(path, archive)
         rate = agreed_samplerate(path, session.samplerate_hz, samplerate_hz)

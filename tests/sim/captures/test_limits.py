@@ -1,13 +1,15 @@
 """Captures that are small on disk and would be large in memory: they are refused by the limits that are stated."""
 
+import os
+import threading
 import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support.captures import assert_error, make_csv, make_sr
+from support.captures import assert_error, assert_same, make_csv, make_sr
 
-from tachometry.sim.captures import file, sigrok
+from tachometry.sim.captures import file, sigrok, waveform
 from tachometry.sim.captures.read import read_capture
 from tachometry.sim.signals.recording import MAX_EDGES, MAX_TICKS, PinTrace, Recording, check_ticks
 from tachometry.spec import Encoder, STachometer, Timing
@@ -57,6 +59,34 @@ def test_a_long_list_of_members(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(sigrok, "_MOST_LISTED", 2000)
     monkeypatch.setattr(sigrok, "CHUNK", 2000)
     assert_error(path, "the list of members of PATH must have at most 2000 bytes, not 2338")
+
+
+@pytest.mark.parametrize("name", ["x.sr", "x.fst"])
+def test_an_endless_device_is_no_file(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).symlink_to("/dev/zero")
+    kinds = ".csv, .txt, .tsv, .teeth and .vcd, also with .gz,"
+    assert_error(tmp_path / name, f"PATH must be a regular file: only {kinds} are read from a pipe or a device")
+
+
+@pytest.mark.parametrize("name", ["x.csv", "x.vcd", "x"])
+def test_a_pipe_is_read_once(name: str, tmp_path: Path) -> None:
+    """Although line B never moves, for which other channels of a file are looked at; without a suffix it is a CSV."""
+    text = HEAD + "#9\n1!\n" if name == "x.vcd" else "time,a,b,c\n0,0,0,0\n1,1,0,1\n"
+    (plain := tmp_path / f"plain{Path(name).suffix or '.csv'}").write_text(text)
+    os.mkfifo(tmp_path / name)
+    threading.Thread(target=(tmp_path / name).write_text, args=[text], daemon=True).start()
+    assert_same(read_capture(tmp_path / name), read_capture(plain))
+
+
+def test_a_head_of_too_many_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (path := tmp_path / "x.vcd").write_text(HEAD)
+    monkeypatch.setattr(waveform, "_MOST_NAMED", 2 * (64 + 2))
+    read_capture(path)
+    monkeypatch.setattr(waveform, "_MOST_NAMED", 2 * (64 + 2) - 1)
+    with pytest.raises(file.CaptureError, match="must have names of variables of at most 131 characters, each with 64"):
+        read_capture(path)
+    path.write_text("$scope module deep $end\n" * 900)
+    assert_error(path, "names of PATH with their scopes must have at most 4096 characters")
 
 
 def test_times_that_overflow(tmp_path: Path) -> None:
