@@ -5,19 +5,24 @@ import json
 import os
 import re
 import struct
+import subprocess
 import sys
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from tachometry.sim.captures.file import NONE, CaptureError, Channel, OptionError, check_edges, reading
-from tachometry.sim.captures.waveform import Changes, Variable
-from tachometry.sim.signals.recording import MAX_EDGES, Recording
+from tachometry.sim.captures.file import NONE, CaptureError, Channel, OptionError, check_regular, reading
+from tachometry.sim.captures.waveform import Changes, Names, Variable
+from tachometry.sim.signals.recording import Recording
 from tachometry.sim.signals.scratch import run_tool
 
 _HEADER = struct.Struct(">BQQQ")  # type of the first block, its length, time of the beginning and of the end
 _PLAIN, _PACKED = 0, 254  # types of it
+# Limits of the process that reads a file, which may be packed a thousand times as tightly: seconds, bytes of its memory
+# (its list of times has 8 for each), and characters that it prints of the names, and of the changes, some 16 for each.
+_LONGEST, _MOST_MEMORY, _MOST_NAMES, _MOST_CHANGES = 600.0, 2 << 30, 1 << 24, 1 << 28
+_TOO_MUCH = 3  # exit status of one that would print more
 
 
 def read_fst(
@@ -30,7 +35,8 @@ def read_fst(
     """Read two to four lines of an FST file: variables of one bit, or bits of vectors, as of `read_vcd`.
 
     Bit 0 of a vector is its last one, as pywellen does not tell how it was declared. It raises CaptureError if pywellen
-    is not installed; if the file is missing, or damaged; for an unknown variable; if a line never is 0 or 1.
+    is not installed; if the file is missing, damaged, or beyond the limits above; for an unknown variable; if a line
+    never is 0 or 1.
     """
     path = Path(path)
     if samplerate_hz is not None:
@@ -40,39 +46,56 @@ def read_fst(
             f"to read {path}, the extra `fst` must be installed: pip install 'tachometry[fst]'; or convert it with "
             f"`fst2vcd {path} -o {path.stem}.vcd`, which comes with GTKWave"
         )
+    check_regular(path)
     with reading(path), path.open("rb") as file:
         head = file.read(_HEADER.size)
     if len(head) < _HEADER.size or head[0] not in (_PLAIN, _PACKED):
         raise _damaged(path)
-    known = _contents(path)
+    known: dict[str, Any] = json.loads(_printed(path))
     if not known["unit"]:
         raise CaptureError(f"{path} must have a unit of its times")
+    names = Names(path)
+    for name, _ in known["variables"]:
+        names.add(name)
     variables = [Variable(name, size, code, size - 1, 0) for code, (name, size) in enumerate(known["variables"])]
     changes = Changes(path, variables, a, b, others)
     codes = sorted(map(int, changes.codes))
-    each = _contents(path, *codes)["changes"]
-    check_edges(path, max(map(len, each)))
     *_, end = _HEADER.unpack(head)
-    rows = [(time, code, value) for code, of in zip(codes, each, strict=True) for time, value in of]
-    for time, code, value in sorted(rows, key=lambda row: row[0]):
+    time = -1
+    for row in re.finditer(r"(\d+) (\d+) (.*)\n", _printed(path, *codes)):
+        time = int(row[1])
         changes.at(time)
-        changes.change(code, value)
-    if head[0] == _PLAIN and end > max([row[0] for row in rows], default=-1):
+        changes.change(int(row[2]), row[3])
+    if head[0] == _PLAIN and end > time:
         changes.at(end)
     factor, power = known["unit"]
     notes = [f"bit 0 of {variables[code].name} is its last one" for code in codes if variables[code].size > 1]
     return changes.recording(factor * Fraction(10) ** power, notes)
 
 
-def _contents(path: Path, *codes: int) -> dict[str, Any]:
-    """Return what another process finds in the file."""
+def _printed(path: Path, *codes: int) -> str:
+    """Return the output of another process that reads the file, see `fst_child`."""
     child = [sys.executable, "-P", "-m", "tachometry.sim.captures.fst_child"]
-    done = run_tool([*child, str(path), str(MAX_EDGES + 1), *map(str, codes)])
+    most = _MOST_CHANGES if codes else _MOST_NAMES
+    try:
+        done = run_tool([*child, str(path), str(most), *map(str, codes)], seconds=_LONGEST, memory=_MOST_MEMORY)
+    except subprocess.TimeoutExpired:
+        raise _too_large(path, f"{_LONGEST:g} s") from None
+    if done.returncode == _TOO_MUCH:
+        raise _too_large(path, f"{most} characters for its {'changes' if codes else 'names'}")
+    if done.returncode and re.search(r"MemoryError|memory allocation", done.stderr):
+        raise _too_large(path, f"{_MOST_MEMORY} bytes of memory")
     if done.returncode:
         reasons = re.findall(r"^\w+Error: (.*\w)", done.stderr, re.MULTILINE)  # a panic speaks of the reader's inside
         raise _damaged(path, *reasons[-1:])
-    contents: dict[str, Any] = json.loads(done.stdout)
-    return contents
+    return done.stdout
+
+
+def _too_large(path: Path, limit: str) -> CaptureError:
+    return CaptureError(
+        f"{path} needs more than {limit}: dump only the lines of the encoder, or convert it with `fst2vcd {path} -o "
+        f"{path.stem}.vcd`, as a .vcd of any length can be read"
+    )
 
 
 def _damaged(path: Path, *reasons: str) -> CaptureError:

@@ -1,31 +1,48 @@
-"""Print what is in a waveform as JSON, for `read_fst`: pywellen ends the process where a file is damaged."""
+"""Print what is in a waveform, for `read_fst`: pywellen ends the process where a file is damaged."""
 
 import contextlib
-import itertools
 import json
 import sys
+from collections import defaultdict
 
 import pywellen
 
 
-def contents(path: str, most: str, *chosen: str) -> dict[str, object]:
-    """Return the unit of the times as a factor and a power of ten of seconds, and name and size of all variables that
-    have bits; or, of the variables with these numbers, their times and values, of each at most so many.
+def main(path: str, most: str, *chosen: str) -> None:
+    """Print, as JSON, the unit of the times as a factor and a power of ten of seconds, and name and size of all
+    variables that have bits; or, of the variables with these numbers, a line for each change: time, number, value.
+
+    It ends with status 3 rather than print more than `most` characters.
     """
-    file = pywellen.Waveform(path, multi_threaded=False)
+    left = int(most)
+
+    def show(text: str) -> None:
+        nonlocal left
+        left -= len(text)
+        if left < 0:
+            sys.exit(3)
+        sys.stdout.write(text)
+
+    file = pywellen.WaveformStream(path, multi_threaded=False)
     variables = [variable for variable in file.all_vars() if variable.bitwidth]
-    if chosen:
-        rows = (itertools.islice(variables[int(number)].tv, int(most)) for number in chosen)
-        return {"changes": [[(time, _bits(value)) for time, value in of] for of in rows]}
-    unit = file.timescale
-    named = [(variable.full_name, variable.bitwidth) for variable in variables]
-    return {"unit": unit and (unit.factor, unit.unit.to_exponent()), "variables": named}
+    if not chosen:
+        unit = file.timescale
+        named = [(variable.full_name, variable.bitwidth) for variable in variables]
+        show(json.dumps({"unit": unit and (unit.factor, unit.unit.to_exponent()), "variables": named}))
+        return
+    numbers = defaultdict[str, list[str]](list)  # of variables, several of which may be one signal
+    for number in chosen:
+        numbers[str(variables[int(number)].signal_id)].append(number)
 
+    def change(time: int, signal: object, value: object) -> None:
+        text = f"{value:b}" if isinstance(value, int) else str(value)
+        for number in numbers[str(signal)]:
+            show(f"{time} {number} {text}\n")
 
-def _bits(value: object) -> str:
-    return f"{value:b}" if isinstance(value, int) else str(value)
+    file.stream_changes(change, [variables[int(number)] for number in chosen])
 
 
 if __name__ == "__main__":
+    sys.stdin.read()  # it ends when the limits of this process are set
     with contextlib.suppress(BrokenPipeError):
-        json.dump(contents(*sys.argv[1:]), sys.stdout)
+        main(*sys.argv[1:])

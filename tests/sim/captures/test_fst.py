@@ -3,13 +3,16 @@
 import importlib.util
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from support.captures import assert_same
 
+from tachometry.sim.captures import fst
 from tachometry.sim.captures.file import CaptureError
 from tachometry.sim.captures.read import read_capture
+from tachometry.sim.signals.scratch import run_tool
 
 BENCH = """\
 `timescale 1 ns / 1 ps
@@ -91,6 +94,29 @@ def test_a_plain_waveform_of_this_name_is_refused(folder: Path) -> None:
     (folder / "plain.fst").write_bytes((folder / "w.vcd").read_bytes())
     with pytest.raises(CaptureError, match=r"plain\.fst must be a whole FST file, but is cut or damaged$"):
         read_capture(folder / "plain.fst")
+
+
+@pytest.mark.parametrize(
+    ("limit", "most", "said"),
+    [
+        ("_MOST_NAMES", 10, "10 characters for its names"),
+        ("_MOST_CHANGES", 100, "100 characters for its changes"),
+        ("_LONGEST", 0.0, "0 s"),
+    ],
+)
+def test_a_file_beyond_a_limit_is_refused(
+    limit: str, most: float, said: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fst, limit, most)
+    with pytest.raises(CaptureError, match=rf"w\.fst needs more than {said}: dump only the lines of the encoder, or "):
+        read_capture(folder / "w.fst")
+
+
+def test_a_reader_that_takes_too_much_memory_is_ended(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    greedy = [sys.executable, "-c", "import sys; sys.stdin.read(); bytearray(1 << 32)"]
+    monkeypatch.setattr(fst, "run_tool", lambda command, **limits: run_tool(greedy, **limits))
+    with pytest.raises(CaptureError, match=rf"w\.fst needs more than {2 << 30} bytes of memory: dump only "):
+        read_capture(folder / "w.fst")
 
 
 def test_a_missing_file_is_named(folder: Path) -> None:
