@@ -22,6 +22,7 @@ from tachometry.cli.options.target import SIMULATED, Target, target_of
 from tachometry.cli.reports.monitor import measured_rows, received_rows, wrong_rows
 from tachometry.sim.studies.plan import default_range
 from tachometry.spec import AUTO
+from tachometry.spec.registers.emulator import rate_of
 
 _EVERY = 0.01  # seconds from a frame of telemetry to the next
 _PATIENCE = 15.0  # seconds after which nobody looks any more
@@ -63,11 +64,15 @@ class Live:
         spec, top = target.registers.spec, limits(target.registers.spec)
         most = min(_ROOM * default_range(spec)[1], top["speed"][1])
         if target.is_simulated:
-            settings = {"speed": float(f"{most / 4:.3g}"), "acceleration": float(f"{most:.3g}")}
+            settings["speed"] = float(f"{most / 4:.3g}")
         with self._changing, refusals():
+            fields = emulator_settings(spec, [f"{name}={n}" for name, n in settings.items()])
+            fields |= {"rate": max(rate_of(spec, most), 1)} if target.is_simulated else {}
+            watched = _Watched(target, fields)  # what is refused leaves the board before
             if self._watched is not None and not self._watched.ended():
                 raise Refused("the board before is still being given back: try again")
-            self._watched = _Watched(target, emulator_settings(spec, [f"{name}={n}" for name, n in settings.items()]))
+            self._watched = watched
+            watched.thread.start()
         ranges = top | {"speed": (-most, most, "rad/s")}
         return {
             "session": self._watched.name,
@@ -140,14 +145,13 @@ class _Watched:
         self._told = "compiling the board…" if target.is_simulated else "connecting…"
         self._facts: list[list[tuple[str, str]]] = []
         self._looked, self._over, self._busy = time.monotonic(), False, threading.Lock()
-        self._thread = threading.Thread(target=self._run, name=f"watching {target.port}", daemon=True)
-        self._thread.start()
+        self.thread = threading.Thread(target=self._run, name=f"watching {target.port}", daemon=True)
 
     def ended(self) -> bool:
         """Give the board back; whether it is."""
         self.stop.set()
-        self._thread.join(_ORDERLY)
-        return not self._thread.is_alive()
+        self.thread.join(_ORDERLY)
+        return not self.thread.is_alive()
 
     def news(self, since: float) -> Answer:
         """Return rows after a time in seconds: time, velocity, its lower and upper bound."""

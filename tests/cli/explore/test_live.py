@@ -81,6 +81,32 @@ def test_the_last_page_has_the_board(attached: tuple[Live, str]) -> None:
     until(live, second, lambda found: bool(found["rows"]))
 
 
+def test_a_refused_start_leaves_the_board_of_the_page_before(
+    attached: tuple[Live, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    live, port = attached
+    first = live.start({}, port)["session"]
+
+    def refused(*_: object) -> None:
+        raise ValueError("refused")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "emulator_settings", refused)
+        with pytest.raises(Refused, match="refused"):
+            live.start({}, port)
+    rows = len(until(live, first, lambda found: bool(found["rows"]))["rows"])
+    assert not until(live, first, lambda found: len(found["rows"]) > rows)["over"]
+
+
+def test_a_slow_core_is_watched() -> None:
+    """Its full scale is below the least acceleration of the emulated encoder."""
+    live = Live(None, None)
+    slow = {"method": "m", "ppr": "1", "tick": "1ms", "max-time": "1s", "max-speed": "0.01rad/s"}
+    assert 0 < live.start(slow, f"sim:{BOARD}")["settings"][0]["value"] < 0.1
+    live.close()
+    live.join()
+
+
 def test_a_page_that_is_gone_leaves_the_board(attached: tuple[Live, str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_PATIENCE", 0.0)
     live, port = attached
