@@ -1,5 +1,6 @@
 """The server of the page: on this machine alone, for those who know its address, and for no page of another origin."""
 
+import asyncio
 import json
 import os
 import secrets
@@ -9,7 +10,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from importlib.resources import files
 from types import FrameType
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import anyio
 import uvicorn
@@ -18,6 +19,7 @@ from starlette.datastructures import Headers
 from starlette.requests import Request
 from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
+from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import HANDLED_SIGNALS
 
 from tachometry.sim.signals.scratch import STOPS, end_tools
@@ -25,7 +27,8 @@ from tachometry.sim.signals.scratch import STOPS, end_tools
 HOST = "127.0.0.1"
 MOST_BYTES = 16 << 20  # that are asked with: a capture, in base64
 _SECONDS = 20.0  # in which what is asked must have come
-_MOST_CLIENTS = 200  # at once; those beyond are told to come again
+_HEAD = 5.0  # seconds in which the head of a request must have come
+_MOST_CLIENTS = 200  # that are answered at once, and as many connections without a request
 _LIGHT = ("options", "check", "boards", "frames", "set", "stop")  # what is answered at once, beside what takes seconds
 _TYPES = {"html": "text/html", "css": "text/css", "js": "text/javascript", "LICENSE": "text/plain"}
 # Nothing but what comes from here is loaded, run, or asked; the page stands in no other one, and no address leaks.
@@ -57,7 +60,7 @@ def page(token: str, hosts: tuple[str, ...], answer: Answer) -> ASGIApp:
     served = {file.name: file.read_bytes() for file in (files(__package__) / "static").iterdir()}
     served[""] = served["page.html"]
     limits = dict.fromkeys(_LIGHT, CapacityLimiter(4))
-    heavy = CapacityLimiter(1)
+    heavy, clients = CapacityLimiter(1), CapacityLimiter(_MOST_CLIENTS)
 
     async def respond(request: Request) -> Response:
         host, path = request.headers.get("host", ""), request.scope["path"].split("/")
@@ -101,7 +104,11 @@ def page(token: str, hosts: tuple[str, ...], answer: Answer) -> ASGIApp:
 
     async def application(scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "http":
-            response = await respond(Request(scope, receive))
+            if clients.available_tokens:
+                async with clients:
+                    response = await respond(Request(scope, receive))
+            else:
+                response = _plain(503, f"at most {_MOST_CLIENTS} requests are answered at once: try again")
             response.headers.update(_HEADERS)
             await response(scope, receive, send)
 
@@ -143,20 +150,7 @@ def serve(port: int, load: Callable[[], tuple[Answer, Boards]], told: Callable[[
         port = listening.getsockname()[1]
         told(f"http://{HOST}:{port}/{token}/\nOpen this address in a browser; Ctrl-C ends it.")
         answer, boards = load()
-        config = uvicorn.Config(
-            page(token, (f"{HOST}:{port}", f"localhost:{port}"), answer),
-            http="h11",
-            ws="none",
-            lifespan="off",
-            interface="asgi3",
-            log_config=None,
-            log_level="critical",
-            access_log=False,
-            server_header=False,
-            limit_concurrency=_MOST_CLIENTS,
-            timeout_graceful_shutdown=2,
-        )
-        server = _Server(config, boards)
+        server = _Server(configured(page(token, (f"{HOST}:{port}", f"localhost:{port}"), answer)), boards)
         for number in STOPS:
             if number not in HANDLED_SIGNALS:
                 signal.signal(number, server.handle_exit)
@@ -164,6 +158,56 @@ def serve(port: int, load: Callable[[], tuple[Answer, Boards]], told: Callable[[
             server.run(sockets=[listening])
         finally:
             boards.join()
+
+
+def configured(application: ASGIApp) -> uvicorn.Config:
+    """Return how the page is served."""
+    return uvicorn.Config(
+        application,
+        http=_Connection,
+        ws="none",
+        lifespan="off",
+        interface="asgi3",
+        log_config=None,
+        log_level="critical",
+        access_log=False,
+        server_header=False,
+        timeout_graceful_shutdown=2,
+    )
+
+
+class _Connection(H11Protocol):
+    """Is closed if the head of a request takes too long, or as the oldest of too many without a request."""
+
+    _idle: ClassVar[dict["_Connection", asyncio.TimerHandle]] = {}
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        self._await_head()
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        self._await_head()
+
+    def on_response_complete(self) -> None:
+        super().on_response_complete()
+        self._await_head()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        super().connection_lost(exc)
+        self._busy()
+
+    def _await_head(self) -> None:
+        if self.cycle is not None and not self.cycle.response_complete:
+            self._busy()
+        elif self not in self._idle and not self.transport.is_closing():
+            self._idle[self] = self.loop.call_later(_HEAD, self.transport.abort)
+            if len(self._idle) > _MOST_CLIENTS:
+                next(iter(self._idle)).transport.abort()
+
+    def _busy(self) -> None:
+        if (timer := self._idle.pop(self, None)) is not None:
+            timer.cancel()
 
 
 class _Server(uvicorn.Server):
