@@ -110,7 +110,7 @@ def test_a_tool_ends_with_all_that_it_has_started(stop: signal.Signals, tmp_path
 def test_a_tool_that_takes_too_long_is_ended() -> None:
     with pytest.raises(subprocess.TimeoutExpired):
         run_tool(["sleep", "1000"], seconds=0.01)
-    with pytest.raises(Refused, match="^sleep takes longer than 0 s$"), refusals():
+    with pytest.raises(Refused, match=r"^sleep takes longer than 0 s$"), refusals():
         run_tool(["/bin/sleep", "1000"], seconds=0)
 
 
