@@ -141,7 +141,8 @@ api: $(VENV)/.docs ## what every module has, from its docstrings, in build/api
 	  $(addprefix tachometry.,$(subst /,.,$(filter-out %/py %/export,$(basename $(wildcard spec/[a-z]* hdl/[a-z]*)))))
 
 page: $(LINKED) ## the page of `tachometry explore` without a server, in build/page: Python and Yosys run in the browser
-	rm -rf build/page && $(BIN)/python bench/page/build.py build/page
+	rm -rf build/page.new && $(BIN)/python bench/page/build.py build/page.new
+	rm -rf build/page && mv build/page.new build/page
 
 site: $(VENV)/.docs page ## the pages of docs/ with a search, in build/www, and `make page` as explore; a dead link is an error
 	$(BIN)/python bench/website.py
@@ -150,13 +151,14 @@ site: $(VENV)/.docs page ## the pages of docs/ with a search, in build/www, and 
 # README.md is the page at PyPI, too, where links are those of the repository, at the tag of the version.
 dist: $(VENV)/.made ## wheel and sdist in build/dist, checked; ADDRESS and MAIL are those of the repository and its owner, if pyproject.toml has none
 	$(PIP) 'build>=1.2' 'twine>=6.1' 'check-wheel-contents>=0.6' 'pyroma>=5'
-	rm -rf build/release build/dist && mkdir -p build/release
+	rm -rf build/release build/dist.new && mkdir -p build/release
 	git ls-files -z | tar --null -T - -cf - | tar -xf - -C build/release
 	$(BIN)/python bench/release.py build/release $(ADDRESS) $(MAIL)
-	$(BIN)/python -m build -o build/dist build/release
-	$(BIN)/twine check --strict build/dist/*
-	$(BIN)/check-wheel-contents build/dist/*.whl
-	$(BIN)/pyroma -n 9 build/dist/*.tar.gz
+	$(BIN)/python -m build -o build/dist.new build/release
+	$(BIN)/twine check --strict build/dist.new/*
+	$(BIN)/check-wheel-contents build/dist.new/*.whl
+	$(BIN)/pyroma -n 9 build/dist.new/*.tar.gz
+	rm -rf build/dist && mv build/dist.new build/dist
 
 lint: $(VENV)/.test ## ruff, and mypy --strict over layers, benchmarks and tests
 	$(BIN)/ruff check .

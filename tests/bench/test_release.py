@@ -2,6 +2,7 @@
 
 import re
 import shutil
+import subprocess
 import tomllib
 from pathlib import Path
 
@@ -57,3 +58,20 @@ def test_workflows_call_what_there_is() -> None:
     classifiers = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["classifiers"]
     known = re.findall(r":: (3\.\d+)", "\n".join(classifiers))
     assert f'python: ["{known[0]}", "{known[-1]}"]' in (ROOT / ".github/workflows/test.yml").read_text()
+
+
+@pytest.mark.parametrize(("target", "fails"), [("dist", "pyroma"), ("page", "python"), ("dist", ""), ("page", "")])
+def test_what_was_made_before_stays_until_the_new_is_checked(target: str, fails: str, tmp_path: Path) -> None:
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    for folder in ("bin", "venv", f"build/{target}"):
+        (tmp_path / folder).mkdir(parents=True)
+    for file in ("venv/.made", f"build/{target}/before"):
+        (tmp_path / file).touch()
+    for tool in ("python", "pip", "twine", "check-wheel-contents", "pyroma"):
+        (link := tmp_path / "bin" / tool).write_text(
+            f"#!/bin/sh\nmkdir -p build/{target}.new; test {tool} != '{fails}'\n"
+        )
+        link.chmod(0o755)
+    for command in ("git init -q", "git add Makefile", f"make -s {target} VENV=venv BIN=bin LINKED="):
+        done = subprocess.run(command.split(), cwd=tmp_path, capture_output=True)
+    assert (done.returncode != 0) == (tmp_path / "build" / target / "before").exists() == bool(fails)
