@@ -12,8 +12,7 @@ from tachometry.cli.reports.check import print_checked
 from tachometry.cli.reports.terminal import activity
 from tachometry.hdl.export import export
 from tachometry.hdl.export.ci import ci_files
-from tachometry.hdl.export.files import file_names
-from tachometry.hdl.export.targets.target import targets_for
+from tachometry.hdl.export.files import digest, file_names
 from tachometry.sim.testbench.check import Checked, Make, manifests
 from tachometry.sim.testbench.check import check as check_core
 
@@ -62,7 +61,7 @@ def check(places: tuple[Path, ...], simulation: bool, netlists: tuple[Path, ...]
         raise ValueError("--verilog must be given for one core, and not together with --no-simulation")
     if simulation and importlib.util.find_spec("cocotb") is None:
         raise OSError("to simulate, cocotb must be there: pip install cocotb; or take --no-simulation")
-    make = Make(export, targets_for, ci_files, file_names)
+    make = Make(export, ci_files, file_names, digest)
     results = []
     with activity() as say:
         for number, path in enumerate(found, 1):

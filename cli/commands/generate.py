@@ -19,14 +19,16 @@ from tachometry.cli.options.option import FilePath, Group, GroupedCommand, optio
 from tachometry.cli.reports.axes import axes_rows
 from tachometry.cli.reports.core import core_rows, size_rows
 from tachometry.cli.reports.loop import loop_rows
+from tachometry.cli.reports.run import print_warnings
 from tachometry.cli.reports.terminal import print_rows
 from tachometry.hdl.export import export
 from tachometry.hdl.export.ci import HOSTS, ci_files
-from tachometry.hdl.export.files import CORE_FILES, manifest_of
+from tachometry.hdl.export.files import CORE_FILES, file_names, manifest_of, recorded
 from tachometry.hdl.export.registers.files import REGISTER_FILES
 from tachometry.hdl.export.targets.target import TARGETS, bus_for
 from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.studies.estimate import Estimate
+from tachometry.sim.testbench.check import left_files
 from tachometry.sim.testbench.vectors import cocotb_bench
 from tachometry.spec import AxesSpec
 from tachometry.spec.control import AnySpec, LoopSpec
@@ -97,7 +99,7 @@ class Asked:
         bench = {} if self.testbench is None else _bench(self.spec, self.name, self.record)
         texts = export(self.spec, self.name, self.bus, self.baud, self.target, self.irq)
         jobs = {file: text for file, text in ci_files(self.name).items() if file == f"{self.name}_{self.ci}.yml"}
-        return texts | bench | jobs
+        return recorded(texts | bench | jobs, self.name, self.target, self.testbench or "none", self.ci or "none")
 
     @property
     def size(self) -> list[tuple[str, str]]:
@@ -204,6 +206,8 @@ def generate(asked: Asked, directory: Path) -> int:
         click.echo(click.format_filename(directory / file))
     click.echo()
     print_rows([*asked.rows, *asked.size])
+    left = left_files(directory, asked.name, file_names(asked.name), texts)
+    print_warnings([f"{click.format_filename(directory / file)} is of an earlier core: remove it" for file in left])
     return 0
 
 

@@ -1,12 +1,15 @@
 """All files of a core: Verilog, manifest, kit, and those for its registers and for a framework."""
 
+import hashlib
 import json
+from collections.abc import Mapping
 from typing import Any
 
 from amaranth.lib import wiring
 
 from tachometry.hdl.core.bus_tachometer import BusTachometer
 from tachometry.hdl.core.core import core_of
+from tachometry.hdl.export.ci import ci_files
 from tachometry.hdl.export.kit import KIT, kit
 from tachometry.hdl.export.registers.files import REGISTER_FILES, register_files
 from tachometry.hdl.export.targets.target import TARGETS, bus_for, check_core, target_files
@@ -68,7 +71,7 @@ def export(
         f"{name}.json": json.dumps(described, indent=2) + "\n",
     }
     core |= kit(spec, name, on) | files
-    return core | target_files(target, spec, name, on, core)
+    return recorded(core | target_files(target, spec, name, on, core), name, target)
 
 
 def top_of(spec: AnySpec, bus: Bus | None) -> wiring.Component:
@@ -77,9 +80,27 @@ def top_of(spec: AnySpec, bus: Bus | None) -> wiring.Component:
 
 
 def file_names(name: str) -> list[str]:
-    """Return the names of all files that `export` can make for a core of this name, whatever its options."""
+    """Return the names of all files that can be made for a core of this name, whatever its options, but of a bench."""
     of_targets = (file for target in TARGETS.values() for file in target.names)
-    return [file.replace("NAME", name) for file in (*CORE_FILES, *REGISTER_FILES, *of_targets)]
+    return [file.replace("NAME", name) for file in (*CORE_FILES, *REGISTER_FILES, *of_targets)] + [*ci_files(name)]
+
+
+def recorded(
+    files: Mapping[str, str], name: str, target: str = "none", testbench: str = "none", ci: str = "none"
+) -> dict[str, str]:
+    """Return the files with a manifest that records what was asked for, and the SHA-256 of each other file.
+
+    `target`, `testbench` and `ci` are the values of `--for`, `--testbench` and `--ci`.
+    """
+    manifest = f"{name}.json"
+    hashes = {file: digest(text) for file, text in files.items() if file != manifest}
+    record = {"asked": {"for": target, "testbench": testbench, "ci": ci}, "files": hashes}
+    return {**files, manifest: json.dumps(json.loads(files[manifest]) | record, indent=2) + "\n"}
+
+
+def digest(text: str) -> str:
+    """Return the SHA-256 of a text in UTF-8, by which the manifest knows a file."""
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def manifest_of(

@@ -6,18 +6,15 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-import numpy as np
-
-from tachometry.sim.signals.recording import LINES, PinTrace
 from tachometry.sim.signals.scratch import run_tool, scratch
-from tachometry.sim.testbench.vectors import bench_of, cocotb_bench, digest_of
+from tachometry.sim.testbench.vectors import cocotb_bench
 from tachometry.spec import of_manifest
 from tachometry.spec.control import AnySpec
 from tachometry.spec.language.files import MOST_JSON, read_text
@@ -33,6 +30,7 @@ SAME, EQUIVALENT, DIFFERENT, MISSING, LEFT = (
 )
 
 _LONGEST_PROOF = 300.0  # seconds
+_MOST = 1 << 28  # bytes of a file: what is longer differs
 _PROOF = """
 design -copy-from gold -as gold gold
 design -copy-from gate -as gate gate
@@ -63,10 +61,9 @@ class Make:
     # those of a core, its name, its bus and the bus's bits a second, a framework or "none", and whether there is an
     # interrupt
     export: Callable[[AnySpec, str, str, int | None, str, bool], Mapping[str, str]]
-    # frameworks that a core of a name, on a bus, can go into, each with the names of its files
-    targets: Callable[[str, str], Mapping[str, Sequence[str]]]
     jobs: Callable[[str], Mapping[str, str]]  # those of continuous integration, for the name of a core
     names: Callable[[str], Sequence[str]]  # names of all files that there can be, for the name of a core
+    digest: Callable[[str], str]  # by which the manifest knows a text
 
 
 @dataclass(frozen=True)
@@ -147,12 +144,18 @@ def check(
         raise ValueError(f"{path} must have the name of its module, {name}.json")
     ours = all(written.get(entry) == here for entry, here in entries().items())
     checked = Checked(path)
-    for file, text in _expected(spec, name, written, path.parent, make).items():
+    expected = _expected(spec, name, written, make)
+    hashes = json.loads(expected[path.name] or "")["files"]
+    for file, text in expected.items():
         may_differ = Path(file).name == f"{name}.v" and not ours  # the core, and copies of it for frameworks
-        checked.files[file] = _compared(path.parent / file, _as_of(file, text, written), name if may_differ else None)
-    for file in set(make.names(name)) - checked.files.keys():
-        if "tachometry" in _text(path.parent / file):
-            checked.files[file] = LEFT, ""
+        there = _text(path.parent / file)
+        found = _compared(there, text and _as_of(file, text, written), name if may_differ else None)
+        if hashes.get(file) not in (None, make.digest(there)) and there:
+            found = DIFFERENT, found[1] or "its hash is not that in the manifest"
+        elif hashes.get(file) and there and not ours and not may_differ:
+            found = SAME, ""  # as other versions wrote it
+        checked.files[file] = found
+    checked.files.update((file, (LEFT, "")) for file in left_files(path.parent, name, make.names(name), expected))
     if written.get("tools") != entries()["tools"] and checked.files[path.name][0] == SAME:
         checked.files[path.name] = EQUIVALENT, ""  # as far as these versions can tell
     sources = list(netlists) or [path.parent / f"{name}.v"]
@@ -166,47 +169,26 @@ def check(
     return _simulated(checked, bench, name, sources, waves)
 
 
-def _expected(spec: AnySpec, name: str, written: Mapping[str, Any], folder: Path, make: Make) -> dict[str, str]:
-    """Return all files; those of a framework, a bench or a job only if they are there."""
+def _expected(spec: AnySpec, name: str, written: Mapping[str, Any], make: Make) -> dict[str, str | None]:
+    """Return all files that were asked for; None for the vectors of a bench, whose motion only their hash knows."""
+    asked, hashes = (written[entry] if isinstance(written.get(entry), dict) else {} for entry in ("asked", "files"))
     bus, baud, irq = written.get("bus", "none"), written.get("baud"), bool(written.get("irq"))
-    files = dict(make.export(spec, name, bus, baud, "none", irq))
-    for target, names in make.targets(name, bus).items():
-        if any((folder / file).exists() for file in names):
-            files |= make.export(spec, name, bus, baud, target, irq)
-    files |= {file: text for file, text in make.jobs(name).items() if (folder / file).exists()}
-    vectors = folder / f"{name}_vectors.json"
-    if vectors.exists() or (folder / f"test_{name}.py").exists():
-        files |= cocotb_bench(spec, name) if not vectors.exists() else _again(spec, name, vectors)
-    return files
+    files: dict[str, str | None] = {**make.export(spec, name, bus, baud, str(asked.get("for", "none")), irq)}
+    manifest = json.loads(files[f"{name}.json"] or "")
+    if asked.get("testbench") == "cocotb":
+        manifest["asked"]["testbench"] = "cocotb"
+        files |= cocotb_bench(spec, name) | {f"{name}_vectors.json": None}
+    if (job := f"{name}_{asked.get('ci')}.yml") in make.jobs(name):
+        manifest["asked"]["ci"] = asked["ci"]
+        files[job] = make.jobs(name)[job]
+    manifest["files"] = {file: hashes.get(file) for file in files if file != f"{name}.json"}
+    return files | {f"{name}.json": json.dumps(manifest, indent=2) + "\n"}
 
 
-def _again(spec: AnySpec, name: str, vectors: Path) -> dict[str, str]:
-    """Return the bench with the motion of the one that is there."""
-    try:
-        there = json.loads(vectors.read_text(encoding="utf-8"))
-        if there["inputs"] != digest_of(there):
-            return cocotb_bench(spec, name)
-        clock, *levels = np.array(there["changes"], dtype=np.int64).T
-        lines = {pin: row for pin, row in zip(there["pins"], levels, strict=True)}
-        of_user = (
-            *LINES,
-            *spec.tachometer.front_end.controls,
-            *(f"{line}_n" for line in spec.tachometer.front_end.complemented),
-            "probe",
-        )
-        lines = {pin: lines[pin] for pin in lines if pin in of_user}
-        traces = []
-        for axis in range(spec.axes or 1):
-            of_axis = {
-                pin: (row if pin.startswith("probe") else row >> axis * (pin != "tick_in") & 1).astype(np.uint8)
-                for pin, row in lines.items()
-            }
-            of_axis.setdefault("b", np.zeros(len(clock), dtype=np.uint8))  # of a sensor of one line
-            trace = PinTrace.of_lines(clock, int(there["clocks"]), of_axis)
-            traces.append(trace.completed(spec.tachometer))
-        return bench_of(spec, name, traces)
-    except (ValueError, KeyError, TypeError, IndexError, OverflowError, MemoryError):
-        return cocotb_bench(spec, name)  # it is none that was made for this core
+def left_files(folder: Path, name: str, names: Sequence[str], made: Collection[str]) -> list[str]:
+    """Return files of an earlier core of this name; `names` are those that one can have, but of its bench."""
+    every = {*names, f"test_{name}.py", f"{name}_vectors.json"}
+    return sorted(file for file in every.difference(made) if "tachometry" in _text(folder / file))
 
 
 def _as_of(file: str, text: str, written: Mapping[str, Any]) -> str:
@@ -217,13 +199,13 @@ def _as_of(file: str, text: str, written: Mapping[str, Any]) -> str:
     return text.replace(generator(), str(written.get("generator")))
 
 
-def _compared(place: Path, text: str, module: str | None) -> tuple[str, str]:
-    """Return what is found of a file; Verilog of a module may be other text for the same core."""
-    there = _text(place)
+def _compared(there: str, text: str | None, module: str | None) -> tuple[str, str]:
+    """Return what is found of the content of a file; Verilog of a module may be other text for the same core."""
     if not there:
         return MISSING, ""
-    if there == text:
+    if text in (None, there):
         return SAME, ""
+    assert text is not None
     where = _first_difference(there, text)
     if module is not None:
         yosys = _yosys()
@@ -235,8 +217,11 @@ def _compared(place: Path, text: str, module: str | None) -> tuple[str, str]:
 
 
 def _text(place: Path) -> str:
-    """Return what is in a file, and "" if there is none."""
-    return place.read_bytes().decode("utf-8", "backslashreplace") if place.exists() else ""
+    """Return the text of a file, "" if there is none; line ends that Git makes on Windows become those of `export`."""
+    if not place.is_file():
+        return ""
+    with place.open("rb") as file:
+        return file.read(_MOST).decode("utf-8", "backslashreplace").replace("\r\n", "\n")
 
 
 def _first_difference(there: str, text: str) -> str:
@@ -274,7 +259,7 @@ def _simulated(
 ) -> Checked:
     """Play a bench on Verilog in a folder of its own, and hold it against the golden model."""
     with scratch() as folder:
-        text = "\n".join(source.read_text(encoding="utf-8") for source in sources)
+        text = "\n".join(map(_text, sources))
         described = checked.manifest.read_text(encoding="utf-8")
         for file, content in {**bench, f"{name}.v": text, f"{name}.json": described}.items():
             (folder / file).write_text(content, encoding="utf-8")

