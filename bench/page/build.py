@@ -19,6 +19,8 @@ from importlib.resources import files
 from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZipFile
 
+from tachometry.cli.explore import POLICY
+
 HERE = Path(__file__).resolve().parent
 # Of the npm registry, by the folder of the page: the archive, its SHA-512, and the folder that is taken.
 PACKAGES = {
@@ -100,12 +102,17 @@ def build(to: Path) -> None:
         shutil.copy(HERE / name, to)
     for file in (files("tachometry.cli.explore") / "static").iterdir():
         (to / file.name).write_bytes(file.read_bytes())
-    script = '<script src="page.js"'
-    before, after = (to / "page.html").read_text(encoding="utf-8").split(script)
+    text = (to / "page.html").read_text(encoding="utf-8")
     (to / "page.html").unlink()
-    (to / "index.html").write_text(
-        f'{before}<script src="answered.js" defer></script>\n{script}{after}', encoding="utf-8"
-    )
+    (to / "index.html").write_text(index(text), encoding="utf-8")
+
+
+def index(text: str) -> str:
+    """Return the page with what answers it in the browser, and with the policy that a server of files does not send."""
+    policy = f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+    before, script, after = text.partition('<script src="page.js"')
+    head, charset, rest = before.partition('<meta charset="utf-8">\n')
+    return f'{head}{charset}{policy}\n{rest}<script src="answered.js" defer></script>\n{script}{after}'
 
 
 if __name__ == "__main__":

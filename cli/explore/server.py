@@ -22,6 +22,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import HANDLED_SIGNALS
 
+from tachometry.cli.explore import POLICY
 from tachometry.sim.signals.scratch import STOPS, end_tools
 
 HOST = "127.0.0.1"
@@ -31,10 +32,9 @@ _HEAD = 5.0  # seconds in which the head of a request must have come
 _MOST_CLIENTS = 200  # that are answered at once, and as many connections without a request
 _LIGHT = ("options", "check", "boards", "frames", "set", "stop")  # what is answered at once, beside what takes seconds
 _TYPES = {"html": "text/html", "css": "text/css", "js": "text/javascript", "LICENSE": "text/plain"}
-# Nothing but what comes from here is loaded, run, or asked; the page stands in no other one, and no address leaks.
+# The page stands in no other one, and no address leaks.
 _HEADERS = {
-    "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
-    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "content-security-policy": f"{POLICY}; frame-ancestors 'none'",
     "cross-origin-opener-policy": "same-origin",
     "cross-origin-resource-policy": "same-origin",
     "referrer-policy": "no-referrer",

@@ -2,17 +2,22 @@
 
 import functools
 import json
+import re
 import shlex
 import shutil
 import subprocess
 import sys
 import threading
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from importlib.resources import files
 from pathlib import Path
 from zipfile import ZipFile
 
 from playwright.sync_api import sync_playwright
 from support.nightly import nightly
+from support.script import load
+
+from tachometry.cli.explore import POLICY
 
 PAGE = Path(__file__).resolve().parents[2] / "bench" / "page"
 ASKED = """
@@ -39,6 +44,16 @@ def test_answers_are_the_same_without_numpy(tmp_path: Path) -> None:
     wanted = answers()
     assert "worst error" in json.dumps(wanted)
     assert answers(str(tmp_path)) == wanted
+
+
+def test_the_page_has_its_policy_before_anything_is_loaded() -> None:
+    """All scripts and styles are files beside it: a policy lets none within the page run."""
+    text = load("page/build").index((files("tachometry.cli.explore") / "static" / "page.html").read_text())
+    policy = f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+    assert 0 < text.index(policy) < min(text.index("<script"), text.index("<link"))
+    assert [*re.findall(r'<script src="(.+?)" defer></script>', text)][-2:] == ["answered.js", "page.js"]
+    assert len(re.findall("<script", text)) == 3
+    assert not re.findall(r"<style| style=| on\w+=", text)
 
 
 class _Files(SimpleHTTPRequestHandler):
