@@ -93,6 +93,14 @@ class Outputs:
         part.replace(kept)
         return kept
 
+    def keep_all(self) -> list[Path]:
+        """Put a part of every output beside its target, but a save file, which names the whole waveform."""
+        with held_back():
+            parts = {what: self[what] for what in [*self._targets]}
+            kept = [self.keep(what, part) for what, part in parts.items() if part.suffix != ".gtkw"]
+            self._targets.clear()
+            return kept
+
     def _check(self) -> None:
         taken: dict[str, str] = {}
         for what, target in self._targets.items():

@@ -54,7 +54,8 @@ def replay(
     are named with their scopes: --a top.a, or --a top.enc[0] for a bit of a vector.
     Its edges are placed on the core's clock. What the shaft truly did is unknown; all else is as with simulate.
 
-    Ctrl-C ends the simulation, and what was simulated so far is reported and written. Equal options and captures give
+    Ctrl-C ends the simulation. What was simulated so far is reported, and written beside the outputs, as t.part.csv.
+    Equal options and captures give
     equal files. Exit status 1 if hardware and golden model differ.
     """
     outputs = Outputs(targets, inputs=[capture])
@@ -72,5 +73,5 @@ def replay(
             bar=progress_bar,
             pulses=pulses,
         )
-        write_outputs(simulation, outputs.get)
-    return print_simulation(simulation)
+        kept = write_outputs(simulation, outputs)
+    return print_simulation(simulation, kept)

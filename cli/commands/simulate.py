@@ -57,7 +57,8 @@ def simulate(
     The hardware is simulated clock by clock and compared with the golden model in every bit of every update and tick.
     The table at the end also shows what was lost on the way, and how far the velocity is from the shaft's.
 
-    Ctrl-C ends the simulation, and what was simulated so far is reported and written. Equal options give equal files.
+    Ctrl-C ends the simulation. What was simulated so far is reported, and written beside the outputs, as t.part.csv.
+    Equal options give equal files.
     Exit status 1 if hardware and golden model differ.
     """
     outputs = Outputs(targets, inputs=tables)
@@ -76,5 +77,5 @@ def simulate(
             bar=progress_bar,
             pulses=pulses,
         )
-        write_outputs(simulation, outputs.get)
-    return print_simulation(simulation)
+        kept = write_outputs(simulation, outputs)
+    return print_simulation(simulation, kept)

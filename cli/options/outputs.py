@@ -1,9 +1,10 @@
 """Options of the files that a simulation writes, and what writes each."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from tachometry.cli.files import Outputs
 from tachometry.cli.options.option import Group, output
 from tachometry.sim.captures.sigrok import write_sr
 from tachometry.sim.signals.tables import write_counts, write_events, write_trace
@@ -55,9 +56,12 @@ def refuse_plot(spec: CoreSpec, targets: Mapping[str, Path]) -> None:
         raise ValueError("--plot must not be given together with --axes: a figure is of one axis")
 
 
-def write_outputs(simulation: Simulation, place: Callable[[str], Path | None]) -> None:
-    """Write what is wanted of a simulation, into the places of its options; the waveform is there already."""
-    spec, run = simulation.spec, simulation.lockstep.actual
+def write_outputs(simulation: Simulation, outputs: Outputs) -> list[Path]:
+    """Write the outputs of a simulation, but the waveform, which is there already.
+
+    Those of an interrupted one leave the outputs as they were, and are returned: they lie beside them, as `t.part.csv`.
+    """
+    spec, run, place = simulation.spec, simulation.lockstep.actual, outputs.get
     if path := place("--trace"):
         write_trace(path, spec, run)
     if path := place("--counts"):
@@ -72,3 +76,4 @@ def write_outputs(simulation: Simulation, place: Callable[[str], Path | None]) -
         assert spec.axes is None, "a figure is of one axis"
         truth = simulation.axes[0].truth
         save_plot(path, spec.tachometer, run, None if truth is None else truth.true_speed)
+    return outputs.keep_all() if simulation.interrupted else []

@@ -3,13 +3,14 @@
 import sys
 from collections.abc import Sequence
 from functools import singledispatch
+from pathlib import Path
 
 import numpy as np
 from rich.text import Text
 
 from tachometry.cli.reports.capture import axis_warnings, capture_rows, channels, index_distance
 from tachometry.cli.reports.core import choice
-from tachometry.cli.reports.streams import INTERRUPTED
+from tachometry.cli.reports.streams import INTERRUPTED, printable
 from tachometry.cli.reports.terminal import print_rows, stdout_console
 from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.simulation import Axis, Simulation
@@ -22,8 +23,11 @@ from tachometry.spec.language.units import format_time, plural
 _Row = tuple[str, str]  # a name and its value
 
 
-def print_simulation(simulation: Simulation) -> int:
-    """Print what was simulated, what the core cannot have seen rightly, and the verdict; the exit status."""
+def print_simulation(simulation: Simulation, kept: Sequence[Path] = ()) -> int:
+    """Print the simulation, what the core cannot have seen rightly, and the verdict; return the exit status.
+
+    `kept` are the files of an interrupted one.
+    """
     lockstep, spec, axes = simulation.lockstep, simulation.spec, simulation.axes
     run = lockstep.actual
     time, n_ticks = format_time(spec.times.seconds(run.n_clocks)), len(run.ticks) // len(axes)
@@ -37,9 +41,11 @@ def print_simulation(simulation: Simulation) -> int:
     console.print(_verdict(simulation, warned=bool(warnings)))
     if lockstep.n_mismatches:
         return 1
-    if run.n_clocks == simulation.wanted:
+    if not simulation.interrupted:
         return 0
-    print(f"tachometry: interrupted after {run.n_clocks} of {simulation.wanted} clocks", file=sys.stderr)
+    where = f", kept in {', '.join(map(str, kept))}" if kept else ""
+    how_far = f"interrupted after {run.n_clocks} of {simulation.wanted} clocks{where}"
+    print(f"tachometry: {printable(how_far)}", file=sys.stderr)
     return INTERRUPTED
 
 
@@ -225,8 +231,9 @@ def _verdict(simulation: Simulation, warned: bool) -> Text:
     n_values = sum(len(table) * (1 + len(table.columns)) for table in run.tables.values())
     of = f" ({plural(n_values, 'value')}), which says nothing of wiring and --ppr" if captured else ""
     only = "; neither was compared with the shaft: see the warning" if warned else ""
+    verdict, style = ("INTERRUPTED", "bold yellow") if simulation.interrupted else ("PASS", "bold green")
     return Text(
-        f"PASS: hardware and golden model agree in every bit of {len(run.updates.clock)} updates "
+        f"{verdict}: hardware and golden model agree in every bit of {len(run.updates.clock)} updates "
         f"and {len(run.ticks.clock)} ticks{of}{only}",
-        style="bold green",
+        style=style,
     )

@@ -78,6 +78,11 @@ class Simulation:
     lockstep: Lockstep
     axes: tuple[Axis, ...]
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether it ended early."""
+        return self.lockstep.actual.n_clocks < self.wanted
+
 
 def simulate(
     spec: CoreSpec,

@@ -272,6 +272,8 @@ def test_ctrl_c_in_the_simulation(
 )
 def test_ctrl_c_from_a_terminal_keeps_what_was_simulated(engine: str, end: signal.Signals, tmp_path: Path) -> None:
     options = [*CORE, "--motion", "constant:20rad/s:1000s", "--engine", engine, *all_outputs(tmp_path / "new")]
+    (tmp_path / "new").mkdir()
+    (tmp_path / "new" / "t.csv").write_text("whole")
     process = subprocess.Popen(
         [*COMMAND, "simulate", *options],
         stdout=subprocess.PIPE,
@@ -287,11 +289,15 @@ def test_ctrl_c_from_a_terminal_keeps_what_was_simulated(engine: str, end: signa
     out, err = process.communicate(timeout=600)
     assert process.returncode == 130, err
     # A loaded machine tells what it does after ten seconds, too.
-    told = re.search(r"^tachometry: interrupted after (\d+) of 20000000 clocks\n\Z", err, re.MULTILINE)
+    told = re.search(r"^tachometry: interrupted after (\d+) of 20000000 clocks, kept in (.*)\n\Z", err, re.MULTILINE)
     assert told is not None, err
     assert summary(out)["simulated"].startswith(f"{told[1]} clocks")
-    assert "PASS" in out
-    assert set(contents(tmp_path / "new")) == {*OUTPUTS.values(), "v.gtkw"}
+    assert "PASS" not in out
+    assert "INTERRUPTED: hardware and golden model agree in every bit of" in out
+    kept = {name.replace(".", ".part.") for name in OUTPUTS.values()}
+    assert {*told[2].split(", ")} == {f"{tmp_path}/new/{name}" for name in kept}
+    assert set(contents(tmp_path / "new")) == {*kept, "t.csv"}
+    assert (tmp_path / "new" / "t.csv").read_text() == "whole"
 
 
 def test_the_glitch_filter_tells_what_it_swallowed(capsys: pytest.CaptureFixture[str]) -> None:
