@@ -4,12 +4,12 @@ import errno
 import itertools
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from tachometry.sim.signals.scratch import Claim, held_back, scratch, stale
+from tachometry.sim.signals.scratch import Claim, held_back, locked, scratch, stale
 
 # What the system says of a disk that takes no more.
 DISK = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO))
@@ -73,7 +73,10 @@ class Outputs:
             return
         with held_back():
             try:
-                self._commit()
+                with ExitStack() as locks:
+                    for parent in sorted(self._staging):  # one process at a time puts files there
+                        locks.enter_context(locked(parent))
+                    self._commit()
             except BaseException:
                 self._discard()
                 raise
@@ -121,8 +124,9 @@ class Outputs:
                 with held_back():
                     missing = [directory for directory in (parent, *parent.parents) if not directory.exists()]
                     for directory in reversed(missing):
-                        self._made.append(directory)
-                        directory.mkdir()
+                        with suppress(FileExistsError):  # another process has just made it
+                            directory.mkdir()
+                            self._made.append(directory)
                     _clear_stale(parent)
                     self._staging[parent] = Claim(parent)
                 for name in (_NEW, _OLD):
@@ -155,7 +159,7 @@ class Outputs:
         with held_back():
             self._remove_staging()
             for directory in reversed(self._made):
-                if directory.is_dir() and not any(directory.iterdir()):
+                with suppress(OSError):  # others use it
                     directory.rmdir()
 
     def _remove_staging(self) -> None:

@@ -118,6 +118,19 @@ def _lock(folder: Path, *, wait: bool) -> int | None:
     return descriptor
 
 
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold a directory, which other processes wait for; where it cannot be locked, they do not."""
+    descriptor = None
+    with suppress(OSError):
+        descriptor = _lock(folder, wait=True)
+    try:
+        yield
+    finally:
+        if descriptor is not None:
+            os.close(descriptor)
+
+
 def run_tool(
     command: Sequence[str],
     folder: Path | None = None,

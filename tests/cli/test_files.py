@@ -1,5 +1,6 @@
 """Outputs appear whole and all together, or not at all."""
 
+import fcntl
 import os
 import resource
 import signal
@@ -148,6 +149,38 @@ def test_what_a_killed_process_has_left_is_removed_and_what_a_living_one_has_sta
     os.close(gate)
     os.waitpid(living, 0)
     assert everything(tmp_path) == {"a": "A", "b": "before"}
+
+
+def test_a_folder_that_another_process_makes_meanwhile_is_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "new").mkdir()
+    with monkeypatch.context() as patch:
+        there = Path.exists
+        patch.setattr(Path, "exists", lambda path: path.name != "new" and there(path))
+        outputs = Outputs({"a": tmp_path / "new" / "a"}).__enter__()
+    outputs["a"].write_text("A")
+    outputs.__exit__(None, None, None)
+    assert everything(tmp_path) == {"new": None, "new/a": "A"}
+
+
+def test_one_process_at_a_time_puts_files_into_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another one could take a file away between the look at it and its replacement."""
+    held, replace = [], Path.replace
+
+    def looked_at(path: Path, target: Path) -> Path:
+        descriptor = os.open(tmp_path, os.O_RDONLY)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            held.append(path.name)
+        finally:
+            os.close(descriptor)
+        return replace(path, target)
+
+    (tmp_path / "a").write_text("before")
+    with monkeypatch.context() as patch, Outputs({"a": tmp_path / "a"}) as outputs:
+        outputs["a"].write_text("A")
+        patch.setattr(Path, "replace", looked_at)
+    assert held == ["a", "a"]
 
 
 def test_a_full_disk_names_the_output(tmp_path: Path) -> None:
