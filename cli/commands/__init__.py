@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from difflib import get_close_matches
 from importlib import import_module
+from pathlib import Path
 
 import click
 from click.shell_completion import shell_complete
@@ -13,6 +14,7 @@ from click.shell_completion import shell_complete
 from tachometry.cli.files import DISK, writable_caches
 from tachometry.cli.options.option import message_of
 from tachometry.sim.signals.progress import show_work
+from tachometry.sim.signals.scratch import PREFIX
 
 COMMANDS = {
     "plan": "Show what a core can measure: resolution and time over speed.",
@@ -142,10 +144,13 @@ def refusals() -> Iterator[None]:
     except subprocess.TimeoutExpired as error:
         raise Refused(f"{os.path.basename(error.cmd[0])} takes longer than {error.timeout:g} s") from error
     except (OverflowError, MemoryError) as error:
-        raise Refused(f"a number is too large for this computer: {error or type(error).__name__}") from error
+        raise Refused(f"a number is too large for this computer: {error or 'out of memory'}") from error
 
 
 def _of_system(error: OSError) -> str:
+    parts = Path(os.fsdecode(error.filename or "")).parts
+    if hidden := [k for k, part in enumerate(parts) if part.startswith(PREFIX)]:
+        return f"cannot write a temporary file in {Path(*parts[: hidden[0]])}: {error.strerror}"
     if error.filename:
         return f"{error.filename}: {error.strerror}"
     if error.errno in DISK:

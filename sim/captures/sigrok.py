@@ -188,7 +188,7 @@ def _damage_named(path: Path) -> Iterator[None]:
     except CaptureError:
         raise
     except ZIP_ERRORS as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
+        reason = " ".join(str(error).split()) or "it ends early"
         raise CaptureError(
             f"{path} must be a whole sigrok session (a zip file), but is cut or damaged: {reason}"
         ) from error

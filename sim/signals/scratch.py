@@ -19,7 +19,7 @@ if sys.platform != "win32":
 _running: set["subprocess.Popen[str]"] = set()
 # What ends a command in order. A terminal that is closed says so by SIGHUP, where there is this signal.
 STOPS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-_PREFIX, _SUFFIX = ".tachometry-", ".tmp"
+PREFIX, _SUFFIX = ".tachometry-", ".tmp"
 _LONGEST = 4 * 3600.0  # seconds of a tool, of which none takes an hour on a slow computer
 _ABANDONED = 24 * 3600.0  # seconds after which a folder is nobody's, where there are no locks
 
@@ -70,7 +70,7 @@ class Claim:
 
     def __init__(self, parent: Path) -> None:
         while True:
-            self.folder = Path(tempfile.mkdtemp(prefix=_PREFIX, suffix=_SUFFIX, dir=parent))
+            self.folder = Path(tempfile.mkdtemp(prefix=PREFIX, suffix=_SUFFIX, dir=parent))
             self._lock = None
             with suppress(FileNotFoundError):
                 self._lock = _lock(self.folder, wait=True)
@@ -89,7 +89,7 @@ class Claim:
 
 def stale(parent: Path) -> Iterator[Path]:
     """Yield temporary folders that killed processes of this user have left, and remove each afterwards."""
-    for folder in parent.glob(f"{_PREFIX}*{_SUFFIX}"):
+    for folder in parent.glob(f"{PREFIX}*{_SUFFIX}"):
         try:
             status = folder.lstat()
             if sys.platform != "win32" and status.st_uid != os.getuid():

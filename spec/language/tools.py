@@ -1,5 +1,7 @@
 """The tools that this project calls fail with many lines, of which one says why."""
 
+import re
+
 _LONGEST = 300  # characters
 _NO_MEMORY = "Cannot allocate memory"
 
@@ -10,4 +12,6 @@ def complaint(said: str) -> str:
     of_error = [line for line in lines if "error" in line.lower()]
     traced = any(line.startswith("Traceback ") for line in lines)  # which quotes its sources, too
     line = (lines[-1:] if traced else of_error or lines[-1:])[0][:_LONGEST]
+    if traced:
+        line = re.sub(r"^[\w.]+: ", "", line)  # the class of a Python error
     return f"{line}; it needs some 5 GB of addresses, see ulimit -v" if _NO_MEMORY in line else line

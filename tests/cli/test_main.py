@@ -69,6 +69,18 @@ main(sys.argv[1:])
         "numpy",
     ],
 )
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (OSError(28, "No space", "/tmp/.tachometry-k3.tmp/new/x"), "cannot write a temporary file in /tmp: No space"),
+        (MemoryError(), "a number is too large for this computer: out of memory"),
+    ],
+)
+def test_no_message_has_a_hidden_file_or_a_class(error: Exception, message: str) -> None:
+    with pytest.raises(Refused, match=f"^{message}$"), refusals():
+        raise error
+
+
 def test_ctrl_c_during_an_import(module: str, tmp_path: Path) -> None:
     words = [sys.executable, "-c", INTERRUPTED, module, *SIMULATE, "--trace", "new/t.csv"]
     done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path)

@@ -63,7 +63,8 @@ class Results:
         beside = self._path.with_name(f".{self._path.name}.lock")
         try:
             with held_back():
-                beside.touch()  # which says it if it cannot be
+                with self._writing():
+                    beside.touch()  # a lock would wait where it cannot be written
                 lock = FileLock(beside, timeout=0)
                 lock.acquire()
                 self._lock = lock

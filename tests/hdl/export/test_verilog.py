@@ -146,7 +146,7 @@ def test_bad_names(name: str, message: str) -> None:
 
 @pytest.mark.parametrize(
     ("said", "told"),
-    [("Traceback:\n  File\nwasmtime._error.WasmtimeError: out of memory", ".*Error: out of memory"), ("", "it fails")],
+    [("Traceback:\n  File\nwasmtime._error.WasmtimeError: out of memory", "out of memory"), ("", "it fails")],
 )
 def test_a_yosys_that_fails_is_told_in_a_line(said: str, told: str) -> None:
     with pytest.raises(OSError, match=rf"^Yosys: {told}$"), bundled_yosys():

@@ -5,6 +5,7 @@ import json
 import re
 import zipfile
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -124,6 +125,12 @@ def test_other_compression(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "x.sr", "a", zipfile.ZIP_BZIP2) as archive:
         archive.writestr("logic-1-1", bytes(4))
     assert_error(tmp_path / "x.sr", "logic-1-1 of PATH must be stored or deflated, not method 12")
+
+
+def test_a_session_that_ends_early_is_told_in_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = make_sr(tmp_path / "x.sr", [bytes(4)])
+    monkeypatch.setattr(zipfile.ZipExtFile, "read", Mock(side_effect=EOFError))
+    assert_error(path, "PATH must be a whole sigrok session (a zip file), but is cut or damaged: it ends early")
 
 
 @pytest.mark.parametrize("chunks", [b"", [b""]])

@@ -41,6 +41,12 @@ def test_rows_are_in_the_order_of_the_sweep(tmp_path: Path) -> None:
     assert [file.name for file in path.parent.iterdir()] == ["r.parquet"]
 
 
+def test_a_lock_that_cannot_be_written_is_told_of_the_file(tmp_path: Path) -> None:
+    (tmp_path / ".r.parquet.lock").symlink_to(tmp_path / "missing" / "x")
+    with pytest.raises(OSError, match=r"^cannot write .*/r\.parquet: No such file"), Results(tmp_path / "r.parquet", [], []):
+        pass
+
+
 def test_what_is_there_is_not_missing_and_stays(tmp_path: Path) -> None:
     path = tmp_path / "r.parquet"
     with Results(path, ["a", "b"], ["speed"]) as results:
