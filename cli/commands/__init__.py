@@ -144,7 +144,7 @@ def refusals() -> Iterator[None]:
     except subprocess.TimeoutExpired as error:
         raise Refused(f"{os.path.basename(error.cmd[0])} takes longer than {error.timeout:g} s") from error
     except (OverflowError, MemoryError) as error:
-        raise Refused(f"a number is too large for this computer: {error or 'out of memory'}") from error
+        raise Refused(f"a number is too large for this computer: {str(error) or 'out of memory'}") from error
 
 
 def _of_system(error: OSError) -> str:

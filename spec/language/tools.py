@@ -12,6 +12,5 @@ def complaint(said: str) -> str:
     of_error = [line for line in lines if "error" in line.lower()]
     traced = any(line.startswith("Traceback ") for line in lines)  # which quotes its sources, too
     line = (lines[-1:] if traced else of_error or lines[-1:])[0][:_LONGEST]
-    if traced:
-        line = re.sub(r"^[\w.]+: ", "", line)  # the class of a Python error
+    line = re.sub(r"^[\w.]+(Error|Exception|Expired): ", "", line)  # the class of a Python error
     return f"{line}; it needs some 5 GB of addresses, see ulimit -v" if _NO_MEMORY in line else line

@@ -13,7 +13,7 @@ from importlib.resources import files
 from pathlib import Path
 from zipfile import ZipFile
 
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import expect, sync_playwright
 from support.nightly import nightly
 from support.script import load
 
@@ -71,14 +71,14 @@ def test_the_browser_writes_the_files_of_the_command(tmp_path: Path) -> None:
         page = browser.new_page()
         page.set_default_timeout(300_000)
         page.goto(f"http://127.0.0.1:{server.server_port}/#lines=2500&clock=100MHz&max-speed=6000rpm&bus=axi-lite")
-        page.wait_for_function("document.querySelector('#methods td')")
+        expect(page.locator("#methods td").first).to_be_visible(timeout=300_000)
         assert page.locator("#moving").is_hidden()
         with page.expect_download() as download:
             page.click("#download")
         download.value.save_as(tmp_path / "core.zip")
         command = page.inner_text("#command")
         page.fill("#o-clock", "48")
-        page.wait_for_function("document.querySelector('#o-clock-error').textContent.includes('48MHz')")
+        expect(page.locator("#o-clock-error")).to_contain_text("48MHz", timeout=300_000)
         browser.close()
         server.shutdown()
     subprocess.run([sys.executable, "-m", *shlex.split(command)[:-1], tmp_path / "build"], check=True)

@@ -12,6 +12,7 @@ import pytest
 from support.command import run
 from support.nightly import only_rows
 
+from tachometry.cli.commands import Refused, refusals
 from tachometry.cli.files import writable_caches
 from tachometry.cli.reports.streams import printable
 from tachometry.cli.reports.terminal import print_rows, print_table
@@ -62,14 +63,6 @@ main(sys.argv[1:])
 
 
 @pytest.mark.parametrize(
-    "module",
-    [
-        "tachometry.cli.commands",
-        "tachometry.spec.methods",  # an import of an import
-        "numpy",
-    ],
-)
-@pytest.mark.parametrize(
     ("error", "message"),
     [
         (OSError(28, "No space", "/tmp/.tachometry-k3.tmp/new/x"), "cannot write a temporary file in /tmp: No space"),
@@ -81,6 +74,14 @@ def test_no_message_has_a_hidden_file_or_a_class(error: Exception, message: str)
         raise error
 
 
+@pytest.mark.parametrize(
+    "module",
+    [
+        "tachometry.cli.commands",
+        "tachometry.spec.methods",  # an import of an import
+        "numpy",
+    ],
+)
 def test_ctrl_c_during_an_import(module: str, tmp_path: Path) -> None:
     words = [sys.executable, "-c", INTERRUPTED, module, *SIMULATE, "--trace", "new/t.csv"]
     done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path)

@@ -43,7 +43,10 @@ def test_rows_are_in_the_order_of_the_sweep(tmp_path: Path) -> None:
 
 def test_a_lock_that_cannot_be_written_is_told_of_the_file(tmp_path: Path) -> None:
     (tmp_path / ".r.parquet.lock").symlink_to(tmp_path / "missing" / "x")
-    with pytest.raises(OSError, match=r"^cannot write .*/r\.parquet: No such file"), Results(tmp_path / "r.parquet", [], []):
+    with (
+        pytest.raises(OSError, match=r"^cannot write .*/r\.parquet: No such file"),
+        Results(tmp_path / "r.parquet", [], []),
+    ):
         pass
 
 
