@@ -182,7 +182,8 @@ def page(found: Mapping[str, Sequence[tuple[str, float, float, float, float]]]) 
 `generate`, `plan` and `explore` estimate the cells and the greatest clock of a core. They count the lookup tables,
 carry chains and memories of its netlist, and find its longest path. The weights are fitted to the cores of
 [size](size.md). Here the estimates are compared with random cores that had no part in the fit: cells as nextpnr packs
-them, MHz as the median of three routings. Single routings differ by 8 % from their median.
+them, MHz as the median of three routings. Single routings differ by 8 % from their median. The greatest clock is
+printed for ECP5 alone: for an iCE40 it may be off by more than 20 %.
 
 {markdown(heads, rows)}"""
     for name, each in found.items():

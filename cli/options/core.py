@@ -250,7 +250,7 @@ FAMILY = option(
     "--family",
     type=click.Choice([*FAMILIES], case_sensitive=False),
     default="ecp5",
-    help="FPGA of the estimated cells and greatest clock: "
+    help="FPGA of the estimated cells and, for ecp5, greatest clock: "
     + ", ".join(f"{name} for {family.title}" for name, family in FAMILIES.items())
     + ". Nothing that is written depends on it.",
 )

@@ -134,7 +134,8 @@ def test_cells_and_clock_are_those_of_the_core_with_its_bus(capsys: pytest.Captu
     cells = [int(re.sub(r"about ([\d,]+),.*", r"\1", rows["cells"]).replace(",", "")) for rows in (alone, on_bus)]
     assert cells[0] + 100 < cells[1]
     assert alone["cells"].endswith("(ECP5)")
-    assert on_bus["greatest clock"].endswith("MHz (iCE40 HX); seeds of the router differ by 8%")
+    assert alone["greatest clock"].endswith("MHz (ECP5); seeds of the router differ by 8%")
+    assert "greatest clock" not in on_bus  # of an iCE40 it is not known within 20 %
     assert on_bus["registers"].startswith("9 of 32 bits on apb")
     assert "warning" not in alone
 
