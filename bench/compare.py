@@ -95,7 +95,7 @@ for bit, and float models of what other projects use and of estimators in the li
 {verdict}
 **When to use what**, according to the tables below:
 
-- *Tracking* (`--method track`): use it if the tick has 830 clocks (250 with a multiplier of the FPGA), and 800 cells
+- *Tracking* (`--method track`): use it if the tick has 852 clocks (264 with a multiplier of the FPGA), and 800 cells
   and block RAMs are free. It has no settings. Of our cores it has the smallest error, except with faulty lines. It also
   outputs the acceleration and the position between counts.
 - *S*: use it if there is no timer faster than the tick, or if ticks are shorter than 18 µs, down to a clock; it is the
