@@ -18,8 +18,9 @@ from health import EXAMPLES, told
 from monitor import CORE as MONITORED
 from motions import OTHERS, SITUATIONS
 from pages import ROOT, block
-from situations import RIVALS, errors
-from tracking import found
+from situations import RIVALS, core, errors
+from tracking import errors as tracking_errors
+from tracking import rms
 
 from tachometry.boards.monitor.columns import columns
 from tachometry.cli.explore import answers
@@ -51,8 +52,11 @@ def measured_core(name: str) -> tuple[list[str], str]:
 @cache
 def tracking() -> list[str]:
     """Return error and coverage of the tracking method in all situations."""
-    pairs = [found(situation, SEED, "20us") for situation in (*SITUATIONS, *OTHERS)]
-    return [f"{error:.7f} {covered:.1f}" for error, covered in pairs]
+    every = [
+        tracking_errors(core(situation, "track", {"tick": "20us"}), situation, SEED)
+        for situation in (*SITUATIONS, *OTHERS)
+    ]
+    return [f"{rms(one.core):.7f} {one.covered:.1f}" for one in every]
 
 
 @cache
