@@ -14,6 +14,7 @@ from pathlib import Path
 
 if sys.platform != "win32":
     import fcntl
+if sys.platform == "linux":  # a browser has none
     import resource
 
 _running: set["subprocess.Popen[str]"] = set()
