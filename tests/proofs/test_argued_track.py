@@ -58,21 +58,6 @@ def test_instructions_that_are_not_there() -> None:
     assert not {addresses[one.store] for one in code if one.store} & {*range(104, 112)}
 
 
-def test_factors_are_below_2_22(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The longest is a time, which is told up to here."""
-    form, machine, factors = BLOCK.form, Interpreter(PROGRAM), set[int]()
-    product = machine._unit._product
-
-    def seen(sum_: int, by: int, how: str) -> int:
-        factors.add(by)
-        return product(sum_, by, how)
-
-    monkeypatch.setattr(machine._unit, "_product", seen)
-    for row in windows(BLOCK, 1, 200).rows():
-        machine.tick(*row)
-    assert 1 << 15 < max(factors) <= form.most_since + PROGRAM.constants["lead"] < 1 << 22
-
-
 def counted(mutant: Callable[[int], int]) -> tuple[int, int]:
     """Return the clock in which an external tick may end first, and the one in which it ends without one."""
     start, first = BLOCK.form.longest_tick - 2, BLOCK.times.min_tick_cycles - 2
