@@ -2,9 +2,7 @@
 
 from collections.abc import Callable, Iterator
 
-import pytest
 from proofs.mutation.cases import CASES
-from support.tracking import Interpreter, windows
 
 from tachometry.sim.golden.methods.track_recursion import log2
 from tachometry.spec import TrackTachometer
