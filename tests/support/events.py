@@ -194,15 +194,15 @@ def covered_by_timed(spec: TimedTachometer, run: Run) -> dict[str, int]:
 
 def covered(spec: TachometerSpec, trace: PinTrace, run: Run) -> Counter[str]:
     """Tell how often each event of the coverage table happened."""
-    updates = run.updates
+    updates, stalled = run.updates, run.tables[spec.facts.stalls_with].stalled
     sign = np.sign(updates.velocity)
     found = Counter(
         covered_by_method(spec, run)
         | {
             "m_e saturated": _count(run.ticks.overflow),
             "sign change": _count(np.diff(sign[sign != 0])),
-            "stalled": _count(run.ticks.stalled),
-            "count after stalled": _count(np.diff(run.ticks.stalled.astype(np.int64)) < 0),
+            "stalled": _count(stalled),
+            "count after stalled": _count(np.diff(stalled.astype(np.int64)) < 0),
             "index captured": len(run.index.clock),
             "position reset": len(run.index.clock) * spec.front_end.index_resets,
             "external tick": len(run.ticks.clock) * spec.external_tick,
