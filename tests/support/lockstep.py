@@ -139,7 +139,7 @@ def watched(spec: TachometerSpec, rng: np.random.Generator) -> TachometerSpec:
     if rng.random() < 0.5:
         return spec
     edges, errors = (int(rng.integers(least, 4)) for least in (2, 0))
-    compare = Compare(int(rng.integers(-3, 4)), int(rng.integers(3, 6)), int(rng.choice([0, 3, 40])), "2clk")
+    compare = Compare(int(rng.integers(-3, 4)), int(rng.integers(3, 6)), int(rng.choice([0, 3, 25])), "2clk")
     compare = replace(compare, direction=str(rng.choice(DIRECTIONS)))
     limit = Speed(Fraction(str(round(spec.scale.greatest_speed * rng.uniform(0.02, 0.5), 3) or 0.001)))
     return replace(spec, health=Health(edges, errors), over_speed=limit, compare=compare)
