@@ -5,6 +5,7 @@ Exit codes: 0, 2 if a bitstream cannot be made.
 
 import argparse
 import json
+import re
 import resource
 import subprocess
 import sys
@@ -46,7 +47,7 @@ def row(name: str, said: str, seconds: float) -> tuple[str, ...]:
     """Return a row of the table from what the command has printed."""
     rows = [line.split("  ", 1) for line in said.split("\n\n")[1].splitlines()]
     told = {key.strip(): value.strip() for key, value in rows}
-    cells = ", ".join(f"{value} {key}" for key, value in told.items() if " of " in value and value[0] != "0")
+    cells = ", ".join(f"{value} {key}" for key, value in told.items() if re.match(r"[1-9][\d,]* of ", value))
     fmax = told["Fmax"].split(" MHz")[0]
     return BOARDS[name].title, cells, fmax, f"{BOARDS[name].clock_hz / 1e6:g}", f"{seconds:.0f}"
 
