@@ -22,7 +22,8 @@ LIKE_OTHERS = re.compile(
     "|default|m|t|mt|rairan"
 )
 RECOMPUTED = {"encoder.md", "encoder.svg", "figures.md", "sweep.md"}  # as a whole, by tests of their own
-RUNS = {"bench.md", "estimate.md", "formal.md", "mutation.md", "upset.md", "verify.md"}  # speeds, proofs and samples of wrong cores
+# Speeds, routings, proofs and samples of wrong cores.
+RUNS = {"bench.md", "estimate.md", "formal.md", "mutation.md", "upset.md", "verify.md"}
 OTHERS = {f"docs/measured/{name}" for name in RECOMPUTED | RUNS}
 OTHERS |= {"docs/demo.png"}  # tests/test_readme.py draws it
 OTHERS |= {"docs/overview.svg", "docs/guides/wiring.svg"}  # by hand
