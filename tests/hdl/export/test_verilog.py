@@ -151,3 +151,11 @@ def test_bad_names(name: str, message: str) -> None:
 def test_a_yosys_that_fails_is_told_in_a_line(said: str, told: str) -> None:
     with pytest.raises(OSError, match=rf"^Yosys: {told}$"), bundled_yosys():
         raise YosysError(said)
+
+
+def test_a_constant_that_is_cut_is_an_error_outside_of_the_tests() -> None:
+    """In a process of its own, as pytest makes all warnings errors."""
+    script = "import tachometry.hdl; from amaranth import Signal; Signal(1, init=2)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "SyntaxWarning: Initial value 2 will be truncated" in done.stderr
