@@ -49,7 +49,7 @@ def test_the_errors_are_those_of_an_independent_model(name: str) -> None:
 def test_lines_at_fault(faults: dict[str, str]) -> None:
     """Edges are lost, and so are counts where both lines change at once."""
     own, other = errors(replace(ROWS["trapezoid, real"], faults=faults), 1, beside=True)
-    assert 0.75 * other < own < 1.1 * other
+    assert 0.85 * other < own < 1.1 * other
 
 
 OTHER_CORES = [
