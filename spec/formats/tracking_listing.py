@@ -97,15 +97,16 @@ heard:
     e - mu over 2
     minus_D4 s+ e; if pos goto alone
     mu = mu + ~ keep
-    quick log_dt + log_32 exp
+    quick log_dt + log_45 exp
     since + lead by
     minus_D3 s+ mu s+ mu; if neg goto calm
-    small log_dt + log_32 exp
+    small log_dt + log_45 exp
     T = memory - ~ lo+ ~
     slow_T = zero
     log_X + log_256; if pos goto kept
     e over 1                            # the memory was long: half of the error is of the place
     log_e = log_e + log_half
+    mu = mu s+ minus_Ds
     P = P + ~
     e = e - ~
 kept:
@@ -239,11 +240,12 @@ shrinks:
     end
 some:
     w = minus_Ds - ~ min minus_sixteenth
-    goto scaled
+    goto five
 long:
     trouble = trouble - log_9_4
     minus_Ds = minus_Ds - ~ - ~
     w = sum min minus_sixteenth
+five:
     doubt = trouble + log_9_4 hi+ log_8
     minus_D3 = w + w + w
     minus_D4 = sum + w + w              # five of them
@@ -319,7 +321,7 @@ begin:
     before = zero; slow_T = zero; T = dt; log_T = log_dt
     log_X = log_quarter; after = zero; quality = of_curve
     if one goto show
-    log_T = log_dt - log_32 exp         # means of many counts are by logarithms: they are forgotten
+    log_T = log_dt - log_64 - log_half exp     # means of many counts are by logarithms: they are forgotten
     T = ~
     goto show
 same:

@@ -119,12 +119,15 @@ class Tracker:
     @property
     def certain(self) -> float:
         """The noise of alarms, which also an edge has that shares no tick."""
-        middle = not self.long and self.share < 1 / 64
-        return max(self.noise * 5 / 4 if middle else self.sure, 1 / 16)
+        return max(self.noise * 5 / 4 if self.some and not self.long else self.sure, 1 / 16)
+
+    @property
+    def some(self) -> bool:
+        return self.share < 1 / 64
 
     @property
     def alarm(self) -> float:
-        return (4 + self.long) * self.certain
+        return (4 + self.some) * self.certain
 
     def _remember(self, e: float, dt: float) -> tuple[float, float]:
         """Let the memory grow or fall; the share of the event in it, and how far the place moves at once."""
@@ -143,7 +146,10 @@ class Tracker:
         if abs(e) > self.alarm:
             least = 8 * dt
         elif abs(self.mean) > 3 / 2 * self.certain:
-            least, more = 32 * dt, e / 2 if self.long else 0
+            least = 2**5.5 * dt
+            if self.long:
+                more = e / 2
+                self.mean -= math.copysign(self.sure, self.mean)
         if least < math.inf:
             self.memory, self.slow_until = min(self.memory, least), 0
         return min(dt / self.memory, 1 / 4), more

@@ -123,10 +123,10 @@ struct Recursion : Tables {
     bool sudden = std::abs(e) >= alarm;
     if (sudden) slow_until = 0, grown = std::min(grown, power(log_dt + k.log_8, 1));
     else if (2 * std::abs(mean) >= 3 * certain) {
-      slow_until = 0, grown = std::min(grown, power(log_dt + k.log_32, 1));
+      slow_until = 0, grown = std::min(grown, power(log_dt + k.log_45, 1));
       if (log_share + k.log_256 < 0) {
         int64_t half = round(e, 1);
-        P += half, e -= half, log_e += k.log_half;
+        P += half, e -= half, log_e += k.log_half, mean -= sign_of(mean) * sure;
       }
     }
     memory = grown, log_memory = log2(memory);
@@ -166,8 +166,9 @@ struct Recursion : Tables {
     bool is_long = log_share + k.log_256 < 0;
     int64_t quarter = round(noise, 2);
     if (is_long) sure += 2 * quarter, lagging += k.log_9_4;
-    certain = std::max(sure + (!is_long && log_share + k.log_64 < 0 ? quarter : 0), k.sixteenth);
-    alarm = (4 + is_long) * certain;
+    bool some = log_share + k.log_64 < 0;
+    certain = std::max(sure + (some && !is_long ? quarter : 0), k.sixteenth);
+    alarm = (4 + some) * certain;
     slack = k.half + (log_share + k.past_8 >= 0 ? 2 * sure : 0);
     grows = 1, log_growth = 0;
     trouble = 2 * log2(lag) - lagging;
@@ -182,7 +183,7 @@ struct Recursion : Tables {
     phase = 2, slips = k.none, lost = 0;
     v = shown_v = power(log2(e) + k.of_velocity - log_dt, sign_of(e));
     p = at - moved, edge = raw - moved;
-    since = tau, log_memory = n > 1 ? log_dt - k.log_32 : log_dt, memory = n > 1 ? power(log_memory, 1) : dt, log_share = k.log_quarter;
+    since = tau, log_memory = n > 1 ? log_dt - k.log_64 - k.log_half : log_dt, memory = n > 1 ? power(log_memory, 1) : dt, log_share = k.log_quarter;
     a = shown_a = mean = lag = error = slow_until = 0, quality = k.of_curve;
     emit(ahead(), place());
     ready();

@@ -157,17 +157,18 @@ class Recursion:
                 return self._begin(n, at, raw, tau, dt, log_dt)
             self.p = at - self._moved
             return self._emit(self._ahead())
-        # A change of the speed leaves 8 or 32 events.
+        # A change of the speed leaves 8 or 45 events.
         quarter = self._round(e - self.mean, 2)
         self.mean += quarter
         sudden = abs(e) >= self.alarm
         if sudden:
             self.slow_until, memory = 0, min(memory, self._power(log_dt + k["log_8"]))
         elif 2 * abs(self.mean) >= 3 * self.certain:
-            self.slow_until, memory = 0, min(memory, self._power(log_dt + k["log_32"]))
+            self.slow_until, memory = 0, min(memory, self._power(log_dt + k["log_45"]))
             if self.log_share + k["log_256"] < 0:
                 half = self._round(e, 1)
                 p, e, log_e = p + half, e - half, log_e + k["log_half"]
+                self.mean += -self.sure if self.mean >= 0 else self.sure
         self.memory, self.log_memory = memory, log2(memory)
         # The least squares.
         self.log_share = x = min(log_dt - self.log_memory, k["log_quarter"])
@@ -233,7 +234,7 @@ class Recursion:
             self.sure = self.certain = self.noise + 2 * quarter
             lagging, times = lagging + k["log_9_4"], 5
         elif self.log_share + k["log_64"] < 0:
-            self.certain += quarter
+            self.certain, times = self.certain + quarter, 5
         self.certain = max(self.certain, k["sixteenth"])
         self.alarm = times * self.certain
         self.slack = k["half"] + (2 * self.sure if self.log_share + k["past_8"] >= 0 else 0)
@@ -262,7 +263,7 @@ class Recursion:
         self.p, self.edge = at - self._moved, raw - self._moved
         self.since, self.memory, self.log_memory, self.log_share = tau, dt, log_dt, k["log_quarter"]
         if n > 1:
-            self.log_memory -= k["log_32"]
+            self.log_memory -= k["log_64"] + k["log_half"]
             self.memory = self._power(self.log_memory)
         self.a = self.shown_a = self.mean = self.lag = self.error = self.slow_until = 0
         self.quality = k["of_curve"]

@@ -117,18 +117,17 @@ def test_no_noise_of_a_disc_is_taken_for_a_change_of_the_speed(rate: float) -> N
 
 
 def test_a_disc_off_centre_raises_no_alarm() -> None:
-    """Nor in a swing, which is followed within twice the error of an alarm."""
+    """Nor an edge whose jitter is six times the standard deviation (seed 1); nor a swing."""
     spec = core(tick="20us", max_time="100ms", max_speed="400rad/s")
-    assert BENCH.steady(spec, 1.5, 0.05, 2, off_centre=0.25, n=500_000, first=50_000).max() < BENCH.BURST
-    assert BENCH.swinging(220, 60, 5, 0.25, 2).max() < 2 * BENCH.BURST
+    assert BENCH.steady(spec, 1.5, 0.05, 1, off_centre=0.25, n=500_000, first=50_000).max() < BENCH.BURST
+    assert BENCH.swinging(220, 60, 5, 0.25, 2).max() < BENCH.BURST
 
 
 @nightly
 @pytest.mark.parametrize("case", list(BENCH.alarm_cases(10)), ids=lambda case: f"{case[0]}, {case[1]}")
 def test_false_alarms_are_few(case: tuple[str, str, float, int, Callable[[int], NDArray[np.float64]]]) -> None:
-    """None in 10^7 counts at a constant speed; few in swings and starts, and these are small."""
-    motion, _, limit, runs, run = case
+    """None in 10^7 counts at a constant speed or in 10 swings; at most 4 in 200 starts."""
+    _, _, limit, runs, run = case
     worst = np.array([run(seed).max() for seed in range(runs)])
-    share = 0.5 if "±" in motion else 0.04 if "start" in motion else 0
-    assert np.mean(worst > limit) <= share
-    assert worst.max() < (2.5 if share else 1) * limit
+    assert np.sum(worst > limit) <= runs // 50
+    assert worst.max() < 2.5 * limit
