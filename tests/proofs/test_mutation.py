@@ -1,5 +1,6 @@
 """The short form of `make mutate`: some mutants of one core, and what it says when they are not noticed."""
 
+import json
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -7,15 +8,12 @@ from unittest.mock import patch
 
 import numpy as np
 import proofs.mutation.__main__ as command
-import proofs.mutation.equivalent
 import proofs.mutation.score
 import pytest
 from proofs.mutation.cases import CASES
-from proofs.mutation.cones import alike
-from proofs.mutation.equivalent import equivalent
 from proofs.mutation.loops import LOOPS, Commanded
-from proofs.mutation.netlist import GROUP, exported, mutants
-from proofs.mutation.score import hold
+from proofs.mutation.netlist import GROUP, Mutant, exported, mutants
+from proofs.mutation.score import Score, hold
 from proofs.mutation.simulate import library, run
 from proofs.mutation.stimulus import steps, stimulus
 from support.nightly import nightly
@@ -37,22 +35,40 @@ def small(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
 
 
 @nightly
-def test_mutants_are_killed_or_equivalent(small: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_most_mutants_are_killed(small: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(["mt"])
-    assert "| mt, all | 40 |" in (total := capsys.readouterr().out.splitlines()[-1])
-    assert "| 100.0 % |" in total
+    assert "\n| mt, all | 40 |" in capsys.readouterr().out
+
+
+def test_a_mutant_that_was_killed_must_be_killed_again(small: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    sample = [Mutant(f"mutate -mode inv -cell c{number} -src hdl/{number}.py:1") for number in range(40)]
+    record = tmp_path / "survivors.json"
+    record.write_text("{}")
+    small.setattr(command, "SURVIVORS", record)
+
+    def passes(survivors: list[int], sample: list[Mutant] = sample) -> bool:
+        small.setattr(command, "judge", lambda case, pool: Score(case, sample, survivors))
+        return command.main(["mt", "-o", str(tmp_path / "page.md")])
+
+    (tmp_path / "page.md").write_text("<!-- mt -->\n<!-- end of mt -->\n")
+    assert not passes([*range(9)])  # 77.5 %
+    assert passes([*range(8)])
+    assert not passes([0, 8])
+    # Other lines of the same cells are the same sample; another cell makes another one.
+    assert not passes([8], [replace(one, command=one.command.replace("py:1", "py:2")) for one in sample])
+    assert passes([0, 8], sample[:-1])
+    assert json.loads(record.read_text())[CASE.name][1] == [0, 8]
 
 
 @nightly
 def test_mutants_of_a_control_loop_are_killed(monkeypatch: pytest.MonkeyPatch) -> None:
     """A few of them; the core is that of the golden model, with its commands."""
     monkeypatch.setattr(proofs.mutation.score, "CLOCKS", 30_000)
-    monkeypatch.setattr(proofs.mutation.score, "equivalent", lambda case, flat, group, *more: [False] * len(group))
     case = next(case for case in LOOPS if case.name == "loop, conventional")
     with ThreadPoolExecutor(1) as pool:
         found = proofs.mutation.score.judge(replace(case, mutants=12), pool)
-        assert (found.mutants, found.killed + len(found.survivors)) == (12, 12)
-        assert found.killed >= 10, found.survivors
+        assert len(found.mutants) == 12
+        assert len(found.survivors) <= 2
         # With commands that were not taken it is not that of the golden model.
         played = case.play(3000)
         parts = [
@@ -62,24 +78,6 @@ def test_mutants_of_a_control_loop_are_killed(monkeypatch: pytest.MonkeyPatch) -
         ]
         with pytest.raises(AssertionError, match="loop, conventional, from clock"):
             proofs.mutation.score.judge(replace(case, mutants=12), pool, replace(played, traces=parts))
-
-
-@nightly
-def test_what_is_killed_is_not_proven_equivalent(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(proofs.mutation.equivalent, "_SECONDS", 2)
-    played = stimulus(CASE.spec, CLOCKS)
-    # As many as are played at once: among forty, none may be noticed late.
-    flat, found = mutants(exported(CASE.component), GROUP, tmp_path)
-    clocks = np.full(len(found), -1, dtype=np.int64)
-    run(library(CASE.pins, flat, found), clocks, len(CASE.pins.outputs), played.pins)
-    # Those that are the last to be noticed are the most like the core.
-    latest = [found[number] for number in np.argsort(clocks)[-4:]]
-    assert clocks.max() > CLOCKS // 25
-    proven = alike(CASE, flat, found, tmp_path)
-    assert any(proven)
-    assert not (proven & (clocks >= 0)).any()
-    with ThreadPoolExecutor(2) as pool:
-        assert not any(equivalent(CASE, flat, latest, played.pins, tmp_path, pool))
 
 
 @nightly

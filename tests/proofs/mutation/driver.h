@@ -4,13 +4,11 @@
 
 #define ENTRY extern "C" __attribute__((visibility("default")))
 
-constexpr int64_t NEVER = -1;
-
 struct Job {
   int64_t n_clocks;
   const uint64_t *pins;  // of each clock, in N_WORDS words; the lowest bit is the reset
   int64_t n_mutants;  // their selectors are 1 … n_mutants
-  int64_t *killed;  // clock in which an output differed, or NEVER; who is not NEVER at first is not played
+  int64_t *killed;  // clock in which an output differed, or -1, as at first
   int64_t *rows;  // clock and outputs of the core without a mutant, in every clock with a strobe
   int64_t n_rows, capacity;
 };
@@ -37,7 +35,7 @@ ENTRY void mutation_run(Job *job) {
   for (int k = 0; k <= job->n_mutants; k++) {
     tops.emplace_back(new Top);
     select(*tops[k], k);
-    if (k && job->killed[k - 1] == NEVER) alive.push_back(k);
+    if (k) alive.push_back(k);
   }
   for (int64_t clock = 0; clock < job->n_clocks; clock++) {
     int64_t right[N_OUTPUTS], wrong[N_OUTPUTS];

@@ -98,32 +98,19 @@ def mutants(netlist: str, number: int, folder: Path, selection: str = "t:*") -> 
     return (folder / "flat.il").read_text(), found[:number]
 
 
-def selected(group: list[Mutant]) -> list[str]:
-    """Return commands of Yosys: the input `SELECTOR` makes the netlist the mutant that it counts from 1, or none."""
-    return [
+def grouped(flat: str, group: list[Mutant], folder: Path) -> str:
+    """Return one netlist with a group of mutants: input `SELECTOR` selects one, counted from 1, or none."""
+    (folder / "flat.il").write_text(flat)
+    commands = [
         mutant.command.replace("mutate ", f"mutate -ctrl {SELECTOR} {WIDTH} {number} ", 1)
         for number, mutant in enumerate(group, 1)
     ]
-
-
-def grouped(flat: str, group: list[Mutant], folder: Path) -> str:
-    """Return one netlist with a group of mutants."""
-    (folder / "flat.il").write_text(flat)
-    begin = ["read_rtlil flat.il", "write_json flat.json", *selected(group), "write_json group.json"]
+    begin = ["read_rtlil flat.il", "write_json flat.json", *commands, "write_json group.json"]
     yosys("\n".join([*begin, "write_rtlil group.il", ""]), folder)
     # A net of which one bit is mutated would seem to depend on itself.
     end = [*_initial(folder), "splitnets -driver", "opt_clean", "write_rtlil group.il", ""]
     yosys("\n".join(["read_rtlil group.il", *end]), folder)
     return (folder / "group.il").read_text()
-
-
-def power_up(module: dict[str, Any]) -> dict[Any, str]:
-    """Return initial values of bits, of a module in Yosys' JSON."""
-    levels: dict[Any, str] = {}
-    for net in module["netnames"].values():
-        if "init" in net["attributes"]:
-            levels.update(zip(net["bits"], reversed(net["attributes"]["init"]), strict=True))
-    return levels
 
 
 def _initial(folder: Path) -> list[str]:
@@ -133,7 +120,10 @@ def _initial(folder: Path) -> list[str]:
     (flat,), (group,) = (
         json.loads((folder / f"{name}.json").read_text())["modules"].values() for name in ("flat", "group")
     )
-    levels = power_up(flat)
+    levels: dict[Any, str] = {}
+    for net in flat["netnames"].values():
+        if "init" in net["attributes"]:
+            levels.update(zip(net["bits"], reversed(net["attributes"]["init"]), strict=True))
     names = {net["bits"][0]: name for name, net in group["netnames"].items() if len(net["bits"]) == 1}
     return [
         f"setattr -set init 1'1 w:{names[bit]}"

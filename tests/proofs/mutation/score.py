@@ -1,5 +1,6 @@
 """The mutants of a core are judged here."""
 
+import re
 import tempfile
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -8,31 +9,29 @@ from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
-from proofs.mutation.argued import argued
 from proofs.mutation.cases import Case
-from proofs.mutation.cones import alike
-from proofs.mutation.equivalent import equivalent
 from proofs.mutation.netlist import GROUP, Mutant, exported, mutants
 from proofs.mutation.simulate import library, run
 from proofs.mutation.stimulus import Stimulus
 
+from tachometry.sim import build
 from tachometry.sim.signals.run import compare, observed
-from tachometry.spec import TrackTachometer
 
 CLOCKS = 400_000  # of the stimulus
-_LITTLE = 8  # part of it, after which it is worth a proof to be still there
 
 
 @dataclass(frozen=True)
 class Score:
-    """Counts the mutants of a core, and holds the survivors that nothing shows to be equivalent."""
+    """Mutants of a core, and the indices of those that no output shows."""
 
     case: Case
-    mutants: int
-    killed: int
-    equivalent: int
-    argued: int
-    survivors: list[Mutant]
+    mutants: list[Mutant]
+    survivors: list[int]
+
+    @property
+    def digest(self) -> str:
+        """Digest of the sample, without the lines of the HDL."""
+        return build.digest(*(re.sub(r" -src \S+", "", mutant.command) for mutant in self.mutants))
 
 
 def judge(case: Case, pool: Executor, played: Stimulus | None = None) -> Score:
@@ -44,37 +43,20 @@ def judge(case: Case, pool: Executor, played: Stimulus | None = None) -> Score:
         If the core without a mutant differs from the golden model.
     """
     played = played or case.play(CLOCKS)
-    n_outputs = len(case.pins.outputs)
     with tempfile.TemporaryDirectory() as folder, patch("tachometry.spec.methods.s.MAX_TABLE", case.max_table):
         flat, found = mutants(exported(case.component), case.mutants, Path(folder), case.selection)
-
     killed = np.full(len(found), -1, dtype=np.int64)
-    proven = np.zeros(len(found), dtype=bool)
 
     def judged(first: int) -> NDArray[np.int64]:
-        """Play a little, prove what is left, and play all on what is not proven; the rows of the core."""
+        """Play a group; return the rows of the core from the first one."""
         group = slice(first, first + GROUP)
-        some, own, same = found[group], killed[group], proven[group]
-        made = library(case.pins, flat, some)
-        run(made, own, n_outputs, played.pins[: len(played.pins) // _LITTLE])
-        with tempfile.TemporaryDirectory() as folder:
-            same[own < 0] = alike(case, flat, [some[number] for number in np.flatnonzero(own < 0)], Path(folder))
-        own[same] = 0
-        return run(made, own, n_outputs, played.pins, 0 if first or not played.traces else len(played.pins))
+        n_rows = 0 if first or not played.traces else len(played.pins)
+        return run(library(case.pins, flat, found[group]), killed[group], len(case.pins.outputs), played.pins, n_rows)
 
     rows, *_ = pool.map(judged, range(0, len(found), GROUP))
     with patch("tachometry.spec.methods.s.MAX_TABLE", case.max_table):
         hold(case, played, rows)
-    left = [found[number] for number in np.flatnonzero(killed < 0)]
-    more = [False] * len(left)
-    if not isinstance(case.spec, TrackTachometer):  # whose program no solver can follow
-        with tempfile.TemporaryDirectory() as folder:
-            more = equivalent(case, flat, left, played.pins, Path(folder), pool)
-    left = [mutant for mutant, same in zip(left, more, strict=True) if not same]
-    survivors = [mutant for mutant in left if not argued(case.name, mutant)]
-    n_proven = int(proven.sum())
-    n_killed = int((killed >= 0).sum()) - n_proven
-    return Score(case, len(found), n_killed, n_proven + sum(more), len(left) - len(survivors), survivors)
+    return Score(case, found, np.flatnonzero(killed < 0).tolist())
 
 
 def hold(case: Case, played: Stimulus, rows: NDArray[np.int64]) -> None:

