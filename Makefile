@@ -98,9 +98,8 @@ formal-quick: $(VENV)/.formal ## the same of a small core for every checker, and
 upset: $(VENV)/.test ## flip-flops upset at random, and how long that is seen, written to docs/measured/upset.md
 	PYTHONPATH=tests $(BIN)/python -m proofs.upset -o docs/measured/upset.md
 
-mutate: $(VENV)/.test icarus ## how many wrong cores and wrong lines of Python the tests notice, written to docs/measured/mutation.md
+mutate: $(VENV)/.test icarus ## how many wrong cores the tests notice, written to docs/measured/mutation.md
 	PYTHONPATH=tests $(BIN)/python -m proofs.mutation -o docs/measured/mutation.md
-	PYTHONPATH=tests $(BIN)/python -P -m proofs.python_mutation -o docs/measured/mutation.md
 
 bench: $(VENV)/.test ## speed of the golden models, of the engines and of sweeps, written to docs/measured/bench.md and sweep.md
 	$(BIN)/python bench/golden.py -o docs/measured/bench.md
