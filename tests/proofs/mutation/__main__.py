@@ -1,7 +1,7 @@
 """How many wrong cores the tests' motions tell from the right one: `make mutate`.
 
-Names of methods as arguments choose those, `registers` what is around a core, `axes` cores of many, and `loop` control
-loops. A mutant that `survivors.json` has as killed must be killed again; -o writes that file, too.
+Names of methods as arguments choose those, `registers` what is around a core, `axes` cores of many, `extras` options,
+and `loop` control loops. A mutant that `survivors.json` has as killed must be killed again; -o writes that file, too.
 """
 
 import json
@@ -17,7 +17,7 @@ from support.report import Table, arguments, chosen
 
 from tachometry.spec import METHODS
 
-GROUPS = (*METHODS, "registers", "axes", "loop")
+GROUPS = (*METHODS, "registers", "axes", "extras", "loop")
 LEAST = 0.80  # of all mutants, also of those that no input can show
 SURVIVORS = Path(__file__).with_name("survivors.json")  # by core: digest of its sample, and indices in it
 

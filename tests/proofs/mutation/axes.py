@@ -1,4 +1,4 @@
-"""Cores of many axes that are mutated, and what is played on them: a motion of its own on every axis."""
+"""Cores of many axes and of many options that are mutated, and the motions that are played on them."""
 
 from dataclasses import dataclass
 
@@ -10,55 +10,80 @@ from proofs.mutation.stimulus import Stimulus, bursts, noise, steady
 
 from tachometry.hdl import core_of
 from tachometry.sim.encoder.stress import stress
-from tachometry.sim.signals.axes import AxesTrace
+from tachometry.sim.signals.axes import AxesTrace, Trace
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.spec import AxesSpec, Encoder, Speed, STachometer, TachometerSpec, Timing
+from tachometry.spec import AxesSpec, Encoder, Speed, STachometer, TachometerSpec, Timing, of_texts
 from tachometry.spec.core.index import Index
 
 _EDGES = 10  # of a motion, at each of its speeds
 
 
+class MotionCase(Case):
+    """A core that is played motions, with resets in the middle."""
+
+    def motion(self, rng: np.random.Generator, number: int) -> Trace:
+        """Return the motion of this number."""
+        raise NotImplementedError
+
+    def play(self, n_clocks: int) -> Stimulus:
+        """Return motions until they have this many clocks."""
+        rng = np.random.default_rng(1)
+        pins, traces, starts = list[NDArray[np.uint64]](), list[Trace](), list[int]()
+        done = 0
+        while done < n_clocks:
+            trace = self.motion(rng, len(traces))
+            # Some end early: the next reset comes in the middle.
+            early = rng.random() < 0.5
+            trace = trace.until(int(rng.integers(1, trace.n_clocks)) if early else trace.n_clocks)
+            resets = int(rng.choice([1, 1, 2, 5]))
+            row = np.searchsorted(trace.clock, np.arange(trace.n_clocks), side="right") - 1
+            reset = np.zeros((resets, self.pins.n_words), dtype=np.uint64)
+            reset[:, 0] = rng.integers(0, 256, resets).astype(np.uint64) | np.uint64(1)
+            starts.append(done + resets)
+            pins += [reset, self.pins.words(trace.n_clocks, {name: line[row] for name, line in trace.lines.items()})]
+            traces.append(trace)
+            done += resets + trace.n_clocks
+        return Stimulus(np.concatenate(pins), traces, starts)
+
+
 @dataclass(frozen=True)
-class AxesCase(Case):
+class PartCase(MotionCase):
+    """A core of one axis, of which only the boxes in these files are mutated."""
+
+    files: tuple[str, ...] = ()
+
+    group = "extras"
+
+    @property
+    def selection(self) -> str:  # type: ignore[override]
+        """Cells of these files."""
+        sources = [f"a:src=*/{file}.py*" for file in self.files]
+        return " ".join([*sources, *["%u"] * (len(sources) - 1), "t:* %i"])
+
+    def motion(self, rng: np.random.Generator, number: int) -> Trace:
+        """Return edges, illegal transitions and pulses at all inputs."""
+        trace = stress(self.spec, int(rng.integers(1 << 30)), _EDGES + int(rng.integers(_EDGES)))
+        return trace.completed(self.spec)
+
+
+@dataclass(frozen=True)
+class AxesCase(MotionCase):
     """A core of many axes."""
 
     spec: AxesSpec  # type: ignore[assignment]
 
     # The arithmetic is that of one axis, and is mutated there.
     selection = "a:src=*hdl/axes/* t:* %i"
-
-    @property
-    def group(self) -> str:
-        """Which row of the last table."""
-        return "axes"
+    group = "axes"
 
     @property
     def component(self) -> wiring.Component:
         """The core."""
         return core_of(self.spec)
 
-    def play(self, n_clocks: int) -> Stimulus:
-        """Return motions, bursts and noise, with resets in the middle."""
-        rng = np.random.default_rng(1)
-        spec, pins = self.spec, list[NDArray[np.uint64]]()
-        traces, starts = list[AxesTrace](), list[int]()
-        done = 0
-        while done < n_clocks:
-            trace = AxesTrace.of([_motion(spec.tachometer, rng, len(traces)) for _ in range(spec.axes)])
-            # Some end early: the next reset comes in the middle.
-            early = rng.random() < 0.5
-            trace = trace.until(int(rng.integers(1, trace.n_clocks)) if early else trace.n_clocks)
-            resets = int(rng.choice([1, 1, 2, 5]))
-            row = np.searchsorted(trace.clock, np.arange(trace.n_clocks), side="right") - 1
-            played = np.zeros(trace.n_clocks, dtype=np.uint64)
-            for port, (_, bit) in list(zip(self.pins.inputs, self.pins.places, strict=True))[1:]:
-                played |= trace.lines[port.name][row] << np.uint64(bit)
-            reset = rng.integers(0, 256, resets).astype(np.uint64) | np.uint64(1)
-            starts.append(done + resets)
-            pins += [reset, played]
-            traces.append(trace)
-            done += resets + trace.n_clocks
-        return Stimulus(np.concatenate(pins)[:, np.newaxis], traces, starts)
+    def motion(self, rng: np.random.Generator, number: int) -> Trace:
+        """Return a motion of its own for every axis."""
+        return AxesTrace.of([_motion(self.spec.tachometer, rng, number) for _ in range(self.spec.axes)])
 
 
 def _motion(spec: TachometerSpec, rng: np.random.Generator, number: int) -> PinTrace:
@@ -89,3 +114,16 @@ def _case(axes: int, tick_cycles: int, max_ticks: int, mutants: int, *, parallel
 
 
 AXES = [_case(5, 55, 4, 240, parallel=False, index=True), _case(2, 35, 3, 120, parallel=True, index=False)]
+
+_TEXTS = {"ppr": "8", "clock": "1MHz", "position-width": "8", "index": "yes", "index-reset": "yes", "preset": "5"}
+_FINE = {"tick": "1000clk", "max-time": "4000clk", "fine-bits": "3", "compare": "1.5:1.25:40:3clk:fine"}
+# What has no wrong core in tests/proofs/formal/mutants.json.
+EXTRAS = [
+    PartCase(
+        "m, index in a state",
+        of_texts("m", _TEXTS | {"tick": "40us", "max-time": "400us", "index-at": "A=1,B=1"}),
+        60,
+        files=("index_state", "pin_rise"),
+    ),
+    PartCase("track, fine compare", of_texts("track", _TEXTS | _FINE), 60, files=("fine_compare_output",)),
+]

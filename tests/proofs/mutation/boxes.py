@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from amaranth.lib import wiring
 from numpy.typing import NDArray
-from proofs.mutation.axes import AXES
+from proofs.mutation.axes import AXES, EXTRAS
 from proofs.mutation.cases import Case, Pins
 from proofs.mutation.commands import COMMANDS
 from proofs.mutation.loops import LOOPS
@@ -274,8 +274,10 @@ BOXES: list[Case] = [
     Box("spi", _SPEC, 80, bus="spi", lines=_spi, sources="hdl/bus/spi.py*"),
     Box("uart", _SPEC, 80, bus="uart", lines=_uart, sources="hdl/bus/uart.py*"),
     Box("emulator", _SPEC, 100, bus="uart", demo=True, lines=_settings, sources="hdl/core/*"),
+    Box("modulo", replace(_SPEC, position_modulo="24"), 40, lines=_native, sources="hdl/core/register_core.py*"),
     Box("telemetry", _SPEC, 60, bus="uart", demo=True, lines=_settings, sources="hdl/bus/telemetry.py*"),
     *AXES,
+    *EXTRAS,
     *LOOPS,
     *COMMANDS,
 ]
