@@ -5,10 +5,8 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from proofs.source import mutant
-from support.nightly import nightly, only
+from support.nightly import only
 
-from tachometry.hdl.front_end import index_state
 from tachometry.hdl.front_end.index_state import IndexState
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
@@ -141,27 +139,6 @@ def test_levels_of_z_with_no_count_between_them_are_one_index() -> None:
         assert found.n_mismatches == 0, found.first
         assert len(found.actual.tables["index_missed"]) == missed
         assert found.actual.ticks.health[-1] == (Fault.INDEX_MISSED if missed else 0)
-
-
-@nightly  # it asks what the tests above notice
-@pytest.mark.parametrize(
-    ("right", "wrong"),
-    [
-        ("& ~met", ""),
-        ("(entered == last)", "1"),
-        ("& ~self.level_z & ~was_z", "& ~self.level_z"),
-        ("met & passing", "met"),
-        ("Mux(passing, entered, latest)", "latest"),
-    ],
-)
-def test_mutants_are_noticed(right: str, wrong: str) -> None:
-    with mutant(index_state.IndexState, right, wrong), pytest.raises(AssertionError):
-        _told_of_three()
-
-
-def _told_of_three() -> None:
-    for seed in range(3):
-        test_a_wide_index_is_told(seed, {})
 
 
 def test_an_index_of_eight_quarters_is_told_in_both_directions_and_one_of_four_never() -> None:

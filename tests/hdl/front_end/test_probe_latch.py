@@ -7,8 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from proofs.source import mutant
-from support.nightly import nightly
 from support.simulate import clock_by_clock
 from support.verilog import play_native
 
@@ -32,9 +30,10 @@ END = 15  # of a time of four bits
 LATE, OLD = 7, 31  # clocks to an update, and the end of an age of five bits
 
 
-def check(seed: int, latency: int) -> None:
+@pytest.mark.parametrize("latency", [2, 3])
+def test_every_clock_is_as_the_rules_say(latency: int) -> None:
     """Two probes with edges of their own, which change, on levels, steps and arms at random."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     rows, position = [], 0
     held = {"level": 0, "edges": 0b0110}
     for clock in range(400):
@@ -71,31 +70,8 @@ def check(seed: int, latency: int) -> None:
                 wanted[f"probe_age_{probe}"] = min(at - ends[-1], OLD) if ends else OLD
             probed[probe] = int((probed[probe] or edge) and not rows[known]["arm"] >> probe & 1)
         wanted["probed"] = probed[0] | probed[1] << 1
-        assert seen[clock] == wanted, (seed, latency, clock)
+        assert seen[clock] == wanted, (latency, clock)
     assert min(len({row[f"probe_{name}_0"] for row in seen}) for name in ("position", "fine", "age")) > 2
-
-
-@pytest.mark.parametrize("latency", [2, 3])
-def test_every_clock_is_as_the_rules_say(latency: int) -> None:
-    check(0, latency)
-
-
-@nightly  # it asks what the test above notices
-@pytest.mark.parametrize(
-    ("right", "wrong"),
-    [
-        ("~self.probed)", "self.probed)"),
-        ("& ~self.arm", ""),
-        ("self.probed | edge", "edge"),
-        ("level & ~past & rising", "level & ~past"),
-        ("~level & past & falling", "~level & past & rising"),
-        ("self._update_latency + 1 - self._latency", "self._update_latency + 2 - self._latency"),
-        ('"age": shown}', '"age": age}'),
-    ],
-)
-def test_mutants_are_noticed(right: str, wrong: str) -> None:
-    with mutant(probe_latch.ProbeLatch, right, wrong), pytest.raises(AssertionError):
-        check(0, 2)
 
 
 @pytest.mark.parametrize("clocks", [0, 2])

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from proofs.source import mutant
-from support.nightly import nightly, only
+from support.nightly import only
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.output import compare_output
@@ -71,7 +70,9 @@ class Computed:
         self.number += reached * (row["step"] if self.both else 1)
 
 
-def check(case: tuple[Compare, int], seed: int) -> None:
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("seed", only([0], range(5)))  # 900 clocks meet all positions
+def test_every_clock_is_as_the_rules_say(case: tuple[Compare, int], seed: int) -> None:
     """Walk to and fro over all positions of five bits, with steps in clocks side by side and far apart."""
     compare, clocks = case
     rng = np.random.default_rng(seed)
@@ -108,16 +109,11 @@ def check(case: tuple[Compare, int], seed: int) -> None:
     assert len(begun) > 5 or (len(begun) == compare.count and compare.direction != "both")
 
 
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("seed", only([0], range(5)))  # 900 clocks meet all positions
-def test_every_clock_is_as_the_rules_say(case: tuple[Compare, int], seed: int) -> None:
-    check(case, seed)
-
-
 AIMED = [Compare(-3, 2, 0, "1clk", "both"), Compare(-14, 3, 4, "1clk", "both"), Compare(-1, 14, 2, "1clk", "both")]
 
 
-def check_aimed(compare: Compare) -> None:
+@pytest.mark.parametrize("compare", AIMED, ids=str)
+def test_a_position_that_is_set_moves_what_is_awaited(compare: Compare) -> None:
     """Set the position anywhere, wait for all positions to be gone through, and walk: each that is met has a pulse."""
     rng = np.random.default_rng(5)
     rows, wanted = list[dict[str, int]](), list[int]()
@@ -136,11 +132,6 @@ def check_aimed(compare: Compare) -> None:
     assert len({*wanted}) > 1
 
 
-@pytest.mark.parametrize("compare", AIMED, ids=str)
-def test_a_position_that_is_set_moves_what_is_awaited(compare: Compare) -> None:
-    check_aimed(compare)
-
-
 @pytest.mark.parametrize("places", ["-20:7:0:1clk:both", "-90:3:50:2clk:both"])
 def test_presets_and_indices_aim_as_in_the_golden_model(places: str) -> None:
     texts = {"ppr": "50", "clock": "1MHz", "tick": "6clk", "max-time": "60clk", "position-width": "8"}
@@ -148,31 +139,3 @@ def test_presets_and_indices_aim_as_in_the_golden_model(places: str) -> None:
     found = lockstep(spec, stress(spec, 0, 60), PySim())
     assert found.n_mismatches == 0, found.first
     assert len({*found.actual.tables["compare_valid"].compare_position.tolist()}) > 5
-
-
-def check_all() -> None:
-    for case in CASES:
-        check(case, 0)
-    for compare in AIMED:
-        check_aimed(compare)
-
-
-@nightly  # it asks what the test above notices
-@pytest.mark.parametrize(
-    ("right", "wrong"),
-    [
-        ("self.position + back", "self.position"),
-        ("Mux(back, behind, left)", "left"),
-        ("init=compare.passed", "init=0"),
-        ("self.moves | (aiming", "(self.moves & (beyond >= 0)) | (aiming"),
-        ("beyond < -compare.step", "beyond <= -compare.step"),
-        ("beyond >= 0", "beyond > 0"),
-        ("width + (compare.count > 0)", "width"),
-        ("ResetInserter(self.compare_clear)(fifo)", "fifo"),
-        ("self.compare_count != compare.count", "self.compare_count != compare.count + 1"),
-        ("self.compare_position.eq(awaited)", "self.compare_position.eq(self._compare.start)"),
-    ],
-)
-def test_mutants_are_noticed(right: str, wrong: str) -> None:
-    with mutant(compare_output.CompareOutput, right, wrong), pytest.raises(AssertionError):
-        check_all()

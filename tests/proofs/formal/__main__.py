@@ -9,9 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from proofs.formal.cases import PROOFS, QUICK
-from proofs.formal.mutants import MUTANTS, Mutant
+from proofs.formal.mutants import MUTANTS, Mutant, mutant
 from proofs.formal.prove import Proof, Result, prepare, solve
-from proofs.source import mutant
 from support.report import Table, arguments, chosen
 
 _FOLDER = Path("build/formal")
