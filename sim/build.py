@@ -11,7 +11,7 @@ import shlex
 import shutil
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -79,12 +79,18 @@ def _is_gcc() -> bool:
     return "Free Software Foundation" in version(compiler())
 
 
-def run(command: Sequence[str | Path], what: str, folder: Path | None = None, text: str = "") -> str:
-    """Run a tool on an input; its output.
+def run(
+    command: Sequence[str | Path],
+    what: str,
+    folder: Path | None = None,
+    text: str = "",
+    variables: Mapping[str, str] | None = None,
+) -> str:
+    """Run a tool on an input, with these environment variables in addition; return its output.
 
     It raises OSError if it fails, with the line that says why.
     """
-    done = run_tool(list(map(str, command)), folder, text)
+    done = run_tool(list(map(str, command)), folder, text, variables=variables)
     if done.returncode:
         raise OSError(f"{what}: {complaint(done.stderr + done.stdout) or f'exit status {done.returncode}'}")
     return done.stdout

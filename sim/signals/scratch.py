@@ -8,7 +8,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -138,11 +138,13 @@ def run_tool(
     text: str = "",
     seconds: float | None = None,
     memory: int | None = None,
+    variables: Mapping[str, str] | None = None,
 ) -> "subprocess.CompletedProcess[str]":
     """Run a tool with a text as its input; it ends with all of its processes, whatever ends the wait for it.
 
     Its temporary files are in `folder`, in which it runs, if that is given. A signal from the terminal does not reach
-    it. It has at most `memory` bytes, by default those of the computer, where Linux keeps it to them.
+    it. It has at most `memory` bytes, by default those of the computer, where Linux keeps it to them, and these
+    environment variables in addition to those of this process.
 
     Raises
     ------
@@ -159,7 +161,7 @@ def run_tool(
                 subprocess.Popen(
                     command,
                     cwd=folder,
-                    env={**os.environ, **ours},
+                    env={**os.environ, **ours, **(variables or {})},
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     stderr=subprocess.PIPE,

@@ -1,7 +1,6 @@
 """Compares files of cores with what their manifests say, and the cores with the golden model, where they lie."""
 
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -11,7 +10,6 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 from tachometry.sim.signals.scratch import run_tool, scratch
 from tachometry.sim.testbench.vectors import cocotb_bench
@@ -263,8 +261,8 @@ def _simulated(
         described = checked.manifest.read_text(encoding="utf-8")
         for file, content in {**bench, f"{name}.v": text, f"{name}.json": described}.items():
             (folder / file).write_text(content, encoding="utf-8")
-        with patch.dict(os.environ, {} if waves is None else {"WAVES": "1"}):  # which cocotb reads
-            done = run_tool([sys.executable, f"test_{name}.py"], folder)
+        variables = {} if waves is None else {"WAVES": "1"}  # which cocotb reads
+        done = run_tool([sys.executable, f"test_{name}.py"], folder, variables=variables)
         said = done.stdout + done.stderr
         if done.returncode == 0 and "PASS=1 FAIL=0" in said:
             return replace(checked, simulated="")
