@@ -28,7 +28,6 @@ _LOOP, _MOTOR = "Controller", "Motor and load"
 
 
 MOST_SECONDS = 100.0
-_MOST_SPEED = 1e6  # rad/s
 
 _OPTIONS = [
     *(declared(_MOTOR if about in options_of(Motor) else _LOOP, about) for about in options_of(Law)),

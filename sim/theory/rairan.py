@@ -1,4 +1,4 @@
-"""Equations (1) to (14) of Rairán 2013 give estimates, their relative errors, delay and greatest acceleration.
+"""Equations of Rairán 2013: estimates, their relative errors, delay and greatest acceleration.
 
 Every function is vectorised: arguments are broadcast against each other, and the result has their shape, float64.
 Estimates n are in units of ω_lim = 1/(pul·dt): n1 = 1/Ndt1 at low speeds, Nep1 at high ones. Relative errors are
@@ -7,13 +7,13 @@ fractions of the speed, where the paper prints them in per cent. A `speed` ω is
 ValueError.
 
 Low and high are told apart by the estimate, which is known, not by the speed, which is not: n1 ≤ 1 is low. So ω_lim
-itself, where n1 = 1, is low, with n2 = ½; eqs. (5) and (6) to the letter would make it high, with n2 = 0.
+itself, where n1 = 1, is low, with n2 = ½; eq. (5) to the letter would make it high, with n2 = 0.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tachometry.sim.theory.checks import Floats, at_least, in_a_regime, positive
+from tachometry.sim.theory.checks import Floats, in_a_regime, positive
 
 
 def _regime_n1(n1: ArrayLike) -> Floats:
@@ -22,10 +22,6 @@ def _regime_n1(n1: ArrayLike) -> Floats:
 
 def _regime_n2(n2: ArrayLike) -> Floats:
     return in_a_regime("n2", n2, 1 / 2, 1)
-
-
-def _regime_n3(n3: ArrayLike) -> Floats:
-    return in_a_regime("n3", n3, 2 / 3, 4 / 3)
 
 
 def rairan_speed_limit(pulses_per_rev: ArrayLike, dt: ArrayLike) -> Floats:
@@ -56,12 +52,6 @@ def rairan_update_time(speed: ArrayLike, speed_limit: ArrayLike, dt: ArrayLike) 
     return (np.floor(ratio) + 1) / ratio * positive("dt", dt)
 
 
-def rairan_eq02_error(estimate: ArrayLike, speed: ArrayLike) -> Floats:
-    """Compute eq. (2) of Rairán 2013: relative error |ω_m − ω|/ω of an estimate ω_m, both in the same unit, ω > 0."""
-    speed = positive("speed", speed)
-    return np.abs(np.asarray(estimate, dtype=np.float64) - speed) / speed
-
-
 def rairan_eq03_error(n1: ArrayLike, speed: ArrayLike, speed_limit: ArrayLike) -> Floats:
     """Compute eq. (3) of Rairán 2013: relative error n1·ω_lim/ω − 1 of the upper estimate n1, never below ω."""
     return _regime_n1(n1) * positive("speed_limit", speed_limit) / positive("speed", speed) - 1
@@ -82,24 +72,8 @@ def rairan_eq05_n2(n1: ArrayLike) -> Floats:
     return np.where(n1 < 1.5, 1 / (1 / n1 + 1), n1 - 1)
 
 
-def rairan_eq06_n2(n_ep1: ArrayLike, n_dt1: ArrayLike) -> Floats:
-    """Compute eq. (6) of Rairán 2013: lower estimate n2 = Nep1/(Ndt1 + 1) if Nep1 = 1, else (Nep1 − 1)/Ndt1.
-
-    Nep1 are pulses in dt, Ndt1 dt between pulses; one of both is 1, else ValueError.
-    """
-    n_ep1, n_dt1 = at_least("n_ep1", n_ep1, 1), at_least("n_dt1", n_dt1, 1)
-    if np.any((n_ep1 > 1) & (n_dt1 > 1)):
-        raise ValueError("n_ep1 or n_dt1 must be 1")
-    return np.where(n_ep1 == 1, n_ep1 / (n_dt1 + 1), (n_ep1 - 1) / n_dt1)
-
-
-def rairan_eq07_error(n2: ArrayLike, speed: ArrayLike, speed_limit: ArrayLike) -> Floats:
-    """Compute eq. (7) of Rairán 2013: relative error 1 − n2·ω_lim/ω of the lower estimate n2, never above ω."""
-    return 1 - _regime_n2(n2) * positive("speed_limit", speed_limit) / positive("speed", speed)
-
-
 def rairan_eq08_sup_error(n2: ArrayLike) -> Floats:
-    """Compute eq. (8) of Rairán 2013: bound of eq. (7) over all speeds of an estimate: n2 if n2 ≤ ½, else 1/(n2 + 1).
+    """Compute eq. (8) of Rairán 2013: bound of the error 1 − n2·ω_lim/ω: n2 if n2 ≤ ½, else 1/(n2 + 1).
 
     A supremum at low speeds, but attained at ω_lim (n2 = ½), and in every interval of high speeds, which has its right
     end, n1.
@@ -108,33 +82,13 @@ def rairan_eq08_sup_error(n2: ArrayLike) -> Floats:
     return np.where(n2 < 0.75, n2, 1 / (n2 + 1))
 
 
-def rairan_eq09_left_error(n3: ArrayLike, n2: ArrayLike) -> Floats:
-    """Compute eq. (9) of Rairán 2013: relative error n3/n2 − 1 of n3 from n2 to n1, at the left end."""
-    return positive("n3", n3) / _regime_n2(n2) - 1
-
-
-def rairan_eq10_right_error(n3: ArrayLike, n1: ArrayLike) -> Floats:
-    """Compute eq. (10) of Rairán 2013: relative error 1 − n3/n1 of an estimate n3 from n2 to n1, at the right end."""
-    return 1 - positive("n3", n3) / _regime_n1(n1)
-
-
 def rairan_eq11_n3(n1: ArrayLike, n2: ArrayLike) -> Floats:
-    """Compute eq. (11) of Rairán 2013: optimal estimate n3 = 2/(1/n1 + 1/n2), where eqs. (9) and (10) are equal."""
+    """Compute eq. (11) of Rairán 2013: optimal estimate n3 = 2/(1/n1 + 1/n2), whose errors at n1 and n2 are equal."""
     return 2 / (1 / _regime_n1(n1) + 1 / _regime_n2(n2))
 
 
-def rairan_eq12_max_error(n3: ArrayLike) -> Floats:
-    """Compute eq. (12) of Rairán 2013: greatest relative error of n3: n3/2 if n3 < 1, else (n3 − ⌊n3⌋)/⌊n3⌋.
-
-    Attained: every interval has one of its ends, and the error is the same at both. No n3 lies between ⅔ and 4/3.
-    """
-    n3 = _regime_n3(n3)
-    whole = np.maximum(np.floor(n3), 1)
-    return np.where(n3 < 1, n3 / 2, (n3 - whole) / whole)
-
-
 def rairan_eq13_max_error(n1: ArrayLike) -> Floats:
-    """Compute eq. (13) of Rairán 2013: eq. (12) in terms of n1: 1/(1 + 2/n1) if n1 ≤ 1, else 1/(2·n1 − 1)."""
+    """Compute eq. (13) of Rairán 2013: greatest error of n3: 1/(1 + 2/n1) if n1 ≤ 1, else 1/(2·n1 − 1); attained."""
     n1 = _regime_n1(n1)
     return np.where(n1 < 1.5, 1 / (1 + 2 / n1), 1 / np.maximum(2 * n1 - 1, 1))
 
@@ -143,21 +97,9 @@ def rairan_eq14_max_acceleration(n1: ArrayLike, pulses_per_rev: ArrayLike, dt: A
     """Compute eq. (14) of Rairán 2013: a_max = ω_lim/(2·dt), at low speeds over Ndt1·(Ndt1 + 1), Ndt1 = 1/n1; in
     rev/s².
 
-    At low speeds it is (Ndt1 + 1)/2 times what `rairan_max_acceleration` finds by the same argument.
+    At low speeds it is (Ndt1 + 1)/2 times the acceleration that changes the speed by n1 − n2 in the longest window.
     """
     n1 = _regime_n1(n1)
     n_dt1 = 1 / n1
     dt = positive("dt", dt)
     return rairan_speed_limit(pulses_per_rev, dt) / (2 * dt * np.where(n1 < 1.5, n_dt1 * (n_dt1 + 1), 1))
-
-
-def rairan_max_acceleration(n1: ArrayLike, pulses_per_rev: ArrayLike, dt: ArrayLike) -> Floats:
-    """Return acceleration, rev/s², that changes the speed by n1 − n2 in the longest window.
-
-    ω_lim/(2·dt) at high speeds, where windows are shorter than 2·dt, as eq. (14) of Rairán 2013; at low ones, where
-    they take up to (Ndt1 + 1)·dt, ω_lim/(dt·Ndt1·(Ndt1 + 1)²), Ndt1 = 1/n1.
-    """
-    n1 = _regime_n1(n1)
-    n_dt1 = 1 / n1
-    windows = np.where(n1 < 1.5, n_dt1 * (n_dt1 + 1) ** 2, 2)
-    return rairan_speed_limit(pulses_per_rev, dt) / (positive("dt", dt) * windows)

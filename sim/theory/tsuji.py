@@ -1,4 +1,4 @@
-"""Equations (3) to (22) of Tsuji 2009 describe the M, T, M/T and S methods and the low-pass filter.
+"""Equations (7) to (20) of Tsuji 2009: resolution and measurement time of the M, T, M/T and S methods.
 
 Every function is vectorised: arguments are broadcast against each other, and the result has their shape, float64.
 Throughout, `counts_per_rev` is P and `tick_seconds` is T_s in seconds, both greater than 0; velocities and resolutions
@@ -20,10 +20,6 @@ def unit_velocity(counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
     return 2 * math.pi / (positive("counts_per_rev", counts_per_rev) * positive("tick_seconds", tick_seconds))
 
 
-def _mean_velocity(counts: ArrayLike, ticks: Floats, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    return np.asarray(counts) / ticks * unit_velocity(counts_per_rev, tick_seconds)
-
-
 def _interval_resolution(m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
     m_s = at_least("m_s", m_s, 1)
     with np.errstate(divide="ignore"):
@@ -34,28 +30,6 @@ def _duration(what: str, ticks: ArrayLike, tick_seconds: ArrayLike) -> Floats:
     return at_least(what, ticks, 1) * positive("tick_seconds", tick_seconds)
 
 
-def tsuji_eq03_velocity(m_e: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """Compute eq. (3) of Tsuji 2009: velocity of the M method, m_e·ω_u, from the counts m_e of one tick."""
-    return np.asarray(m_e) * unit_velocity(counts_per_rev, tick_seconds)
-
-
-def tsuji_eq04_resolution(counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """Compute eq. (4) of Tsuji 2009: resolution Q_V = ω_u of the M method. Errors are less; it is their supremum."""
-    return unit_velocity(counts_per_rev, tick_seconds)
-
-
-def tsuji_eq05_measurement_time(tick_seconds: ArrayLike) -> Floats:
-    """Compute eq. (5) of Tsuji 2009: measurement time T_m = T_s of the M method."""
-    return positive("tick_seconds", tick_seconds)
-
-
-def tsuji_eq06_velocity(
-    pulse_sum: ArrayLike, n: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike
-) -> Floats:
-    """Compute eq. (6) of Tsuji 2009: velocity of the M method with averaging."""
-    return _mean_velocity(pulse_sum, at_least("n", n, 1), counts_per_rev, tick_seconds)
-
-
 def tsuji_eq07_resolution(n: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
     """Compute eq. (7) of Tsuji 2009: resolution ω_u/n of the M method with averaging, the supremum of errors."""
     return unit_velocity(counts_per_rev, tick_seconds) / at_least("n", n, 1)
@@ -64,11 +38,6 @@ def tsuji_eq07_resolution(n: ArrayLike, counts_per_rev: ArrayLike, tick_seconds:
 def tsuji_eq08_measurement_time(n: ArrayLike, tick_seconds: ArrayLike) -> Floats:
     """Compute eq. (8) of Tsuji 2009: measurement time T_m = n·T_s of the M method with averaging."""
     return _duration("n", n, tick_seconds)
-
-
-def tsuji_eq09_velocity(m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
-    """Compute eq. (9) of Tsuji 2009: velocity ω_u/m_s of the T method, without sign; m_s ticks from count to count."""
-    return _mean_velocity(1, at_least("m_s", m_s, 1), counts_per_rev, tick_seconds)
 
 
 def tsuji_eq10_resolution(m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
@@ -92,13 +61,6 @@ def tsuji_eq12_interval(speed: ArrayLike, counts_per_rev: ArrayLike, tick_second
     """
     with np.errstate(divide="ignore"):
         return unit_velocity(counts_per_rev, tick_seconds) / np.abs(np.asarray(speed, dtype=np.float64))
-
-
-def tsuji_eq13_velocity(
-    pulse_sum: ArrayLike, m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike
-) -> Floats:
-    """Compute eq. (13) of Tsuji 2009: velocity of the M/T method, whose windows begin and end at ticks with a count."""
-    return _mean_velocity(pulse_sum, at_least("m_s", m_s, 1), counts_per_rev, tick_seconds)
 
 
 def tsuji_eq14_resolution(
@@ -133,13 +95,6 @@ def tsuji_eq16_interval(speed: ArrayLike, m_c: ArrayLike, counts_per_rev: ArrayL
         return m_c * (np.floor(in_minimum_time) + 1) / in_minimum_time
 
 
-def tsuji_eq17_velocity(
-    pulse_sum: ArrayLike, m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike
-) -> Floats:
-    """Compute eq. (17) of Tsuji 2009: velocity of the S method, whose windows end at pulse alterations."""
-    return _mean_velocity(pulse_sum, at_least("m_s", m_s, 1), counts_per_rev, tick_seconds)
-
-
 def tsuji_eq18_resolution(m_s: ArrayLike, counts_per_rev: ArrayLike, tick_seconds: ArrayLike) -> Floats:
     """Compute eq. (18) of Tsuji 2009: resolution Q_V = ω_u/(m_s·(m_s − 1)) of the S method; infinite for m_s = 1.
 
@@ -158,32 +113,3 @@ def tsuji_eq20_interval(speed: ArrayLike, counts_per_rev: ArrayLike, tick_second
     units = np.asarray(speed, dtype=np.float64) / unit_velocity(counts_per_rev, tick_seconds)
     with np.errstate(divide="ignore"):
         return 1 / np.abs(units - np.floor(units + 0.5))
-
-
-def tsuji_eq21_velocity(
-    pulse_sum: ArrayLike,
-    opening: ArrayLike,
-    closing: ArrayLike,
-    m_s: ArrayLike,
-    counts_per_rev: ArrayLike,
-    tick_seconds: ArrayLike,
-) -> Floats:
-    """Compute eq. (21) of Tsuji 2009: velocity of the S method with alternate alterations cancelled.
-
-    The pulse numbers at both ends of the window count by one half: eq. (17)'s sum, half the opening m_e(i−m_s) more,
-    half the closing m_e(i) less.
-    """
-    counts = np.asarray(pulse_sum) + (np.asarray(opening) - np.asarray(closing)) / 2
-    return _mean_velocity(counts, at_least("m_s", m_s, 1), counts_per_rev, tick_seconds)
-
-
-def tsuji_eq22_low_pass(
-    u: ArrayLike, y_0: ArrayLike, m_s: ArrayLike, cutoff: ArrayLike, tick_seconds: ArrayLike
-) -> Floats:
-    """Compute eq. (22) of Tsuji 2009: output y = y_0 + (1 − e^(−G·m_s·T_s))·(u − y_0) of the LPF after m_s ticks.
-
-    It is exact for an input u that is constant meanwhile; y_0 is the output before, and G the cutoff in rad/s.
-    """
-    exponent = positive("cutoff", cutoff) * _duration("m_s", m_s, tick_seconds)
-    y_0 = np.asarray(y_0, dtype=np.float64)
-    return y_0 - np.expm1(-exponent) * (np.asarray(u) - y_0)

@@ -50,9 +50,9 @@ def test_bounds_are_never_exceeded_at_any_speed_and_phase() -> None:
         n2 = rairan.rairan_eq05_n2(n1)
         errors = {
             "eq. (4)": (rairan.rairan_eq03_error(n1, speed, 1), rairan.rairan_eq04_max_error(n1)),
-            "eq. (8)": (rairan.rairan_eq07_error(n2, speed, 1), rairan.rairan_eq08_sup_error(n2)),
+            "eq. (8)": (1 - n2 / speed, rairan.rairan_eq08_sup_error(n2)),
             "eq. (13)": (
-                rairan.rairan_eq02_error(rairan.rairan_eq11_n3(n1, n2), speed),
+                abs(rairan.rairan_eq11_n3(n1, n2) - speed) / speed,
                 rairan.rairan_eq13_max_error(n1),
             ),
         }

@@ -92,7 +92,6 @@ def test_equations_against_their_printed_form() -> None:
     counts, tick = 500, 1e-3
     unit = tsuji.unit_velocity(counts, tick)
     assert unit == pytest.approx(12.566, abs=1e-3)
-    assert tsuji.tsuji_eq17_velocity(13, 4, counts, tick) == pytest.approx(2 * math.pi * 13 / (4 * counts * tick))
     assert tsuji.tsuji_eq18_resolution([1, 2, 5], counts, tick).tolist() == pytest.approx(
         [math.inf, 2 * math.pi / (2 * counts * tick), 2 * math.pi / (20 * counts * tick)]
     )
