@@ -1,6 +1,7 @@
 import pytest
 from support.simulate import clock_by_clock
 
+from tachometry.hdl.axes.rounds import Rounds
 from tachometry.hdl.axes.turns import Turns
 
 
@@ -28,3 +29,19 @@ def test_what_an_upset_leaves_ends_with_the_next_tick() -> None:
     steps = [(row["axis"], row["step"]) for row in seen[31 + begin :]]
     assert steps[:whole] == [(clock // 7, 1 << clock % 7) for clock in range(whole)]
     assert not any(step for _, step in steps[whole:])
+
+
+OUTPUTS = ["slot", "first", "last", "ready"]
+
+
+@pytest.mark.parametrize(("slots", "rounds"), [(3, 1), (3, 2), (5, 4), (8, 7)])
+def test_slots_and_rounds(slots: int, rounds: int) -> None:
+    seen = clock_by_clock(Rounds(slots, rounds, 3), [{}] * (slots * (2 * rounds + 5)), OUTPUTS)
+    for clock, row in enumerate(seen):
+        round_ = clock // slots
+        assert row == {
+            "slot": clock % slots,
+            "first": round_ % rounds == 0,
+            "last": round_ % rounds == rounds - 1,
+            "ready": round_ >= 3,
+        }, clock

@@ -6,6 +6,7 @@ from support.lockstep import random_case
 from support.nightly import only
 from support.simulate import clock_by_clock
 
+from tachometry.hdl.bus import counter
 from tachometry.hdl.core import register_core
 from tachometry.sim.golden.registers import Access, GoldenBank
 from tachometry.sim.signals.recording import PinTrace
@@ -58,3 +59,11 @@ def test_registers_are_those_of_the_golden_model(method: str, seed: int) -> None
         row = seen[access.clock + 1]
         got = row["bus.read_data"] if data is not None else None, bool(row["bus.error"])
         assert got == (data, error), f"{method}, seed {seed}, {access}: {got}, not {data}, {error}"
+
+
+def test_it_counts_and_saturates() -> None:
+    """Counts to 7 in 3 bits, stays there, and begins anew; an event together with clear is not counted."""
+    rows = [{"event": event, "clear": 0} for event in (1, 0, 1, 1, 1, 1, 1, 1, 1, 1)]
+    rows += [{"event": 1, "clear": 1}, {"clear": 0}, {"event": 0}]
+    seen = clock_by_clock(counter.SaturatingCounter(3), rows, ["count"])
+    assert [row["count"] for row in seen] == [0, 1, 1, 2, 3, 4, 5, 6, 7, 7, 7, 0, 1]

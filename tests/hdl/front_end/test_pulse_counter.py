@@ -8,7 +8,9 @@ from amaranth.lib.wiring import In, Out
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.arithmetic.saturate import raised_for, saturate, saturate_raised
+from tachometry.hdl.front_end.position_counter import PositionCounter
 from tachometry.hdl.front_end.pulse_counter import PulseCounter
+from tachometry.hdl.front_end.sampling_clock import SamplingClock
 
 
 class Held(wiring.Component):
@@ -114,3 +116,43 @@ def check_stretched(tick_cycles: int, max_count: int, seed: int) -> None:
 @pytest.mark.parametrize(("tick_cycles", "max_count"), [(1, 1), (2, 2), (3, 3), (4, 4), (7, 7), (8, 3), (16, 16)])
 def test_a_window_may_be_longer_than_nominal(tick_cycles: int, max_count: int) -> None:
     check_stretched(tick_cycles, max_count, seed=tick_cycles)
+
+
+def test_adds_up_steps_and_wraps_both_ways() -> None:
+    steps = [1] * 9 + [0] + [-1] * 19 + [0] * 2
+    seen = clock_by_clock(PositionCounter(4), [{"step": step} for step in steps], ["position"])
+    total, wanted = 0, [0, 0]
+    for step in steps:
+        total += step
+        wanted.append((total + 8) % 16 - 8)
+    assert [row["position"] for row in seen] == wanted[: len(steps)]
+
+
+def test_bad_width() -> None:
+    with pytest.raises(ValueError, match=r"^width must be at least 2, not 1$"):
+        PositionCounter(1)
+
+
+@pytest.mark.parametrize("tick_cycles", [1, 2, 3, 4, 5, 8, 9, 15, 16, 31, 32, 960, 4095, 4096])
+def test_last_is_high_in_the_last_clock_of_every_window(tick_cycles: int) -> None:
+    seen = clock_by_clock(SamplingClock(tick_cycles), [{}] * (3 * tick_cycles + 1), ["last"])
+    assert [row["last"] for row in seen] == [
+        int(clock % tick_cycles == tick_cycles - 1) for clock in range(3 * tick_cycles + 1)
+    ]
+
+
+@pytest.mark.parametrize("bits", range(5, 13))
+def test_the_shift_register_goes_through_all_states_but_one(bits: int) -> None:
+    """So whatever state it is in, the last one of a window comes; and of ones alone, which is its own, it is told."""
+    ones = (1 << bits) - 1
+    for tick_cycles in (1 << (bits - 1), ones):
+        clock = SamplingClock(tick_cycles)
+        assert sorted(clock.states) == list(range(ones))
+        assert clock.states[-1] == ones >> 1
+        assert [state for state in clock.states if state & ones >> 1 == ones >> 1] == [ones >> 1]
+        del clock
+
+
+def test_bad_tick_cycles() -> None:
+    with pytest.raises(ValueError, match=r"^tick_cycles must be at least 1, not 0$"):
+        SamplingClock(0)

@@ -8,6 +8,7 @@ import pytest
 
 from tachometry.spec import Encoder, MTachometer, Speed, STachometer, Timing
 from tachometry.spec.core.index import Index
+from tachometry.spec.language.tools import complaint
 
 UNITS = {"rad/s": 2 * Fraction(math.pi), "rev/s": Fraction(1), "rpm": Fraction(60)}  # of a revolution per second
 
@@ -156,3 +157,22 @@ def test_bits_of_the_edge_error(eighths: int, bits: int) -> None:
     assert spec.bound.error_bits == bits
     assert spec.bound.uncertainty == Fraction(8 + eighths, 8)
     assert spec.bound.max == spec.widths.max_count + (1 if not eighths else 2)
+
+
+@pytest.mark.parametrize(
+    ("said", "line"),
+    [
+        ("", ""),
+        ("one\n\n  two \n", "two"),
+        ("Info: no\nERROR: it is too big\nERROR: and too slow\n2 errors\n", "ERROR: it is too big"),
+        ("begins\nmodel.cc:3: error: no\nmore\n", "model.cc:3: error: no"),
+        ('Traceback (most recent call last):\n  File "a.py"\n    raise Error(error)\na.Error: so\n', "so"),
+        (
+            "Traceback (most recent call last):\nError: mmap\n\nCannot allocate memory (os error 12)",
+            "Cannot allocate memory (os error 12); it needs some 5 GB of addresses, see ulimit -v",
+        ),
+        ("x" * 1000, "x" * 300),
+    ],
+)
+def test_one_line_says_why(said: str, line: str) -> None:
+    assert complaint(said) == line

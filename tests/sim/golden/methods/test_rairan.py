@@ -6,19 +6,20 @@ from typing import Any
 import numpy as np
 import pytest
 from reference.front import Front
-from reference.rairan import estimate, rairan_updates, table_1
+from reference.rairan import estimate, next_k, rairan_updates, table_1
 from reference.sequences import rounded
 from reference.settings import Settings
 from reference.tsuji import Update
 from support.nightly import only, only_rows
 from support.rairan import golden_updates, make_spec, random_steps, steps_of
 
+from tachometry.sim.golden.methods.adaptive import next_shift
 from tachometry.sim.golden.methods.rairan import Model, orbit
 from tachometry.sim.signals.run import Table
 from tachometry.sim.theory.rairan import rairan_eq13_max_error
 from tachometry.spec import RairanTachometer, Speed
 from tachometry.spec.core.ports import BOUNDS
-from tachometry.spec.methods.adaptive import parse_target
+from tachometry.spec.methods.adaptive import AdaptiveDt, parse_target
 
 
 def held(updates: Table, name: str, n: int, first: int) -> np.ndarray:
@@ -377,3 +378,17 @@ def test_at_a_steady_speed_eq13_is_within_the_target_and_dt_no_longer_than_that_
 
 def test_without_n3_the_counts_of_a_tick_are_not_limited() -> None:
     assert isinstance(make_spec(5000, estimate="n1"), RairanTachometer)
+
+
+@pytest.mark.parametrize("falling", [False, True])
+@pytest.mark.parametrize("max_shift", [1, 3, 4, 7])
+@pytest.mark.parametrize("one_in", [4, 5, 9, 20, 100])
+def test_the_next_k(one_in: int, max_shift: int, falling: bool) -> None:
+    target = Fraction(1, one_in)
+    rule = AdaptiveDt(target, max_shift)
+    for k in range(falling, max_shift + 1):  # from k = 0 on nothing falls
+        for n in range(1, 4 * rule.fewest):
+            for high in (False, True):
+                counts = (n, 1) if high and n > 1 else (1, 1 if high else n)
+                wanted = next_k(k, falling, counts, target, max_shift)
+                assert next_shift(rule, k, n, high=high, falling=falling) == wanted, (k, n, high)
