@@ -3,13 +3,12 @@
 import functools
 import math
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import count, pairwise
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from reference.rairan import table_1
-from support.table1 import table1
 
 from tachometry.sim import golden
 from tachometry.sim.signals.recording import PinTrace
@@ -358,3 +357,30 @@ def test_the_default_does_not_lock_where_the_letter_does(phase: float) -> None:
     letter = replace(SPEC, timing=timing, paper_exact=True)
     for spec, expected in ((letter, 0.5), (replace(letter, paper_exact=False), 1.0)):
         assert set(settled_n1(spec, edges)) == {expected}
+
+
+WINDOWS = 4  # to get in step, and then to be looked at
+
+
+@dataclass(frozen=True)
+class Steady:
+    """Computes Table 1 once it is in step with the pulses.
+
+    Parameters
+    ----------
+    outputs : all (Nep1, Ndt1) that it returns
+    update_times : all times between updates of Ndt1, in ts
+    """
+
+    outputs: set[tuple[int, int]]
+    update_times: set[int]
+
+
+def table1(period: int, dt: int, first_pulse: int) -> Steady:
+    """Return pulses at `first_pulse` and every `period` after it, all in ts."""
+    duration = first_pulse + 2 * WINDOWS * (period + 2 * dt)
+    rows = table1_rows(count(first_pulse, period), dt, duration)
+    updates = [k for k, row in enumerate(rows) if row.new_n_dt1]
+    settled = rows[updates[WINDOWS] : updates[2 * WINDOWS - 1] + 1]
+    times = [row.time for row in settled if row.new_n_dt1]
+    return Steady({(row.n_ep1, row.n_dt1) for row in settled}, {after - before for before, after in pairwise(times)})

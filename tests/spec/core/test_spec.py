@@ -1,5 +1,3 @@
-import json
-import math
 import re
 from fractions import Fraction
 
@@ -8,7 +6,6 @@ import pytest
 from tachometry.spec import Encoder, Speed, STachometer, Timing, of_texts
 from tachometry.spec.formats.reciprocal import Reciprocal
 from tachometry.spec.language.units import parse_frequency
-from tachometry.spec.registers.manifest import manifest
 
 TIMING = Timing(48_000_000, 960, 500)
 
@@ -153,44 +150,3 @@ def test_memory_is_the_table() -> None:
     assert isinstance(spec.form.reciprocal, Reciprocal)
     assert entries == len(spec.form.reciprocal.table)
     assert width == max(spec.form.reciprocal.table).bit_length()
-
-
-def test_widths_hold_what_they_must() -> None:
-    spec = STachometer(encoder=Encoder(500), timing=TIMING)
-    assert spec.widths.max_count == 960
-    assert (spec.widths.count, spec.widths.velocity, spec.widths.interval) == (11, 27, 9)
-    assert spec.scale.unit_velocity == pytest.approx(50 * math.pi)
-    assert spec.scale.rad_per_s_per_lsb == pytest.approx(50 * math.pi / 65536)
-
-
-def test_manifest_names_every_option_and_survives_json() -> None:
-    spec = STachometer(encoder=Encoder(500), timing=TIMING, max_speed=Speed.parse("400rad/s"), cancel=False)
-    described = manifest(spec)
-    assert json.loads(json.dumps(described)) == described
-    assert described["parameters"] == {
-        "method": "s",
-        "pulses_per_rev": 500,
-        "decoding": 4,
-        "clock_hz": 48_000_000,
-        "tick_cycles": 960,
-        "max_ticks": 500,
-        "unit": "count/tick",
-        "frac_bits": 16,
-        "velocity_width": 19,
-        "max_speed": "400rad/s",
-        "position_width": 32,
-        "filter_clocks": 0,
-        "index": False,
-        "index_reset": False,
-        "max_tick_cycles": None,
-        "age": False,
-        "bounds": False,
-        "edge_error": 0.0,
-        "lowpass": None,
-        "cancel": False,
-        "reciprocal_source": "serial",
-    }
-    assert described["counts_per_rev"] == 2000
-    assert described["interval_unit_cycles"] == 960
-    assert described["velocity"]["unit"] == "count/tick"
-    assert set(described["latency_cycles"]) == {"pin_to_count", "tick_latency", "tick_to_velocity"}

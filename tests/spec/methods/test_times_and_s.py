@@ -159,15 +159,6 @@ def test_the_paper_alone_neither_decays_nor_has_bounds(made: Any) -> None:
     assert made(bounds=True).bounds
 
 
-def test_equations() -> None:
-    assert [t().words.description, mt(timer="tick").words.description] == [
-        "eq. (9), times in clocks",
-        "eq. (13), times in ticks",
-    ]
-    assert [s().words.description[:8], s(cancel=False).words.description] == ["eq. (21)", "eq. (17)"]
-    assert [s().words.heading, s(cancel=False).words.heading] == ["S method, eq. (21)", "S method, eq. (17)"]
-
-
 def test_the_numerator_of_s() -> None:
     """N = d0 + d1 of eq. (21) is of half counts, d1 of eq. (17) of counts; d is twice the greatest m_e at most."""
     assert [s().form.max_numerator, s(cancel=False).form.max_numerator] == [80, 40]
@@ -237,29 +228,6 @@ def test_what_is_told_of_the_reciprocal() -> None:
     )
     with pytest.raises(ValueError, match=r"^reciprocal must be serial or table, not 'none'$"):
         s(reciprocal_source="none")
-
-
-def test_latencies_of_s() -> None:
-    """80 has 7 bits, so N has 8: four digits, one clock each, and one to start."""
-    assert [s(tick).latency.serial for tick in (7, 18)] == [True, True]
-    assert [s(6).latency.serial, s(18, 2049).latency.serial] == [False, False]
-    assert [s(18).latency.datapath, s(7).latency.datapath, s(19).latency.datapath] == [4 + 1, 3 + 1, 4 + 1]
-    # A table takes three clocks more: m_s, the table, its register. A division one for every bit, and one to begin.
-    assert [s(18).latency.busy, s(19).latency.busy] == [5 + 3, 5 + 1 + 13]
-    # One for each bit of N and each digit of N·R/m, and one each for the table, its register, and to round.
-    fast = s(1, 5000)
-    assert (fast.form.max_numerator, fast.latency.datapath) == (4, 4 + 2 + 3)
-    # What saturates has two registers of its own.
-    slow: dict[str, Any] = {"max_speed": Speed(Fraction(1000), "rev/s")}
-    assert [one.latency.tick for one in (s(), s(**slow), s(1, **slow), t(), t(**slow))] == [2, 4, 2, 2, 2]
-
-
-def test_windows_of_s() -> None:
-    """A forced update keeps the newer half. The next one does not contain the last count any more."""
-    assert [s(20, ticks).form.kept_ticks for ticks in (2, 3, 10, 11)] == [1, 1, 5, 5]
-    assert [s(20, ticks).times.standstill_ticks for ticks in (2, 3, 10, 11)] == [3, 5, 15, 17]
-    assert s(20, 10).recovery.remembered == (16 + 10 + 1) * 20
-    assert s(20, 10, external_tick=True, max_tick_cycles=30).recovery.remembered == (16 + 10 + 1) * 30
 
 
 @pytest.mark.parametrize("made", [TTachometer, MTTachometer, STachometer])
