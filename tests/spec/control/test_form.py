@@ -219,48 +219,6 @@ def test_products_are_rounded_and_the_least_coefficient_has_twelve_bits(seed: in
             assert form.product(term, word, len(one.values)) == math.floor(exact + Fraction(1, 2))
 
 
-def check_formats(form: ControlForm) -> None:
-    """The greatest words of all terms; and an error of the position that is the least of all bits that is enough."""
-    most = {
-        Term.FILTER: 2 * form.most_y,
-        Term.OBSERVER: form.most_w,
-        Term.CURRENT: form.longest * form.current_limit,
-        Term.POSITION: form.most_error + 1,
-        Term.VELOCITY: form.most_y + (1 << form.velocity_width - 1 + form.extra_bits),
-        Term.ACCELERATION: 1 << 19,
-        Term.DISTURBANCE: form.most_w,
-    }
-    assert form.word_width == max((most[term] << one.shift).bit_length() + 1 for term, one in form.terms.items())
-    others = sum(form.product(term, most[term]) + 1 for term in (Term.VELOCITY, Term.ACCELERATION, Term.DISTURBANCE))
-    enough = others + 16 * form.current_limit + 1
-    everything = (1 << form.position_width + POSITION_FRAC_BITS - 1) - 1
-    bits = 1
-    while form.product(Term.POSITION, 2**bits - 1) < enough and 2**bits - 1 < everything and form.most_error > 1:
-        bits += 1
-    assert form.most_error == 2**bits - 1
-    assert form._most_others == others
-    total = others + form.product(Term.POSITION, form.most_error + 1) + 1
-    assert form.most_total == total
-    assert form.total_width == max(total.bit_length() + 1, form.position_width + POSITION_FRAC_BITS)
-    # z leads by less than what n currents add, and what rounding adds, over what is forgotten in n ticks.
-    forgets, gains = form.terms[Term.OBSERVER].values, form.terms[Term.CURRENT]
-    adds = [n * form.current_limit * 2**gains.shift * gain for n, gain in enumerate(gains.values, 1)]
-    leads = [Fraction(add + 2**form.factor_bits, forget) for add, forget in zip(adds, forgets, strict=True)]
-    assert form.most_lead == math.ceil(max(leads))
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_what_the_formats_hold(seed: int) -> None:
-    """Whichever term has the widest word, however few bits the position has, however great the current may be."""
-    form = random_spec(seed).form
-    check_formats(form)
-    for term, one in form.terms.items():
-        check_formats(replace(form, terms={**form.terms, term: replace(one, shift=one.shift + 60)}))
-    check_formats(replace(form, position_width=1))
-    for bits in range(1, 30):
-        check_formats(replace(form, current_limit=form.current_limit << bits))
-
-
 def test_a_tracking_core_has_no_filter() -> None:
     core = TrackTachometer(encoder=Encoder(500), max_speed=Speed.parse("1000rad/s"), velocity_width=16)
     assert LoopSpec(tachometer=core).filter is None
@@ -304,21 +262,6 @@ def test_words_of_80_bits() -> None:
     inertia = next(2**n for n in range(20) if loop(2**n).form.word_width == 80)
     with pytest.raises(ParameterError, match="words would have 81 bits, and 80 are the most"):
         loop(2 * inertia)
-
-
-def test_times() -> None:
-    """Seven products, one for each term, and two clocks to hold their sum; without the filter three for the first."""
-    for multiplier, filter, clocks in (
-        ("serial", Fraction(40), lambda p: 7 * (p + 4) + 2),
-        ("parallel", Fraction(40), lambda p: 7 * 6 + 2),
-        ("serial", Fraction(0), lambda p: 6 * (p + 4) + 3 + 2),
-        ("parallel", Fraction(0), lambda p: 6 * 6 + 3 + 2),
-    ):
-        spec = LoopSpec(tachometer=CORE, multiplier=multiplier, velocity_filter=filter)
-        assert spec.latency.tick_to_result == clocks(spec.form.factor_bits)
-        assert spec.latency.least_period == spec.latency.tick_to_result + 1
-        # A control tick comes a clock behind the first update, which is late from the last clock of the tick on.
-        assert spec.latency.first_tick == 959 + CORE.latency.tick + CORE.latency.tick_to_velocity + 1
 
 
 def test_gains_that_are_inputs_have_24_bits_at_most() -> None:

@@ -60,26 +60,6 @@ def test_ports_that_have_a_sign_and_those_of_16_bits() -> None:
 BUSY = 8 + 1 + 38
 
 
-def test_counts_per_tick() -> None:
-    spec = spec_of()
-    assert spec.widths.frac_bits_range("count/tick") == (4, 24)
-    assert (spec.widths.frac_bits, spec.widths.native_frac_bits, spec.scale.full_scale) == (16, 16, 960 << 16)
-    assert (spec.scale.output, spec.latency.output, spec.latency.low_pass) == (None, 0, 0)
-    assert (
-        spec.latency.tick_to_velocity == spec.latency.datapath == 7 + 1
-    )  # N of 3840 half counts has 13 bits: 7 digits
-    assert (spec.times.update_spacing, spec.times.min_tick_cycles, spec.times.longest_tick) == (960, BUSY, 960)
-    assert (spec.scale.shown_unit.name, spec.scale.rounding_lsb, spec_of(unit="rpm").scale.rounding_lsb) == (
-        "rad/s",
-        0.5,
-        0.7,
-    )
-    assert spec.scale.greatest_speed == pytest.approx(960 * 50 * math.pi)
-    assert spec.bound.uncertainty == 1
-    assert (spec.bound.max, spec.bound.width) == (961, 11 + 16)
-    assert (spec.bound.absent, spec.bound.shown_absent) == (2**26 - 1, 2**26 - 1)
-
-
 @pytest.mark.parametrize("width", [8, 9, 13, 20])
 @pytest.mark.parametrize("unit", ["count/tick", *UNITS])
 def test_what_fits_the_bits_of_the_velocity(unit: str, width: int) -> None:
