@@ -1,10 +1,13 @@
-"""Timing is read from recorded logs of nextpnr, and from logs with violations."""
+"""Timing is read from recorded logs of nextpnr, and from logs with violations; programs are found."""
 
+import importlib.metadata
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from support.fake_tools import FakeTools
 
+from tachometry.boards.fpga import tools
 from tachometry.boards.fpga.timing import TimingError, check_hold, slowest_clock
 
 LOGS = Path(__file__).parent / "logs"
@@ -82,3 +85,19 @@ def test_a_recorded_design_that_is_too_slow() -> None:
     check_hold(log)
     with pytest.raises(TimingError, match=r"^timing is not met: cd_sync.clk is good for 123.73 MHz, not 200 MHz$"):
         slowest_clock(report(123.73, 200.0), 200_000_000)
+
+
+def test_programs_of_this_python_come_before_those_on_the_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    FakeTools(tmp_path / "path", monkeypatch, "here there")
+    FakeTools(tmp_path / "scripts", monkeypatch, "here")
+    monkeypatch.setenv("PATH", str(tmp_path / "path"))
+    assert tools.find("here") == str(tmp_path / "scripts" / "here")
+    assert tools.find("there") == str(tmp_path / "path" / "there")
+    with pytest.raises(tools.ToolError, match=r"^nowhere is needed for boards and not installed: pip install 'tach"):
+        tools.find("nowhere")
+
+
+def test_versions_are_those_that_are_installed() -> None:
+    assert tools.versions(["amaranth"]) == {"amaranth": importlib.metadata.version("amaranth")}
+    with pytest.raises(tools.ToolError, match=r"^nonsense-of-nobody is needed for boards and not installed: pip "):
+        tools.versions(["amaranth", "nonsense-of-nobody"])

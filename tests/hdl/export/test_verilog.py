@@ -1,3 +1,4 @@
+import ast
 import importlib.metadata
 import json
 import os
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 from amaranth.back.verilog import YosysError
 
+import tachometry.hdl
 from tachometry.hdl.export import export
 from tachometry.hdl.export.files import CORE_FILES
 from tachometry.hdl.export.verilog import bundled_yosys
@@ -159,3 +161,50 @@ def test_a_constant_that_is_cut_is_an_error_outside_of_the_tests() -> None:
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert done.returncode == 1
     assert "SyntaxWarning: Initial value 2 will be truncated" in done.stderr
+
+
+NAMED = ("Signal", "Signal.like", ".read_port", ".write_port")
+FILES = [path for folder in tachometry.hdl.__path__ for path in sorted(Path(folder).rglob("*.py"))]
+
+
+def unnamed(source: str) -> list[int]:
+    """Return lines of the signals and ports of memories whose names Amaranth would guess.
+
+    It reads the name from the bytecode after the constructor. That is an assignment to a single variable or attribute
+    in every version of Python; after anything else (a tuple, a comprehension, an argument) compilers differ.
+    """
+    tree = ast.parse(source)
+    assigned = {
+        id(node.value)
+        for node in ast.walk(tree)
+        if (isinstance(node, ast.Assign) and len(node.targets) == 1 and not isinstance(node.targets[0], ast.Tuple))
+        or isinstance(node, ast.AnnAssign)
+    }
+    return [
+        node.lineno
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        and ast.unparse(node.func).endswith(NAMED)
+        and id(node) not in assigned
+        and not any(keyword.arg == "name" for keyword in node.keywords)
+    ]
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+def test_no_name_is_guessed(path: Path) -> None:
+    assert unnamed(path.read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["a, b = Signal(), Signal()", "a = [Signal.like(b)]", "a = b = Signal()", "f(Signal())", "a, b = m.read_port(), c"],
+)
+def test_guesses_are_found(line: str) -> None:
+    assert set(unnamed(line)) == {1}
+
+
+@pytest.mark.parametrize(
+    "line", ["a = Signal()", "self.a = Signal.like(b)", "a: int = Signal(3)", "f(Signal(name='a'))"]
+)
+def test_plain_assignments_are_none(line: str) -> None:
+    assert unnamed(line) == []

@@ -69,10 +69,7 @@ class Box(Case):
         """Cells of these sources."""
         return f"a:src=*{self.sources} t:* %i"
 
-    @property
-    def group(self) -> str:
-        """Which row of the last table."""
-        return "registers"
+    group = "registers"
 
     @property
     def on(self) -> Bus:

@@ -52,11 +52,7 @@ class GeneratorCase(Case):
     """The command generator alone."""
 
     selection = "a:src=*hdl/control/* t:* %i"
-
-    @property
-    def group(self) -> str:
-        """Which row of the last table."""
-        return "loop"
+    group = "loop"
 
     @property
     def component(self) -> wiring.Component:

@@ -55,11 +55,7 @@ class LoopCase(Case):
 
     # The tachometer is mutated by itself.
     selection = "a:src=*hdl/control/* t:* %i"
-
-    @property
-    def group(self) -> str:
-        """Which row of the last table."""
-        return "loop"
+    group = "loop"
 
     @property
     def component(self) -> wiring.Component:
