@@ -4,15 +4,15 @@ from collections.abc import Iterable, Sequence
 from functools import reduce
 from operator import and_, or_
 
-from amaranth import Array, C, Cat, Module, Mux, Shape, Signal, Value, signed
+from amaranth import Array, C, Cat, Module, Mux, Signal, Value, signed
 from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleBox
 from tachometry.hdl.front_end.sampling_clock import state_after, states_of
-from tachometry.hdl.methods.small_unit import SmallUnit
-from tachometry.hdl.methods.track_unit import QuickUnit
+from tachometry.hdl.methods.block_unit import BlockUnit
+from tachometry.hdl.methods.serial_unit import SerialUnit
 from tachometry.spec.formats.tracking import PLACE_BITS, WIDTH
 from tachometry.spec.formats.tracking_code import (
     ADDRESS_BITS,
@@ -26,7 +26,7 @@ from tachometry.spec.formats.tracking_code import (
     Left,
     Program,
 )
-from tachometry.spec.formats.tracking_units import QUICK, Start
+from tachometry.spec.formats.tracking_units import BLOCK, Start
 
 _PLACES_BITS = PLACE_BITS - 1 - 6  # twice the places, over 64
 
@@ -65,30 +65,27 @@ def _encoded(program: Program, one: Instruction, layout: data.StructLayout, at: 
     if one.target:
         target = at[program.code.labels[one.target]]
         how, store = target & ((1 << HOW_BITS) - 1), target >> HOW_BITS
-    values = {
-        "left": one.left,
-        "from_unit": one.word == "~",
-        "word": word,
-        "first": first,
-        "subtract": one.subtract,
-        "by_sign": one.by_sign,
-        "keep": one.keep,
-        "writes": bool(one.store),
-        "start": one.start,
-        "output": OUTPUTS.index(one.output),
-        "jump": one.jump,
-        "how": how,
-        "store": store,
-    }
-    coded, place = 0, 0
-    for name, field in layout.members.items():
-        coded |= int(values[name]) << place
-        place += Shape.cast(field).width
-    return coded
+    return layout.const(
+        {
+            "left": one.left,
+            "from_unit": one.word == "~",
+            "word": word,
+            **({"first": first} if program.times.ports > 1 else {}),
+            "subtract": one.subtract,
+            "by_sign": one.by_sign,
+            "keep": one.keep,
+            "writes": bool(one.store),
+            "start": one.start,
+            "output": OUTPUTS.index(one.output),
+            "jump": one.jump,
+            "how": how,
+            "store": store,
+        }
+    ).as_bits()
 
 
 class TrackMachine(wiring.Component):
-    """Runs the program once for every tick; `spec.formats.tracking_code` says what each instruction does.
+    """Runs the program once for every tick; `spec.formats.tracking_code` defines each instruction.
 
     While an instruction is executed, the word of the next one is read, and the one behind that is fetched; with more
     stages, there is a register in front of the memory of words and one behind it. All wait while one needs the unit,
@@ -98,35 +95,20 @@ class TrackMachine(wiring.Component):
     inputs are cleared where they are not read, as a reset of registers takes no cell. So the unit and the outputs take
     what the adder gives, and not the sum a clock later.
 
-    Parameters
-    ----------
-    program : Program
-    others : Program
-        Of further axes, which have the machine in turn; they differ in their words alone.
-
-    Members
-    -------
-    axis : In(range(axes))
-        Only with other axes: whose words they are, from `begin` to the end. All have begun once before the first
-        begins again.
-    begin : In(1)
-    number, times, places, last, moved, length : In
-        What the tick had; they hold until the next, as all inputs do.
-    kind, end, down : In
-        Of the last count's edge; of the position at the end; whether the count went backward.
-    velocity, position_fine, quality, acceleration : Out(signed)
-    stalled : Out(1)
-        Of a tick without a count. All are those of this tick `program.clocks - 1` after `begin`.
+    Further axes have the machine in turn; their programs differ in their words alone.
     """
 
     def __init__(self, program: Program, *others: Program) -> None:
         self._program = program
         self._axes = (program, *others)
+        self._two = program.times.ports > 1  # words are read at a time
         form = program.form
-        self.unit = (QuickUnit if program.times == QUICK else SmallUnit)(program)
+        self.unit = (BlockUnit if program.times == BLOCK else SerialUnit)(program)
+        # All axes have begun once before the first begins again. Inputs are those of the tick, and hold until the next.
+        # Outputs are those of this tick `program.clocks - 1` after `begin`.
         super().__init__(
             {
-                **({"axis": In(range(len(self._axes)))} if others else {}),
+                **({"axis": In(range(len(self._axes)))} if others else {}),  # its words, from `begin` to the end
                 "begin": In(1),
                 "number": In(form.number_bits),
                 "times": In(form.times_bits),
@@ -134,173 +116,234 @@ class TrackMachine(wiring.Component):
                 "last": In(range(form.longest_tick)),
                 "moved": In(signed(form.moved_bits)),
                 "length": In(range(form.longest_tick + 1)),
-                "kind": In(2),
-                "end": In(2),
-                "down": In(1),
+                "kind": In(2),  # of the last count's edge
+                "end": In(2),  # kind of the position at the end
+                "down": In(1),  # the last count went backward
                 **dict.fromkeys(OUTPUTS[1:], Out(signed(WIDTH))),
-                "stalled": Out(1),
+                "stalled": Out(1),  # of a tick without a count
             }
         )
-
-    @property
-    def idle(self) -> tuple[Idle, ...]:
-        """The small unit: while it works, all else waits for it, or rests."""
-        busy = ("unit.reads", "unit.adds", "unit.shifts")
-        return (IdleBox("unit", busy),) if isinstance(self.unit, SmallUnit) else ()
-
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
-        program, code = self._program, self._program.code.instructions
-        m.submodules.unit = unit = self.unit
-        layout = _layout(program)
+        self._layout = layout = _layout(program)
         # Nothing needs them to be in order, so a shift register with feedback takes the place of a counter.
-        at = states_of(len(code).bit_length())
-        held_at = {place: _encoded(program, one, layout, at) for place, one in zip(at, code, strict=False)}
+        self._states = at = states_of(len(program.code.instructions).bit_length())
+        codes = {
+            place: _encoded(program, one, layout, at) for place, one in zip(at, program.code.instructions, strict=False)
+        }
         depth = len(at) + 1
-        m.submodules.program = rom = Memory(
-            shape=layout.size, depth=depth, init=[held_at.get(place, 0) for place in range(depth)]
-        )
-        m.submodules.words = words = Memory(
+        self._rom = Memory(shape=layout.size, depth=depth, init=[codes.get(place, 0) for place in range(depth)])
+        self._words = Memory(
             shape=signed(WIDTH),
             depth=1 << ((len(self._axes) - 1).bit_length() + ADDRESS_BITS),
             init=self._contents(),
             attrs={"no_rw_check": 1},  # the program reads no word in the clock in which it is written
         )
-        fetch = rom.read_port()
-        read = words.read_port()
-        write = words.write_port()
+        self._fetch = self._rom.read_port()
+        self._read = self._words.read_port()
+        self._write = self._words.write_port()
+        self._declare(depth)
+
+    def _declare(self, depth: int) -> None:
         # Fetch, read, execute.
-        reset, tick = (at[program.code.labels[name]] for name in ("reset", "tick"))
-        first = Signal(init=1)  # the words are to be reset
-        pc = Signal(range(depth), init=reset)
-        fetched = Signal()
-        active = Signal()
-        taken = Signal()
-        stop = Signal()
-        hold = Signal()
-        go = Signal()
-        now = Signal(layout, reset_less=True)
-        place = Signal.like(pc)
-        coming, valid = data.View(layout, fetch.data), fetched
-        address, word = self._at(self._chosen(m, coming.word)), read.data
-        two = program.times.ports > 1
-        if not two:
-            held = Signal.like(Value.cast(address), reset_less=True)
-            word = Signal(signed(WIDTH), reset_less=True)
-            m.d.sync += held.eq(Mux(hold, held, address))
+        self.first = Signal(init=1)  # the words are to be reset
+        self.pc = Signal(range(depth), init=self._state("reset"))
+        self.place = Signal.like(self.pc)  # of the instruction that is fetched
+        self.fetched = Signal()
+        self.active = Signal()  # `now` is executed
+        self.now = Signal(self._layout, reset_less=True)
+        self.hold = Signal()  # all wait for the unit
+        self.go = Signal()
+        self.taken = Signal()  # a jump is
+        self.stop = Signal()
+        # The adder.
+        self.sum_ = Signal(signed(WIDTH), reset_less=True)
+        self.sign = Signal()  # that is kept
+        self.left = Signal(signed(WIDTH))
+        self.right = Signal(signed(WIDTH))
+        self.total = Signal(signed(WIDTH))
+        self.minus = Signal()
+        self.carry = Signal()
+        self.used = Signal(attrs={"keep": "true"})  # the sum is the first term
+        self.from_unit = Signal()  # and the result of the unit is the second
+        self.negative = self.sum_[-1]
+        self.word = self._read.data
+        self.made = self.sum_  # the unit and the outputs take it
+        if not self._two:
+            self.negative = Signal(name="negative")
+            self.word = Signal(signed(WIDTH), name="word", reset_less=True)
+            self.made = self.total
+
+    @property
+    def idle(self) -> tuple[Idle, ...]:
+        """The serial unit: while it works, all else waits for it, or rests."""
+        busy = ("unit.reads", "unit.adds", "unit.shifts")
+        return (IdleBox("unit", busy),) if isinstance(self.unit, SerialUnit) else ()
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        m.submodules.unit = self.unit
+        m.submodules.program = self._rom
+        m.submodules.words = self._words
+        fetched = data.View(self._layout, self._fetch.data)
+        added = self._read_words(m, fetched)
+        earlier, coming, follows = self._execute(m, fetched)
+        self._go_on(m)
+        choice, below = coming.left, Mux(self.go, self.total[-1], self.negative)
+        if self._two:
+            choice, below = self.now.left, self.negative
+        least_or_sum, most_or_sum = Value.cast(choice)
+        m.d.comb += self.used.eq(Mux(below, least_or_sum, most_or_sum))
+        # Where no word is meant one is read that is 0, and so is an input where none is; it is a first term.
+        if self._two:
+            left = Mux(self.used, self.sum_, 0) | self._take_input(m, coming) | added
+            minus = self.now.subtract ^ (self.now.by_sign & self.sign)
+        else:
+            left, minus = self.sum_, self._take_word(m, coming, earlier, below)
+        self._add(m, left, minus, follows)
+        self._show(m)
+        self._begin(m)
+        self._jump(m)
+        return m
+
+    def _state(self, label: str) -> int:
+        return self._states[self._program.code.labels[label]]
+
+    def _read_words(self, m: Module, fetched: data.View) -> Value:
+        """Fetch an instruction, and read the words of the one before; return the second one."""
+        address = self._at(self._chosen(m, fetched.word))
+        if not self._two:
+            held = Signal.like(Value.cast(address), name="held", reset_less=True)
+            m.d.sync += held.eq(Mux(self.hold, held, address))
             address = held
         m.d.comb += [
-            place.eq(Mux(taken, Cat(now.how, now.store), pc)),
-            fetch.addr.eq(place),
-            fetch.en.eq(~hold),
-            read.addr.eq(address),
-            read.en.eq(~hold),
-            go.eq(active & ~hold),
+            self.place.eq(Mux(self.taken, Cat(self.now.how, self.now.store), self.pc)),
+            self._fetch.addr.eq(self.place),
+            self._fetch.en.eq(~self.hold),
+            self._read.addr.eq(address),
+            self._read.en.eq(~self.hold),
+            self.go.eq(self.active & ~self.hold),
         ]
-        added = C(0, signed(WIDTH))
-        if two:
-            second = words.read_port()
-            m.d.comb += [second.addr.eq(self._at(coming.first)), second.en.eq(~hold)]
-            added = second.data
+        if not self._two:
+            return C(0, signed(WIDTH))
+        second = self._words.read_port()
+        m.d.comb += [second.addr.eq(self._at(fetched.first)), second.en.eq(~self.hold)]
+        return second.data
+
+    def _execute(self, m: Module, fetched: data.View) -> tuple[data.View, data.View, Value]:
+        """Move instructions on to `now`; return the two before it, and whether the latter follows."""
+        coming, valid = fetched, self.fetched
         earlier = coming
-        for _ in range(program.times.stages - 1):
+        for _ in range(self._program.times.stages - 1):
             earlier = coming
-            following = Signal(layout, reset_less=True)
+            following = Signal(self._layout, reset_less=True)
             follows = Signal()
-            with m.If(~hold):
-                m.d.sync += [following.eq(coming), follows.eq(valid & ~taken & ~stop)]
+            with m.If(~self.hold):
+                m.d.sync += [following.eq(coming), follows.eq(valid & ~self.taken & ~self.stop)]
             coming, valid = following, follows
-        follows = valid & ~taken & ~stop
-        with m.If(~hold):
-            m.d.sync += [now.eq(coming), active.eq(follows)]
-        with m.If((fetched & ~hold) | self.begin):
-            m.d.sync += pc.eq(state_after(place))
-        with m.If(stop):
-            m.d.sync += [fetched.eq(0), pc.eq(Mux(first & ~self._is_last(), reset, tick))]
+        is_next = valid & ~self.taken & ~self.stop
+        with m.If(~self.hold):
+            m.d.sync += [self.now.eq(coming), self.active.eq(is_next)]
+        return earlier, coming, is_next
+
+    def _go_on(self, m: Module) -> None:
+        """Go on to the next instruction, and stop at an end; the first program of each axis resets its words."""
+        with m.If((self.fetched & ~self.hold) | self.begin):
+            m.d.sync += self.pc.eq(state_after(self.place))
+        with m.If(self.stop):
+            begin = Mux(self.first & ~self._is_last(), self._state("reset"), self._state("tick"))
+            m.d.sync += [self.fetched.eq(0), self.pc.eq(begin)]
             with m.If(self._is_last()):
-                m.d.sync += first.eq(0)
+                m.d.sync += self.first.eq(0)
         with m.If(self.begin):
-            m.d.sync += fetched.eq(1)
-        # The adder.
-        sum_ = Signal(signed(WIDTH), reset_less=True)
-        negative = sum_[-1] if two else Signal(name="negative")
-        sign = Signal()
-        left = Signal(signed(WIDTH))
-        right = Signal(signed(WIDTH))
-        total = Signal(signed(WIDTH))
-        minus = Signal()
-        carry = Signal()
-        choice, below = (now.left, negative) if two else (coming.left, Mux(go, total[-1], negative))
-        least_or_sum, most_or_sum = Value.cast(choice)
-        used = Signal(attrs={"keep": "true"})
-        m.d.comb += used.eq(Mux(below, least_or_sum, most_or_sum))
-        # Where no word is meant one is read that is 0, and so is an input where none is; it is a first term.
-        from_unit = Signal()
+            m.d.sync += self.fetched.eq(1)
+
+    def _take_input(self, m: Module, coming: data.View) -> Value:
+        """Return the input that an instruction with two words takes."""
+        given = Signal(signed(WIDTH), reset_less=True)
+        with m.If(~self.hold):
+            m.d.sync += [self.from_unit.eq(coming.from_unit), given.eq(0)]
+            with m.If(coming.first[3:] == FIRST_INPUT >> 3):
+                inputs = Array((*self._inputs(), C(0)))  # as many as its index selects
+                m.d.sync += given.eq(inputs[coming.first[:3]])
+        return given
+
+    def _take_word(self, m: Module, coming: data.View, earlier: data.View, below: Value) -> Value:
+        """Take the word or input of an instruction; return whether it is subtracted."""
         inputs = self._inputs()
-        if two:
-            given = Signal(signed(WIDTH), reset_less=True)
-            with m.If(~hold):
-                m.d.sync += [from_unit.eq(coming.from_unit), given.eq(0)]
-                with m.If(coming.first[3:] == FIRST_INPUT >> 3):
-                    m.d.sync += given.eq(Array((*inputs, C(0)))[coming.first[:3]])  # as many as its index tells
-        else:
-            given = [Signal.like(value, reset_less=True, name=name) for name, value in zip(INPUTS, inputs, strict=True)]
-            with m.If(~hold):
-                m.d.sync += [from_unit.eq(coming.from_unit), word.eq(reduce(or_, given, read.data))]
-                m.d.sync += Cat(given).eq(Cat(inputs))
-            for number, one in enumerate(given):
-                with m.If(~hold & (earlier.word != FIRST_INPUT + number)):
-                    m.d.sync += one.eq(0)
-            kept = Mux(go & now.keep, total[-1], sign)
-            following_minus = Signal()
-            with m.If(~hold):
-                m.d.sync += following_minus.eq(coming.subtract ^ (coming.by_sign & kept))
-            m.d.sync += negative.eq(below)
-        flipped = (right ^ minus.replicate(WIDTH))[:WIDTH]
+        given = [Signal.like(value, reset_less=True, name=name) for name, value in zip(INPUTS, inputs, strict=True)]
+        with m.If(~self.hold):
+            word = reduce(or_, given, self._read.data)
+            m.d.sync += [self.from_unit.eq(coming.from_unit), self.word.eq(word)]
+            m.d.sync += Cat(given).eq(Cat(inputs))
+        for number, one in enumerate(given):
+            with m.If(~self.hold & (earlier.word != FIRST_INPUT + number)):
+                m.d.sync += one.eq(0)
+        kept = Mux(self.go & self.now.keep, self.total[-1], self.sign)
+        following_minus = Signal()
+        with m.If(~self.hold):
+            m.d.sync += following_minus.eq(coming.subtract ^ (coming.by_sign & kept))
+        m.d.sync += self.negative.eq(below)
+        return following_minus
+
+    def _add(self, m: Module, left: Value, minus: Value, follows: Value) -> None:
+        """Add or subtract a term, and store the sum; one that the next instruction does not take is cleared."""
+        flipped = (self.right ^ self.minus.replicate(WIDTH))[:WIDTH]
         m.d.comb += [
-            left.eq(Mux(used, sum_, 0) | given | added if two else sum_),
-            right.eq(word | Mux(from_unit, unit.result, 0)),
-            minus.eq(now.subtract ^ (now.by_sign & sign) if two else following_minus),
-            carry.eq(minus ^ (from_unit & unit.up)),
-            total.eq((Cat(C(1, 1), left).as_signed() + Cat(carry, flipped).as_signed()) >> 1),
+            self.left.eq(left),
+            self.right.eq(self.word | Mux(self.from_unit, self.unit.result, 0)),
+            self.minus.eq(minus),
+            self.carry.eq(self.minus ^ (self.from_unit & self.unit.up)),
+            self.total.eq((Cat(C(1, 1), self.left).as_signed() + Cat(self.carry, flipped).as_signed()) >> 1),
         ]
-        with m.If(go):
-            m.d.sync += sum_.eq(total)
-        if not two:
-            with m.If(~hold & follows & ~used):
-                m.d.sync += sum_.eq(0)
-        with m.If(go & now.keep):
-            m.d.sync += sign.eq(total[-1])
+        with m.If(self.go):
+            m.d.sync += self.sum_.eq(self.total)
+        if not self._two:
+            with m.If(~self.hold & follows & ~self.used):
+                m.d.sync += self.sum_.eq(0)
+        with m.If(self.go & self.now.keep):
+            m.d.sync += self.sign.eq(self.total[-1])
+
         m.d.comb += [
-            write.en.eq(go & now.writes),
-            write.addr.eq(self._at(self._stored(now.store))),
-            write.data.eq(total),
+            self._write.en.eq(self.go & self.now.writes),
+            self._write.addr.eq(self._at(self._stored(self.now.store))),
+            self._write.data.eq(self.total),
         ]
+
+    def _show(self, m: Module) -> None:
+        """Show the sum at an output."""
         shows = Signal(3)
-        domain = m.d.sync if two else m.d.comb
-        domain += shows.eq(Mux(go, now.output, 0))
-        made = sum_ if two else total
+        domain = m.d.sync if self._two else m.d.comb
+        domain += shows.eq(Mux(self.go, self.now.output, 0))
         for number, name in enumerate(OUTPUTS):
             if name:
                 with m.If(shows == number):
-                    m.d.sync += getattr(self, name).eq(~made[-1] if name == "stalled" else made)
-        # The unit.
-        uses = from_unit | reduce(and_, (now.start != start for start in Start if not program.times.of(start)))
+                    m.d.sync += getattr(self, name).eq(~self.made[-1] if name == "stalled" else self.made)
+
+    def _begin(self, m: Module) -> None:
+        """Begin an operation of the unit, or wait for it."""
+        unit, now = self.unit, self.now
+        waits = reduce(and_, (now.start != start for start in Start if not self._program.times.of(start)))
         m.d.comb += [
-            hold.eq(active & uses & unit.busy),
+            self.hold.eq(self.active & (self.from_unit | waits) & unit.busy),
             unit.begin.eq(self.begin),
-            unit.start.eq(Mux(go, now.start, Start.NONE)),
+            unit.start.eq(Mux(self.go, now.start, Start.NONE)),
             unit.how.eq(now.how),
-            unit.sum.eq(made),
+            unit.sum.eq(self.made),
         ]
-        # Jumps.
+
+    def _jump(self, m: Module) -> None:
+        """Jump if the condition is met."""
         empty, one = ~self.number.any(), self.number == 1
-        met = {Jump.ALWAYS: C(1, 1), Jump.NEG: negative, Jump.POS: ~negative, Jump.EMPTY: empty, Jump.ONE: one}
+        met = {
+            Jump.ALWAYS: C(1, 1),
+            Jump.NEG: self.negative,
+            Jump.POS: ~self.negative,
+            Jump.EMPTY: empty,
+            Jump.ONE: one,
+        }
         m.d.comb += [
-            taken.eq(go & Cat(met.get(jump, C(0, 1)) for jump in Jump).bit_select(now.jump, 1)),
-            stop.eq(go & (now.jump == Jump.END)),
+            self.taken.eq(self.go & Cat(met.get(jump, C(0, 1)) for jump in Jump).bit_select(self.now.jump, 1)),
+            self.stop.eq(self.go & (self.now.jump == Jump.END)),
         ]
-        return m
 
     def _contents(self) -> list[int]:
         """Return the first words of all axes."""

@@ -16,7 +16,7 @@ from tachometry.sim.signals.files import rows_of, write_csv
 from tachometry.sim.theory.performance import PERFORMANCES, disc_counts, disc_error, unknown
 from tachometry.sim.theory.tsuji import unit_velocity
 from tachometry.spec import METHODS, ParameterError, TachometerSpec, TrackTachometer
-from tachometry.spec.formats.tracking_units import QUICK
+from tachometry.spec.formats.tracking_units import BLOCK
 from tachometry.spec.language.units import SpeedUnit
 
 _ROWS = 12  # of a table
@@ -228,7 +228,7 @@ def _rounding(spec: TachometerSpec) -> float:
 
 def cells_of(spec: TachometerSpec) -> int | None:
     """Return cells of an ECP5 that its method takes with the options of the reference core; None: not measured."""
-    block = isinstance(spec, TrackTachometer) and spec.program.times is QUICK
+    block = isinstance(spec, TrackTachometer) and spec.program.times is BLOCK
     return CELLS.get(f"{spec.method}{'-block' * block}")
 
 

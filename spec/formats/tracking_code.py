@@ -154,8 +154,8 @@ def assembled(listing: str = LISTING, apart: int = 2, ports: int = 1) -> Code:
     labels: dict[str, int] = {}
     for line in re.sub("#.*", "", listing).replace(";", "\n").splitlines():
         words = line.split()
-        if words[:1] in (["quick"], ["small"]):
-            words = words[1:] if (words[0] == "quick") == (ports > 1) else []
+        if words[:1] in (["block"], ["serial"]):
+            words = words[1:] if (words[0] == "block") == (ports > 1) else []
         if not words:
             continue
         if words[0].endswith(":"):
@@ -188,7 +188,7 @@ def _spaced(code: Code, apart: int, ports: int) -> Code:
 
 
 def _clash(one: Instruction, before: Instruction = Instruction(), second: Instruction = Instruction()) -> bool:
-    """Tell whether an instruction is too early for the quick unit, as of the two before it; see `QuickUnit`."""
+    """Tell whether an instruction is too early for the block unit, as of the two before it; see `BlockUnit`."""
     if one.start == Start.BY:
         return second.start in (Start.TIMES, Start.EXP)
     return before.start == Start.BY and (one.start == Start.TIMES or one.how == "by")
@@ -355,7 +355,7 @@ class Program:
     def tables(self) -> tuple[int, ...]:
         """The tables of the unit: powers, gains, logarithms; those again, each twice.
 
-        The small unit has the leading one at a bit or one above. So in both cases all bits are an address.
+        The serial unit has the leading one at a bit or one above. So in both cases all bits are an address.
         """
         turned = (
             gains[-GAINS_FROM:] + gains[:-GAINS_FROM] for gains in self.form.gains

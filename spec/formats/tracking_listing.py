@@ -10,7 +10,7 @@ what is begun with the sum`.
     o@last, o@up, o@down   the offset of the last count's edge, of the edge above and below the position
     o@m1, o@m2, o@m3       of the last count if n mod 4 ≥ 1, of that before if ≥ 2, of the third if = 3, else 0
     keep          the sign of the sum         log, exp      begin log2|sum|, 2^sum       out name      an output
-    gain k        begin: log of the gain of p (0), v (1), a (2)  quick, small  before a line: for that machine only
+    gain k        begin: log of the gain of p (0), v (1), a (2)  block, serial  before a line: for that machine only
     by            the factor of products      product name  begin: sum·factor/2^shift of that name
     over n        begin: shift right by n     over by       by ⌊log2⌋ of the factor's whole part
 """
@@ -32,16 +32,16 @@ tick:
     minus_log_n + ~ exp
     quiet = $last
     turn = turn + one
-    quick $number by
-    small tau = ~
-    small $number by
+    block $number by
+    serial tau = ~
+    serial $number by
     moved = $moved
-    quick tau = ~ product time
-    small tau product time
+    block tau = ~ product time
+    serial tau product time
     dt = since - clock - tau hi+ clock
     left = $times - ~
     t over 6
-    quick dt by
+    block dt by
     places = $places - ~ keep log
     log_64 + minus_log_n + ~ exp
     raw = zero s+ ~
@@ -52,19 +52,19 @@ tick:
 known:
     if neg goto young
     log_dt = ~
-    small dt by
+    serial dt by
     a product half_velocity
     e = raw - edge keep
     share = log_dt - log_T
     w = sum lo+ growing
-    quick step = zero
-    quick t = v + ~ product place
-    quick $number by
-    quick V = t - v + t
-    small t = v + ~
-    small V = sum + ~
-    small step = zero
-    small t product place
+    block step = zero
+    block t = v + ~ product place
+    block $number by
+    block V = t - v + t
+    serial t = v + ~
+    serial V = sum + ~
+    serial step = zero
+    serial t product place
     minus_sixteenth s+ e; if pos goto event
     ~ keep                              # the same edge again: no event, unless it moved
     minus_quarter s+ ~; if neg goto same
@@ -75,19 +75,19 @@ event:
     share + log_8192 - growth; if neg goto grown
     step = zero s+ ~
 grown:
-    small $number by
+    serial $number by
     if one goto lone
     left keep
     P product mean
-    quick zero s+ left by
-    quick memory = T + step min most_memory
-    small memory = T + step min most_memory max clock
+    block zero s+ left by
+    block memory = T + step min most_memory
+    serial memory = T + step min most_memory max clock
     t = places - ~
-    small zero s+ left by
+    serial zero s+ left by
     V product place_64
     since = tau; P = P - moved
     t s+ ~ keep log
-    quick memory = memory max clock
+    block memory = memory max clock
     log_64 + minus_log_n + ~ exp
     edge = raw - moved
     e = zero s+ ~ keep log
@@ -97,10 +97,10 @@ heard:
     e - mu over 2
     minus_D4 s+ e; if pos goto alone
     mu = mu + ~ keep
-    quick log_dt + log_45 exp
+    block log_dt + log_45 exp
     since + lead by
     minus_D3 s+ mu s+ mu; if neg goto calm
-    small log_dt + log_45 exp
+    serial log_dt + log_45 exp
     T = memory - ~ lo+ ~
     slow_T = zero
     log_X + log_256; if pos goto kept
@@ -127,7 +127,7 @@ few:
     log_X gain 2
     of_v + log_X - log_dt + ~ exp
     t = log_T + log_T; step = D + D
-    small of_e = log_e + log_X
+    serial of_e = log_e + log_X
     t = t + t - w
     a = a s+ ~ keep log
     log_X + log_64                      # order one, where the acceleration is not seen
@@ -136,7 +136,7 @@ few:
     t + ~ + ~; if pos goto curved
     of_v + ~ exp
     as = zero; quality = of_straight
-    quick of_e = log_e + log_X
+    block of_e = log_e + log_X
     vs = v s- ~
     velocity = sum
     log_X gain 0
@@ -144,39 +144,39 @@ few:
 curved:
     as = a product velocity             # the velocity at the time when it is shown
     quality = of_curve
-    quick of_e = log_e + log_X
+    block of_e = log_e + log_X
     vs = v
     velocity = sum + ~
     log_X gain 0
 placed:
     e keep
     of_e + ~ exp
-    quick since by
+    block since by
     noises = noises + noises_one min noises_most
     p = P s+ ~
 place:                                  # and the place at the end of the tick
-    small since by
+    serial since by
     as product half_velocity
     v keep
     t = zero s+ v min most
     vs + ~ product place
-    quick tick by
+    block tick by
     v = zero s+ t
     least = one
     if empty goto seen
     p + ~ out position_fine
 shown:
-    small tick by
+    serial tick by
     velocity product shown
     w = doubt + log_X - slips hi+ slips     # D·√X, more if errors keep a sign
     triple = step + D
     t = ~
     limit + w over 1
-    quick slope by
+    block slope by
     quality - log_T + ~ exp
     t min most_shown max least_shown out velocity
     t = ~
-    small slope by
+    serial slope by
     as product acceleration
     t max least min most_quality out quality
     ~ out acceleration
@@ -186,7 +186,7 @@ learn:                                  # nothing below is in a hurry
     lost = slips hi+ lost               # counts were lost or added, and now the place is right
     log_X + log_3_2 + ~ exp
     noises = noises max noises_first    # an upset may have made it less
-    quick sum min noises_offset by
+    block sum min noises_offset by
     lag = lag s+ ~
     e over 1
     t = e - before keep
@@ -194,7 +194,7 @@ learn:                                  # nothing below is in a hurry
     trouble; if pos goto short
     t = e + ~ keep
 short:
-    small noises min noises_offset by
+    serial noises min noises_offset by
     before = e
     slips = slips lo+ fade max none
     zero s+ t - D min triple over by
@@ -265,7 +265,7 @@ single:
     dt = sum - tau max clock log
     turn = turn + one chance
     moved = $moved
-    quick dt by
+    block dt by
     phase
     goto known
 offsets:
@@ -288,9 +288,9 @@ lone:
 alone:
     mu = mu + ~
     slips = slips min zero
-    quick log_dt + log_8 exp
+    block log_dt + log_8 exp
     since + lead by
-    small log_dt + log_8 exp
+    serial log_dt + log_8 exp
     T = memory - ~ lo+ ~ log
     slow_T = zero
     goto sized
@@ -335,7 +335,7 @@ silent:
 show:
     since + lead by
     as product velocity
-    quick since by
+    block since by
     velocity = vs + ~
     goto place
 seen:
@@ -382,6 +382,6 @@ nothing:
     p out position_fine
 quiet:
     as = zero
-    quick tick by
+    block tick by
     goto shown
 """

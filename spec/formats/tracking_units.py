@@ -49,12 +49,12 @@ class Times:
         return getattr(self, start.name.lower(), 0)
 
 
-QUICK = Times(log=4, exp=5, over=3, gain=3, by=0, times=5, ports=2)
+BLOCK = Times(log=4, exp=5, over=3, gain=3, by=0, times=5, ports=2)
 
 
 @dataclass(frozen=True)
-class Small:
-    """Says how the small unit works: what is added on top of its register goes right by 2 or by 8 places a clock."""
+class Serial:
+    """Says how the serial unit works: what is added on top of its register goes right by 2 or by 8 places a clock."""
 
     form: Tracking
 

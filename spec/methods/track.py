@@ -18,7 +18,7 @@ from tachometry.spec.core.words import Words
 from tachometry.spec.formats.carrying import Carrying
 from tachometry.spec.formats.tracking import MOST_MEMORY, RESULT_BITS, WIDTH, Tracking
 from tachometry.spec.formats.tracking_code import Program
-from tachometry.spec.formats.tracking_units import QUICK, Small
+from tachometry.spec.formats.tracking_units import BLOCK, Serial
 from tachometry.spec.formats.velocity_output import NATIVE, VelocityOutput
 from tachometry.spec.language.option import ParameterError, option
 from tachometry.spec.language.port import UPDATE, Port, held
@@ -271,12 +271,12 @@ class TrackTachometer(TachometerSpec):
         """The program of the datapath from a tick to the update."""
         latency = self.latency
         delay = latency.pin_to_count + latency.tick + latency.low_pass + latency.output
-        serial = Program(self.form, Small(self.form).times, delay)
+        serial = Program(self.form, Serial(self.form).times, delay)
         fits = self.times.has_room(serial.all_clocks)
         return (
             serial
             if self.multiplier == "serial" or (self.multiplier == "auto" and fits)
-            else replace(serial, times=QUICK)
+            else replace(serial, times=BLOCK)
         )
 
     def _check_fine(self) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from tachometry.spec.formats.tracking_code import Program
-from tachometry.spec.formats.tracking_units import QUICK, Small
+from tachometry.spec.formats.tracking_units import BLOCK, Serial
 from tachometry.spec.methods.axis import AxisTimes, OneAxis, Plan, output_cycles, own_options
 from tachometry.spec.methods.track import TrackTachometer
 
@@ -30,8 +30,8 @@ class TrackAxis(OneAxis, TrackTachometer):
 
     @cached_property
     def program(self) -> Program:
-        """The program of a turn, on the quick unit if nothing else is asked for."""
-        times = Small(self.form).times if self.multiplier == "serial" else QUICK
+        """The program of a turn, on the block unit if nothing else is asked for."""
+        times = Serial(self.form).times if self.multiplier == "serial" else BLOCK
         made = Program(self.form, times, 0)
         return replace(made, delay=self.ahead - made.clocks)
 

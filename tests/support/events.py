@@ -11,7 +11,7 @@ from tachometry.sim.golden.methods.s import alterations
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run
 from tachometry.spec import MTachometer, RairanTachometer, STachometer, TachometerSpec, TrackTachometer
-from tachometry.spec.formats.tracking_units import QUICK
+from tachometry.spec.formats.tracking_units import BLOCK
 from tachometry.spec.methods.timed import TimedTachometer
 
 STATES = ("00", "10", "11", "01")
@@ -148,8 +148,8 @@ def covered_by_track(spec: TrackTachometer, run: Run) -> dict[str, int]:
     n = len(updates.clock)
     rest = updates.forced & (updates.interval == spec.timing.max_ticks)
     return {
-        "serial product": n * (spec.program.times != QUICK),
-        "multiplier of the FPGA": n * (spec.program.times == QUICK),
+        "serial product": n * (spec.program.times != BLOCK),
+        "multiplier of the FPGA": n * (spec.program.times == BLOCK),
         "bounded memory": n * (spec.max_memory is not None),
         "several counts": _count(np.abs(m_e) > 1),
         "counts that cancel": _count(~updates.forced & (m_e[:n] == 0)),

@@ -98,7 +98,7 @@ def test_the_fine_position_wraps_as_the_position_does() -> None:
     assert golden(SPEC, steps, last) != golden(replace(SPEC, position_width=16), steps, last)
 
 
-# tests/test_matrix.py has external ticks and the quick unit daily, which takes half a minute to be compiled here.
+# tests/test_matrix.py has external ticks and the block unit daily, which takes half a minute to be compiled here.
 @pytest.mark.parametrize("spec", only([SPEC], [SPEC, EXTERNAL, replace(EXTERNAL, multiplier="block")]), ids=range(3))
 def test_hostile_counts(spec: TrackTachometer) -> None:
     check(spec, *motions(spec, np.random.default_rng(3), 200))

@@ -63,7 +63,7 @@ def results(program: Program, operations: Sequence[tuple[Instruction, int]], clo
     """Return what the unit gives for instructions and operands, so many clocks apart."""
     rows: list[dict[str, int]] = []
     for one, operand in operations:
-        # The quick unit takes the sum in the clock after the start.
+        # The block unit takes the sum in the clock after the start.
         begins = {"start": one.start, "how": program.number(one), "sum": operand}
         rows += [begins, *[begins | {"start": Start.NONE}] * (clocks - 1)]
     seen = clock_by_clock(track_machine.TrackMachine(program).unit, rows, ["result", "busy"])[clocks - 1 :: clocks]

@@ -13,10 +13,10 @@ from tachometry.spec.registers.map import RegisterMap
 
 PPR = {"ppr": "500", "max-speed": "400rad/s"}
 # Clocks of its program, serial and with multipliers of the FPGA.
-SERIAL, QUICK = (of_texts("track", PPR | {"multiplier": kind}).latency.busy for kind in ("serial", "block"))
-# Ticks for one, two and four turns of the quick program on each machine: a turn has a clock more than the program, the
+SERIAL, BLOCK = (of_texts("track", PPR | {"multiplier": kind}).latency.busy for kind in ("serial", "block"))
+# Ticks for one, two and four turns of the block program on each machine: a turn has a clock more than the program, the
 # machines begin two clocks apart, and a round is left.
-ONE, TWO, FOUR = (next_written_time(turns * (QUICK + 1) + (4 // turns - 1) * 2 + 4, 48_000_000) for turns in (1, 2, 4))
+ONE, TWO, FOUR = (next_written_time(turns * (BLOCK + 1) + (4 // turns - 1) * 2 + 4, 48_000_000) for turns in (1, 2, 4))
 
 
 def clocks(tick: str) -> int:
@@ -26,10 +26,10 @@ def clocks(tick: str) -> int:
 
 CHOICES = [
     ({}, "track", f"as its {SERIAL} clocks fit the tick of 960 clocks"),
-    ({"tick": "10us"}, "track", f"as its {QUICK} clocks fit the tick of 480 clocks"),
-    ({"tick": "10us", "external-tick": "yes"}, "track", f"as its {QUICK} clocks fit the tick of 480 clocks"),
-    ({"tick": "5us"}, "mt", f"as track needs a tick of {QUICK} clocks"),
-    ({"tick": "250ns"}, "s", f"as track needs a tick of {QUICK} clocks and mt needs a tick of 20 clocks"),
+    ({"tick": "10us"}, "track", f"as its {BLOCK} clocks fit the tick of 480 clocks"),
+    ({"tick": "10us", "external-tick": "yes"}, "track", f"as its {BLOCK} clocks fit the tick of 480 clocks"),
+    ({"tick": "5us"}, "mt", f"as track needs a tick of {BLOCK} clocks"),
+    ({"tick": "250ns"}, "s", f"as track needs a tick of {BLOCK} clocks and mt needs a tick of 20 clocks"),
     ({"axes": "4", "tick": ONE}, "s", f"as track needs 4 machines or --tick {TWO} and mt is of one axis"),
     ({"axes": "4", "tick": TWO}, "track", f"as the turns of 4 axes fit the tick of {clocks(TWO)} clocks"),
     ({"axes": "4", "tick": FOUR}, "track", f"as the turns of 4 axes fit the tick of {clocks(FOUR)} clocks"),

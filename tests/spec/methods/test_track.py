@@ -8,7 +8,7 @@ from support.tracking import core
 from tachometry.spec import ParameterError, TrackTachometer, of_options, with_loop
 from tachometry.spec.formats.tracking import WIDTH
 from tachometry.spec.formats.tracking_code import FIRST_INPUT, FIRST_OFFSET, OFFSETS
-from tachometry.spec.formats.tracking_units import QUICK, Small
+from tachometry.spec.formats.tracking_units import BLOCK, Serial
 from tachometry.spec.methods.track import in_loop
 
 
@@ -58,9 +58,9 @@ def test_the_shortest_tick_is_that_of_the_program(multiplier: str) -> None:
 
 def test_the_multiplier_is_serial_where_that_fits_the_tick() -> None:
     serial = core(multiplier="serial").times.min_tick_cycles
-    for cycles, quick in ((serial, False), (serial - 1, True)):
-        assert (with_tick(cycles, "auto").program.times == QUICK) == quick
-    assert core(multiplier="block").program.times == QUICK
+    for cycles, block in ((serial, False), (serial - 1, True)):
+        assert (with_tick(cycles, "auto").program.times == BLOCK) == block
+    assert core(multiplier="block").program.times == BLOCK
     assert core(multiplier="block").latency.datapath < core(multiplier="serial").latency.datapath / 2
 
 
@@ -80,7 +80,7 @@ def test_words_hold_the_greatest_speed_and_acceleration(options: dict[str, str],
     assert (form.longest_tick << form.time_bits) < 1 << form.factor_bits
     assert form.most_number * (form.longest_tick - 1) < 1 << form.times_bits
     assert all(0 <= shift < 64 for _, shift in spec.program.shifts)
-    assert all(Small(form).pairs(*shift) <= 32 for shift in spec.program.shifts)  # six bits, signed
+    assert all(Serial(form).pairs(*shift) <= 32 for shift in spec.program.shifts)  # six bits, signed
     assert len(spec.program.shifts) < 15  # each has a number of four bits, the last of which is another
     assert all(abs(value) < 1 << WIDTH - 1 for value in spec.program.words.values())
     assert len(spec.program.words) <= FIRST_INPUT
