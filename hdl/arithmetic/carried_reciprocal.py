@@ -24,18 +24,6 @@ class CarriedReciprocal(wiring.Component):
     correction is enough is shown in spec/formats/carried_reciprocal.py.
 
     Latency: the answer is there in the clock after `moves`, and stays until the clock after the next.
-
-    Parameters
-    ----------
-    reciprocal : spec.carried_reciprocal.CarriedReciprocal
-
-    Members
-    -------
-    m : In(range(max_m + 1))
-    moves : In(1)
-        This is the last clock with this m, which is answered.
-    q : Out(quotient_width)
-    r : Out(remainder_width)
     """
 
     def __init__(self, reciprocal: carried_reciprocal.CarriedReciprocal) -> None:
@@ -43,7 +31,7 @@ class CarriedReciprocal(wiring.Component):
         super().__init__(
             {
                 "m": In(range(reciprocal.max_m + 1)),
-                "moves": In(1),
+                "moves": In(1),  # the last clock with this m, which is answered
                 "q": Out(reciprocal.quotient_width),
                 "r": Out(reciprocal.remainder_width),
             }

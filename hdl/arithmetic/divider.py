@@ -4,6 +4,8 @@ from amaranth import Array, Cat, Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import only_if
+
 
 class Divider(wiring.Component):
     """Divides serially, signed, non-restoring: gives ⌊2^s · dividend / divisor⌋, or the nearest integer to it.
@@ -32,26 +34,6 @@ class Divider(wiring.Component):
         Round to the nearest integer, a tie up.
     zeros : int
         Bits at the end of each part of the dividend that are 0.
-
-    Members
-    -------
-    start : In(1)
-    dividend, addend : In(signed(divisor_width + integer_bits + 1))
-        Two numbers whose sum is divided.
-    divisor : In(divisor_width)
-        Positive; all three are valid with `start`.
-    running : Out(1)
-        A digit is found in this clock.
-    digit : Out(1)
-        The digits of the quotient in two's complement, the first ones first; the very first one is inverted.
-    last : Out(1)
-        If `running`, no digit follows this one.
-    done : Out(1)
-        One clock: the quotient is new.
-    quotient : Out(signed(integer_bits + scale_bits + 1))
-        Held until the next start; not if `nearest`.
-    by : Out(divisor_width)
-        The divisor, held until the next start.
     """
 
     def __init__(
@@ -65,15 +47,15 @@ class Divider(wiring.Component):
         super().__init__(
             {
                 "start": In(1),
-                "dividend": In(signed(divisor_width + integer_bits + 1)),
+                "dividend": In(signed(divisor_width + integer_bits + 1)),  # its sum with `addend` is divided
                 "addend": In(signed(divisor_width + integer_bits + 1)),
-                "divisor": In(divisor_width),
-                "running": Out(1),
-                "digit": Out(1),
-                "last": Out(1),
-                "done": Out(1),
-                **({} if nearest else {"quotient": Out(signed(self._steps + 1))}),
-                "by": Out(divisor_width),
+                "divisor": In(divisor_width),  # positive; valid with `start`, as both parts of the dividend
+                "running": Out(1),  # a digit is found in this clock
+                "digit": Out(1),  # of the quotient in two's complement, the sign first and inverted
+                "last": Out(1),  # if `running`, no digit follows this one
+                "done": Out(1),  # one clock: the quotient is new
+                **only_if(not nearest, quotient=Out(signed(self._steps + 1))),  # held until the next start
+                "by": Out(divisor_width),  # the divisor, held until the next start
             }
         )
         # Counts down to −1.

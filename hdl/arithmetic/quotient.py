@@ -56,22 +56,6 @@ class Quotient(wiring.Component):
         they are until then. Otherwise it may come in every clock.
     constant : int or None
         m, if it is always the same.
-
-    Members
-    -------
-    m : In(range(max_m + 1))
-        `m` and `moves` exist only if m is not constant. A carried reciprocal restricts what may follow an m.
-    moves : In(1)
-        This is the last clock with this m.
-    load : In(1)
-        `base` and `numerator` are valid.
-    start : In(1)
-        What was loaded in the clock before is to be used; `m` and `tag` are valid. If m is looked up or divided, it
-        must have been there for as long as that takes.
-    base, numerator : In(signed)
-    tag : In(tag)
-    results : Out(stream)
-        The quotients by their names, `m` if it is not constant, and the fields of the tag; held until the next.
     """
 
     def __init__(
@@ -90,6 +74,7 @@ class Quotient(wiring.Component):
         self._constant = 0
         inputs, travels = {}, tag
         if constant is None:
+            # `moves`: the last clock with this m. A carried reciprocal restricts the next m.
             inputs = {"m": In(range(shape.max_m + 1)), "moves": In(1)}
             travels = data.StructLayout({"m": range(shape.max_m + 1), **tag.members})
         if isinstance(shape, carried_reciprocal.CarriedReciprocal):
@@ -118,11 +103,13 @@ class Quotient(wiring.Component):
         super().__init__(
             {
                 **inputs,
-                "load": In(1),
+                "load": In(1),  # `base` and `numerator` are valid
+                # The clock after `load`, with `m` and `tag`; m has been valid as long as its reciprocal takes.
                 "start": In(1),
                 "base": In(signed(min(len(box.base) for box in self.scalers.values()))),
                 "numerator": In(signed(numerator_width)),
                 "tag": In(tag),
+                # Quotients by their names, `m` if it is not constant, and the fields of the tag; held until the next.
                 "results": Out(stream.Signature(data.StructLayout(results), always_ready=True)),
             }
         )

@@ -18,19 +18,17 @@ class LookedUpReciprocal(wiring.Component):
     ----------
     reciprocal : spec.reciprocal.Reciprocal
         Widths and contents.
-
-    Members
-    -------
-    m : In(range(max_m + 1))
-        1 … max_m.
-    moves : In(1)
-        Not used: see `DividedReciprocal`.
-    q : Out(width)
     """
 
     def __init__(self, reciprocal: spec.Reciprocal) -> None:
         self._reciprocal = reciprocal
-        super().__init__({"m": In(range(reciprocal.max_m + 1)), "moves": In(1), "q": Out(reciprocal.width)})
+        super().__init__(
+            {
+                "m": In(range(reciprocal.max_m + 1)),  # 1 … max_m
+                "moves": In(1),  # not used: see `DividedReciprocal`
+                "q": Out(reciprocal.width),
+            }
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
@@ -47,23 +45,17 @@ class DividedReciprocal(wiring.Component):
     """Finds q(m) by a subtraction a clock.
 
     Latency: q is there `reciprocal.steps` and two clocks after `moves`, or after the reset, and stays until it moves.
-
-    Parameters
-    ----------
-    reciprocal : spec.reciprocal.DividedReciprocal
-
-    Members
-    -------
-    m : In(range(max_m + 1))
-        1 … max_m.
-    moves : In(1)
-        This is the last clock with this m.
-    q : Out(steps)
     """
 
     def __init__(self, reciprocal: spec.DividedReciprocal) -> None:
         self._reciprocal = reciprocal
-        super().__init__({"m": In(range(reciprocal.max_m + 1)), "moves": In(1), "q": Out(reciprocal.width)})
+        super().__init__(
+            {
+                "m": In(range(reciprocal.max_m + 1)),  # 1 … max_m
+                "moves": In(1),  # the last clock with this m
+                "q": Out(reciprocal.width),
+            }
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

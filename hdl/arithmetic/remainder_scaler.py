@@ -40,18 +40,6 @@ class RemainderScaler(wiring.Component):
         What travels along with a value; `m` is a field of it.
     towards : int
         Round to the nearest (0), down (−1) or up (1).
-
-    Members
-    -------
-    load : In(1)
-        `base` and `numerator` are valid.
-    start : In(1)
-        What was loaded in the clock before is to be used; `tag` is valid.
-    base, numerator, tag : In
-    q, r : In
-        Quotient and remainder, valid in the clock after `start`.
-    results : Out(stream)
-        `quotient` and `tag`, held until the next.
     """
 
     def __init__(
@@ -69,14 +57,14 @@ class RemainderScaler(wiring.Component):
         self._digits = reciprocal.digits
         super().__init__(
             {
-                "load": In(1),
-                "start": In(1),
+                "load": In(1),  # with `base` and `numerator`
+                "start": In(1),  # the clock after `load`, with `tag`
                 "base": In(signed(base_width)),
                 "numerator": In(signed(numerator_width)),
                 "tag": In(tag),
-                "q": In(reciprocal.quotient_width),
+                "q": In(reciprocal.quotient_width),  # quotient and remainder, valid in the clock after `start`
                 "r": In(reciprocal.remainder_width),
-                "results": Out(scaled_stream(base_width + reciprocal.frac_bits, tag)),
+                "results": Out(scaled_stream(base_width + reciprocal.frac_bits, tag)),  # held until the next
             }
         )
 

@@ -26,18 +26,6 @@ class _Scaler(wiring.Component):
         What travels along with a value.
     towards : int
         Round to the nearest (0), down (−1) or up (1).
-
-    Members
-    -------
-    load : In(1)
-        `base` and `numerator` are valid.
-    start : In(1)
-        What was loaded in the clock before is to be used; `q` and `tag` are valid.
-    base, numerator, tag : In
-    q : In(reciprocal.width)
-        Reciprocal.
-    results : Out(stream)
-        `quotient` and `tag`, held until the next.
     """
 
     def __init__(
@@ -51,13 +39,13 @@ class _Scaler(wiring.Component):
         self._scale_bits = reciprocal.scale_bits
         super().__init__(
             {
-                "load": In(1),
-                "start": In(1),
+                "load": In(1),  # with `base` and `numerator`
+                "start": In(1),  # the clock after `load`, with `q` and `tag`
                 "base": In(signed(base_width)),
                 "numerator": In(signed(numerator_width)),
                 "tag": In(tag),
                 "q": In(reciprocal.width),
-                "results": Out(scaled_stream(base_width + reciprocal.frac_bits, tag)),
+                "results": Out(scaled_stream(base_width + reciprocal.frac_bits, tag)),  # held until the next
             }
         )
 

@@ -12,6 +12,7 @@ from tachometry.hdl.axes.turns import Turns
 from tachometry.hdl.output.update import update_layout
 from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import only_if
 from tachometry.spec.methods.axes import AxesSpec
 from tachometry.spec.methods.s_axis import DECIDE, READ, SAxis
 
@@ -41,22 +42,6 @@ class AxesDatapath(wiring.Component):
 
     Latency: the outputs of an axis are new `spec.turn_cycles` and `READ` clocks after its turn has begun, in the turn
     of the next.
-
-    Members
-    -------
-    complete : In(1)
-        `count` is handed over. The turns begin with the clock after that of axis 0.
-    slot : In(range(slots))
-        Whose count it is.
-    count : In(signed)
-    handed_position : In(signed)
-        Of this axis, only where the index resets it; else it is the sum of the counts.
-    tick : Out(1)
-        One clock for every axis in every tick.
-    axis : Out(range(axes))
-        Valid with `tick`; as are `pulse_count`, `position`, `overflow` and `stalled`.
-    velocity_valid : Out(1)
-        Only together with `tick`: `velocity`, `interval`, `forced` are new, and `velocity_overflow` if there is one.
     """
 
     def __init__(self, spec: AxesSpec) -> None:
@@ -83,21 +68,23 @@ class AxesDatapath(wiring.Component):
             self.velocity_output = PipelinedVelocityOutput(axis.scale.output, update_layout(axis))
         super().__init__(
             {
-                "complete": In(1),
-                "slot": In(range(spec.slots)),
+                "complete": In(1),  # `count` is handed over; the turns begin with the clock after that of axis 0
+                "slot": In(range(spec.slots)),  # that the count belongs to
                 "count": In(signed(axis.times.longest_tick.bit_length() + 1)),
-                **({"handed_position": In(signed(axis.position_width))} if axis.front_end.index_resets else {}),
-                "tick": Out(1),
+                # With `count`, where the index resets it; else the position is the sum of the counts.
+                **only_if(axis.front_end.index_resets, handed_position=In(signed(axis.position_width))),
+                "tick": Out(1),  # one clock for every axis in every tick
+                # Valid with `tick`, as are the next four.
                 "axis": Out(len(self.turns.axis)),
                 "pulse_count": Out(signed(axis.widths.count)),
                 "position": Out(signed(axis.position_width)),
                 "overflow": Out(1),
                 "stalled": Out(1),
-                "velocity_valid": Out(1),
+                "velocity_valid": Out(1),  # only together with `tick`: all below are new
                 "velocity": Out(signed(axis.widths.velocity)),
                 "interval": Out(axis.widths.interval),
                 "forced": Out(1),
-                **({} if axis.scale.output is None else {"velocity_overflow": Out(1)}),
+                **only_if(axis.scale.output is not None, velocity_overflow=Out(1)),
             }
         )
 

@@ -15,6 +15,7 @@ from tachometry.hdl.axes.track_turns import SHOWN_AFTER, TrackTurns, turn_layout
 from tachometry.hdl.output.update import shown_layout, update_layout
 from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import only_if
 from tachometry.spec.methods.axes import AxesSpec
 from tachometry.spec.methods.axis import output_cycles
 from tachometry.spec.methods.track_axis import TrackAxis
@@ -37,24 +38,6 @@ class AxesTrackDatapath(wiring.Component):
     """Tracking datapath that the axes have in turn; as many machines as all turns of a tick need.
 
     Latency: the outputs of an axis are new `spec.plan.latency` clocks after its turn has begun.
-
-    Parameters
-    ----------
-    spec : AxesSpec
-
-    Members
-    -------
-    complete : In(1)
-        `count` is handed over. The turns begin with the clock after that of axis 0.
-    slot : In(range(slots))
-        Whose count it is.
-    count : In(counts_layout(form))
-    handed_position : In(signed)
-        Of this axis, only where the index resets it; else it is the sum of the counts.
-    tick, velocity_valid : Out(1)
-        One clock for every axis in every tick.
-    axis : Out(range(axes))
-        Valid with `tick`, as are all other outputs, by the names of the ports.
     """
 
     def __init__(self, spec: AxesSpec) -> None:
@@ -69,16 +52,16 @@ class AxesTrackDatapath(wiring.Component):
             self.velocity_output = PipelinedVelocityOutput(axis.scale.output, layout)
             layout = shown_layout(layout, axis.scale.output)
         self._update = layout
-        position = {"handed_position": In(signed(axis.position_width))} if axis.front_end.index_resets else {}
         super().__init__(
             {
-                "complete": In(1),
-                "slot": In(range(spec.slots)),
+                "complete": In(1),  # `count` is handed over; the turns begin with the clock after that of axis 0
+                "slot": In(range(spec.slots)),  # that the count belongs to
                 "count": In(counts_layout(axis.form)),
-                **position,
-                "tick": Out(1),
+                # With `count`, where the index resets it; else the position is the sum of the counts.
+                **only_if(axis.front_end.index_resets, handed_position=In(signed(axis.position_width))),
+                "tick": Out(1),  # one clock for every axis in every tick
                 "velocity_valid": Out(1),
-                "axis": Out(range(max(spec.axes, 2))),
+                "axis": Out(range(max(spec.axes, 2))),  # valid with `tick`, as are all others
                 **{name: Out(shape) for name, shape in tick_layout(axis).members.items()},
                 **{name: Out(shape) for name, shape in layout.members.items()},
             }

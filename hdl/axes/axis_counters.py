@@ -25,27 +25,6 @@ class AxisCounters(wiring.Component):
         Rounds of a tick: most steps of an axis in it.
     reverse : bool
         Forward is B before A.
-        Counts per period: 1, 2 or 4.
-
-    Members
-    -------
-    slot : In(range(slots))
-    first, last : In(1)
-        Of this round, see `Rounds`.
-    ready : In(1)
-        The levels of this round and of the one before are those of the lines.
-    level_a, level_b : In(1)
-        Levels of the axis whose slot it is.
-    axis : Out(range(slots))
-        Of the other outputs.
-    step : Out(signed(2))
-        −1, 0 or +1.
-    decode_error : Out(1)
-        Both lines changed.
-    complete : Out(1)
-        The tick of this axis is over.
-    count : Out(signed)
-        Sum of its steps in this tick.
     """
 
     def __init__(self, *, slots: int, rounds: int, decoding: int, reverse: bool = False) -> None:
@@ -62,12 +41,14 @@ class AxisCounters(wiring.Component):
         super().__init__(
             {
                 "slot": In(range(slots)),
-                **dict.fromkeys(("first", "last", "ready", "level_a", "level_b"), In(1)),
-                "axis": Out(range(slots)),
+                **dict.fromkeys(("first", "last"), In(1)),  # of this round, see `Rounds`
+                "ready": In(1),  # the levels of this round and of the one before are those of the lines
+                **dict.fromkeys(("level_a", "level_b"), In(1)),  # of the axis whose slot it is
+                "axis": Out(range(slots)),  # that the other outputs belong to
                 "step": Out(signed(2)),
-                "decode_error": Out(1),
-                "complete": Out(1),
-                "count": Out(count),
+                "decode_error": Out(1),  # both lines changed
+                "complete": Out(1),  # the tick of this axis is over
+                "count": Out(count),  # sum of its steps in this tick
             }
         )
 

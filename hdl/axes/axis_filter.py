@@ -19,19 +19,6 @@ class AxisFilter(wiring.Component):
     ----------
     lines : sequence of str
         Names of the lines.
-
-    Members
-    -------
-    slot : In(range(slots))
-    first, last, ready, real : In(1)
-        Of this round, see `Rounds`.
-    level_a, level_b … : In(1)
-        Levels of the axis whose slot it is.
-    seen_slot, seen_first, seen_last, seen_ready : Out
-        Of the other outputs.
-    filtered_a, filtered_b … : Out(1)
-    known_a, known_b … : Out(1)
-        The level before the present one is one of the line as well.
     """
 
     def __init__(self, *, slots: int, looks: int, lines: Sequence[str]) -> None:
@@ -41,10 +28,11 @@ class AxisFilter(wiring.Component):
         super().__init__(
             {
                 "slot": In(range(slots)),
-                **dict.fromkeys(("first", "last", "ready", "real"), In(1)),
-                **{f"level_{name}": In(1) for name in lines},
-                "seen_slot": Out(range(slots)),
+                **dict.fromkeys(("first", "last", "ready", "real"), In(1)),  # of this round, see `Rounds`
+                **{f"level_{name}": In(1) for name in lines},  # of the axis whose slot it is
+                "seen_slot": Out(range(slots)),  # of the axis that the other outputs belong to
                 **dict.fromkeys(("seen_first", "seen_last", "seen_ready"), Out(1)),
+                # `known`: the level before the present one is one of the line as well.
                 **{f"{what}_{name}": Out(1) for name in lines for what in ("filtered", "known")},
             }
         )

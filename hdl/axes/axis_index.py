@@ -21,26 +21,6 @@ class AxisIndex(wiring.Component):
         Bits of a position.
     resets : bool
         A rise sets the position to 0.
-
-    Members
-    -------
-    slot : In(range(slots))
-    ready : In(1)
-        Of this round, see `Rounds`.
-    level_z : In(1)
-        Level of the axis whose slot it is.
-    known : In(1)
-        The levels of this round and of the one before are those of the line.
-    step : In(signed(2))
-        Of the slot three clocks ago.
-    axis : Out(range(slots))
-        Of the other outputs.
-    index_valid : Out(1)
-        One clock per rise.
-    index_position : Out(signed(width))
-        Sum of the steps of this axis.
-    position : Out(signed(width))
-        The same, or 0 with a rise that resets.
     """
 
     def __init__(self, *, slots: int, width: int, resets: bool) -> None:
@@ -49,14 +29,14 @@ class AxisIndex(wiring.Component):
         super().__init__(
             {
                 "slot": In(range(slots)),
-                "ready": In(1),
-                "level_z": In(1),
-                "known": In(1),
-                "step": In(signed(2)),
-                "axis": Out(range(slots)),
-                "index_valid": Out(1),
-                "index_position": Out(signed(width)),
-                "position": Out(signed(width)),
+                "ready": In(1),  # of this round, see `Rounds`
+                "level_z": In(1),  # of the axis whose slot it is
+                "known": In(1),  # the levels of this round and of the one before are those of the line
+                "step": In(signed(2)),  # of the slot three clocks ago
+                "axis": Out(range(slots)),  # that the other outputs belong to
+                "index_valid": Out(1),  # one clock per rise
+                "index_position": Out(signed(width)),  # sum of the steps of this axis
+                "position": Out(signed(width)),  # the same, but 0 with a rise that resets
             }
         )
 

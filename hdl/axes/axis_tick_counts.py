@@ -41,7 +41,6 @@ class AxisTickCounts(AxisCounters):
         That of an axis.
     reverse : bool
         Forward is B before A.
-        Counts per period: 1, 2 or 4.
     """
 
     def __init__(self, *, slots: int, form: Tracking, decoding: int, reverse: bool = False) -> None:

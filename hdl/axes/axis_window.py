@@ -16,23 +16,6 @@ class AxisWindow(wiring.Component):
         Bits of m_e and of the numerator.
     cancel : bool
         Eq. (21) of Tsuji 2009 instead of eq. (17).
-
-    Members
-    -------
-    clears : In(1)
-        The next state is that of a reset.
-    state : In
-        `previous` is m_e(i−1), `offset` the pulse number of the last tick that did not alter, `opening` that of the
-        tick that opened the window, `m_s` the length of the window; `rests` and `nearly` say what has been silent.
-    m_e : In(signed(count_width))
-        Pulse number of this tick; with `clears` it is 0.
-    next : Out
-        State of the next tick.
-    numerator : Out(signed(numerator_width))
-    update : Out(1)
-        The window closes.
-    forced : Out(1)
-        The window closes without an alteration.
     """
 
     def __init__(
@@ -43,17 +26,24 @@ class AxisWindow(wiring.Component):
         self._cancel = cancel
         count = signed(count_width)
         state = data.StructLayout(
-            {"previous": count, "offset": count, "opening": count, "m_s": range(max_ticks + 1), "rests": 1, "nearly": 1}
+            {
+                "previous": count,  # m_e(i−1)
+                "offset": count,  # of the last tick that did not alter
+                "opening": count,  # of the tick that opened the window
+                "m_s": range(max_ticks + 1),  # length of the window
+                "rests": 1,
+                "nearly": 1,  # the window before was silent
+            }
         )
         super().__init__(
             {
-                "clears": In(1),
+                "clears": In(1),  # the next state is that of a reset
                 "state": In(state),
-                "m_e": In(count),
+                "m_e": In(count),  # of this tick; 0 with `clears`
                 "next": Out(state),
                 "numerator": Out(signed(numerator_width)),
-                "update": Out(1),
-                "forced": Out(1),
+                "update": Out(1),  # the window closes
+                "forced": Out(1),  # it closes without an alteration
             }
         )
 

@@ -16,16 +16,6 @@ class HeldOutputs(wiring.Component):
     ----------
     values : mapping of str to Shape
         What comes with the strobe.
-
-    Members
-    -------
-    strobe : In(1)
-    axis : In(range(axes))
-        Whose values they are.
-    NAME : In
-        One for each value, by its name.
-    NAME_0, NAME_1 … : Out
-        Of each axis the latest value, at first 0.
     """
 
     def __init__(self, axes: int, axis_width: int, values: Mapping[str, Shape]) -> None:
@@ -34,8 +24,9 @@ class HeldOutputs(wiring.Component):
         super().__init__(
             {
                 "strobe": In(1),
-                "axis": In(axis_width),
+                "axis": In(axis_width),  # that the values belong to
                 **{name: In(shape) for name, shape in values.items()},
+                # The latest value of each axis, at first 0.
                 **{f"{name}_{axis}": Out(shape) for axis in range(axes) for name, shape in values.items()},
             }
         )

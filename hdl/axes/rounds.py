@@ -6,6 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.front_end.external_tick import ExternalTick
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
+from tachometry.hdl.wires.ports import only_if
 
 
 class Rounds(wiring.Component):
@@ -21,21 +22,6 @@ class Rounds(wiring.Component):
         Fewest and most rounds of a tick whose end comes from outside.
     warm_up : int
         Rounds after reset in which there are no two real levels to be compared.
-
-    Members
-    -------
-    slot : Out(range(slots))
-    first, last : Out(1)
-        High in the first and in the last round of a tick.
-    ready : Out(1)
-        The warm-up is over.
-    real : Out(1)
-        The level is one of the line, though that of the round before need not be.
-    tick_in : In(1)
-        Only with `external`: synchronous; if it has been high in a round, and not in the one before, a tick ends with
-        the next.
-    tick_error : Out(1)
-        Only with `external`: see `ExternalTick`; in the first clock of the second round after.
     """
 
     def __init__(self, slots: int, rounds: int, warm_up: int, external: tuple[int, int] | None = None) -> None:
@@ -43,13 +29,17 @@ class Rounds(wiring.Component):
         self._warm_up = warm_up
         # A round is a clock of this box.
         self.sampling_clock = SamplingClock(rounds) if external is None else ExternalTick(*external, synchronous=True)
-        outside = {"tick_in": In(1), "tick_error": Out(1)} if external else {}
         super().__init__(
             {
                 "slot": Out(range(slots)),
-                "first": Out(1, init=1),
-                **dict.fromkeys(("last", "ready", "real"), Out(1)),
-                **outside,
+                "first": Out(1, init=1),  # in the first round of a tick
+                "last": Out(1),  # in its last round
+                "ready": Out(1),  # the warm-up is over
+                "real": Out(1),  # the level is one of the line, though that of the round before need not be
+                # Synchronous; if it has been high in a round, and not in the one before, a tick ends with the next.
+                **only_if(external, tick_in=In(1)),
+                # See `ExternalTick`; in the first clock of the second round after.
+                **only_if(external, tick_error=Out(1)),
             }
         )
 

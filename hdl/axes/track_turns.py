@@ -8,6 +8,7 @@ from amaranth.lib.wiring import In, Out
 from tachometry.hdl.axes.axis_tick_counts import BLOCK, counts_layout
 from tachometry.hdl.methods.track_machine import TrackMachine
 from tachometry.hdl.output.update import update_layout
+from tachometry.hdl.wires.ports import only_if
 from tachometry.spec.formats.tracking import PLACE_BITS, WIDTH
 from tachometry.spec.methods.axes import AxesSpec
 from tachometry.spec.methods.track_axis import TrackAxis
@@ -26,7 +27,7 @@ def turn_layout(axis: TrackAxis) -> data.StructLayout:
     layout = update_layout(axis).members
     return data.StructLayout(
         {
-            "first": 1,
+            "first": 1,  # turn of this axis after reset
             "moved": signed(axis.form.moved_bits),
             "counted": 1,
             **({"position": signed(axis.position_width)} if axis.front_end.index_resets else {}),
@@ -41,23 +42,8 @@ class TrackTurns(wiring.Component):
 
     Parameters
     ----------
-    spec : AxesSpec
     machine : int
         Which of `spec.plan.machines` it is.
-
-    Members
-    -------
-    complete, slot, count, handed_position : In
-        As of `AxesTrackDatapath`.
-    length : In
-        Rounds of the tick.
-    comes : Out(1)
-        `SHOWN_AFTER` clocks later what is found is shown.
-    axis : Out(range(axes))
-        Whose turn it is.
-    turn : Out(turn_layout(axis))
-        What is found holds from the clock before it is shown to the end of the turn, all else from `comes` on.
-        `first` says that it is the first turn of this axis after reset.
     """
 
     def __init__(self, spec: AxesSpec, machine: int) -> None:
@@ -66,16 +52,17 @@ class TrackTurns(wiring.Component):
         self._spec, self._axis, self._number = spec, axis, machine
         self._own = range(machine, spec.axes, spec.plan.machines)
         self.machine = TrackMachine(*(axis.at(number, spec.delay(number)).program for number in self._own))
-        position = {"handed_position": In(signed(axis.position_width))} if axis.front_end.index_resets else {}
         super().__init__(
             {
+                # As in `AxesTrackDatapath`.
                 "complete": In(1),
                 "slot": In(range(spec.slots)),
                 "count": In(counts_layout(axis.form)),
-                **position,
-                "length": In(range(axis.form.longest_tick + 1)),
-                "comes": Out(1),
-                "axis": Out(range(max(spec.axes, 2))),
+                **only_if(axis.front_end.index_resets, handed_position=In(signed(axis.position_width))),
+                "length": In(range(axis.form.longest_tick + 1)),  # rounds of the tick
+                "comes": Out(1),  # `SHOWN_AFTER` clocks before the results are shown
+                "axis": Out(range(max(spec.axes, 2))),  # that has its turn
+                # Results hold from the clock before they are shown to the end of the turn, all else from `comes` on.
                 "turn": Out(turn_layout(axis)),
             }
         )

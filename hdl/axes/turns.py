@@ -14,23 +14,17 @@ class Turns(wiring.Component):
     ----------
     cycles : int
         Clocks of a turn.
-
-    Members
-    -------
-    begin : In(1)
-        The first turn begins in the next clock; not before the last one has ended.
-    axis : Out(range(axes))
-        Whose turn it is.
-    clears : Out(1)
-        It is a turn after reset.
-    step : Out(cycles)
-        Bit n in the n-th clock of a turn.
     """
 
     def __init__(self, axes: int, cycles: int) -> None:
         self._axes = axes
         super().__init__(
-            {"begin": In(1), "axis": Out(range(max(axes, 2))), "clears": Out(1, init=1), "step": Out(cycles, init=1)}
+            {
+                "begin": In(1),  # the first turn begins in the next clock; not before the last one has ended
+                "axis": Out(range(max(axes, 2))),  # that has its turn
+                "clears": Out(1, init=1),  # it is a turn after reset
+                "step": Out(cycles, init=1),  # bit n in the n-th clock of a turn
+            }
         )
 
     def elaborate(self, platform: object) -> Module:

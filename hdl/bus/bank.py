@@ -21,24 +21,6 @@ class RegisterBank(wiring.Component):
 
     A capture takes in one clock all that the core shows in it. It is made by `capture`, and by reading the first
     captured register, whose answer, a clock later, is what has just been captured.
-
-    Members
-    -------
-    bus : In(native_port)
-    capture : In(1)
-        Captures in every clock in which it is high.
-    clear : Out(1)
-        The counters are being cleared.
-    velocity, position … : In
-        The captured ports of the core; `position` is to be that of the latest tick.
-    tick, velocity_valid, decode_error … : In(1)
-        Strobes of the core.
-    written : Out(1)
-        A register is being written.
-    … : Out
-        `settings` of the map, as they were written last; those that act once are high in the clock of the write.
-    … : In
-        `live` fields of the map.
     """
 
     def __init__(self, registers: RegisterMap) -> None:
@@ -46,11 +28,13 @@ class RegisterBank(wiring.Component):
         super().__init__(
             {
                 "bus": In(native_port(registers.address_width - 2)),
-                "capture": In(1),
-                "clear": Out(1),
+                "capture": In(1),  # captures in every clock in which it is high
+                "clear": Out(1),  # the counters are being cleared
+                # The captured ports of the core; `position` is that of the latest tick.
                 **{port.name: In(signed(port.width) if port.signed else port.width) for port in registers.ports},
                 **{name: In(1) for name in (*registers.strobes, *registers.events.values(), "overflow")},
-                "written": Out(1),
+                "written": Out(1),  # a register is being written
+                # Settings as they were written last; those that act once are high in the clock of the write.
                 **{name: Out(shape, init=init) for name, (shape, init) in _shapes(registers.settings).items()},
                 **{field.port: In(_shape(field)) for field in registers.live},
             }

@@ -17,12 +17,6 @@ class Bridge(wiring.Component):
     ----------
     more : flows
         Members beyond those of the bus.
-
-    Members
-    -------
-    The ports that the bus adds to the core, and
-
-    native : Out(native_port)
     """
 
     bus = ""

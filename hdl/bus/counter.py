@@ -12,18 +12,16 @@ class SaturatingCounter(wiring.Component):
     ----------
     width : int
         Bits.
-
-    Members
-    -------
-    event : In(1)
-    clear : In(1)
-        The count is 0 in the next clock, an event in this one included.
-    count : Out(width)
-        Events up to the clock before.
     """
 
     def __init__(self, width: int) -> None:
-        super().__init__({"event": In(1), "clear": In(1), "count": Out(width)})
+        super().__init__(
+            {
+                "event": In(1),
+                "clear": In(1),  # the count is 0 in the next clock, an event in this one included
+                "count": Out(width),  # events up to the clock before
+            }
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

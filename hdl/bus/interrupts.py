@@ -11,39 +11,22 @@ from tachometry.spec.registers.map import RegisterMap
 
 
 class Interrupts(wiring.Component):
-    """Keeps events for a program; one that comes in the clock in which it is cleared waits on.
-
-    Parameters
-    ----------
-    registers : RegisterMap
-        Those of a core with an interrupt.
-
-    Members
-    -------
-    ticks, stalled : In(axes)
-        The axis ticks; its shaft rests.
-    index, probe, overflow, error, fault, over_speed : In(1)
-        The event is in this clock; only those that the core has.
-    irq_enable_… : In(1)
-        An event raises `irq`.
-    irq_clear_… : In(1)
-        An event is being cleared.
-    irq_pending_… : Out(1)
-        An event waits, from the clock after it on.
-    irq : Out(1)
-        An event that is enabled waits, a clock later.
-    """
+    """Keeps events for a program; one that comes in the clock in which it is cleared waits on."""
 
     def __init__(self, registers: RegisterMap, axes: int = 1) -> None:
         self._events = [*registers.interrupts]
-        kinds = {"enable": In(1), "clear": In(1), "pending": Out(1)}
+        kinds = {
+            "enable": In(1),  # the event raises `irq`
+            "clear": In(1),
+            "pending": Out(1),  # it waits, from the clock after it on
+        }
         super().__init__(
             {
                 **{event: In(1) for event in self._events if event != "stall"},
                 **{f"irq_{kind}_{event}": flow for kind, flow in kinds.items() for event in self._events},
                 "ticks": In(axes),
-                "stalled": In(axes),
-                "irq": Out(1),
+                "stalled": In(axes),  # the shaft of the axis stands still
+                "irq": Out(1),  # an enabled event waits, a clock later
             }
         )
 

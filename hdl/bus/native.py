@@ -7,28 +7,14 @@ from tachometry.spec.registers.field import WORD
 
 
 def native_port(address_width: int) -> wiring.Signature:
-    """Return an access is a clock with `read` or `write`; its answer is there in the clock after it, for that clock
-    only.
-
-    Members
-    -------
-    address : Out(address_width)
-        Of the word, not of the byte.
-    read, write : Out(1)
-        Not both at once.
-    write_data : Out(32)
-    read_data : In(32)
-        0 where nothing was read.
-    error : In(1)
-        There is no such register, or a read-only one was written.
-    """
+    """Return the signature of the native port: an access takes a clock, its answer is valid in the next one only."""
     return wiring.Signature(
         {
-            "address": Out(address_width),
+            "address": Out(address_width),  # of the word, not of the byte
             "read": Out(1),
-            "write": Out(1),
+            "write": Out(1),  # not together with `read`
             "write_data": Out(WORD),
-            "read_data": In(WORD),
-            "error": In(1),
+            "read_data": In(WORD),  # 0 where nothing was read
+            "error": In(1),  # there is no such register, or a read-only one was written
         }
     )

@@ -41,18 +41,6 @@ class TelemetrySender(wiring.Component):
     ----------
     bit_cycles : int
         Clocks of a bit.
-
-    Members
-    -------
-    native : Out(native_port)
-    send : In(1)
-        A frame is wanted. It is left out if the one before has not begun.
-    wait : In(1)
-        None may begin.
-    busy : Out(1)
-        One is under way.
-    line : Out(1)
-        High when idle.
     """
 
     def __init__(self, registers: RegisterMap, bit_cycles: int) -> None:
@@ -62,10 +50,10 @@ class TelemetrySender(wiring.Component):
         super().__init__(
             {
                 "native": Out(native_port(registers.address_width - 2)),
-                "send": In(1),
-                "wait": In(1),
-                "busy": Out(1),
-                "line": Out(1, init=1),
+                "send": In(1),  # a frame is wanted; it is left out if the one before has not begun
+                "wait": In(1),  # none may begin
+                "busy": Out(1),  # one is under way
+                "line": Out(1, init=1),  # high when idle
             }
         )
 

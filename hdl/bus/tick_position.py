@@ -17,22 +17,15 @@ class TickPosition(wiring.Component):
         Bits of the position.
     sum_width : int
         Bits of `open_sum`; 0 if there is none, and a register keeps the position.
-
-    Members
-    -------
-    tick : In(1)
-    position : In(signed(width))
-    next : In(signed(width))
-        The position of the next clock; only with `open_sum`.
-    open_sum : In(signed(sum_width))
-        Sum of the steps after the latest tick that are in `next`; only if it has bits.
-    latest : Out(signed(width))
     """
 
     def __init__(self, width: int, sum_width: int = 0) -> None:
         self._sum_width = sum_width
         position = signed(width)
-        inputs = {"next": In(position), "open_sum": In(signed(sum_width))} if sum_width else {}
+        inputs = {}
+        if sum_width:
+            # The position of the next clock, and the sum of the steps in it after the latest tick.
+            inputs = {"next": In(position), "open_sum": In(signed(sum_width))}
         super().__init__({"tick": In(1), "position": In(position), **inputs, "latest": Out(position)})
 
     def elaborate(self, platform: object) -> Module:

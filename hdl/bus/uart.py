@@ -82,22 +82,17 @@ class UartBridge(Bridge):
     ----------
     bit_cycles : int
         Clocks of a bit, at least 8.
-
-    Members
-    -------
-    Those of a `Bridge`, and
-
-    wait : In(1)
-        Answers must wait: something else is sent, and uses the native port. 0 unless it is connected.
-    occupied : Out(1)
-        An answer is sent or waits; nothing else must begin.
     """
 
     bus = "uart"
 
     def __init__(self, registers: RegisterMap, bit_cycles: int) -> None:
         self._bit_cycles = bit_cycles
-        super().__init__(registers, wait=In(1), occupied=Out(1))
+        super().__init__(
+            registers,
+            wait=In(1),  # something else is sent, and uses the native port: answers must wait
+            occupied=Out(1),  # an answer is sent or waits; nothing else must begin
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

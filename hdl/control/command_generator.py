@@ -47,19 +47,6 @@ class CommandGenerator(wiring.Component):
     ----------
     multiplier : str
         `serial` or `parallel`.
-
-    Members
-    -------
-    tick : In(1)
-    enable : In(1)
-        Where it is low the position is commanded, at rest.
-    position : In(signed)
-    mode : In(2)
-    velocity : In(signed(32))
-    acceleration : In(32)
-    amplitude : In(signed(28))
-    rate : In(32)
-    command_position, command_velocity, command_acceleration : Out(signed)
     """
 
     def __init__(self, form: GeneratorForm, multiplier: str = "serial") -> None:
@@ -68,7 +55,7 @@ class CommandGenerator(wiring.Component):
         super().__init__(
             {
                 "tick": In(1),
-                "enable": In(1),
+                "enable": In(1),  # where it is low the position is commanded, at rest
                 "position": In(signed(form.position_width)),
                 "mode": In(MODE_WIDTH),
                 "velocity": In(signed(WORD)),

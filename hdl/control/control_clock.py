@@ -5,6 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
+from tachometry.hdl.wires.ports import only_if
 
 
 class ControlClock(wiring.Component):
@@ -14,17 +15,16 @@ class ControlClock(wiring.Component):
     ----------
     tells : bool
         It also tells of a tick in the clock before.
-
-    Members
-    -------
-    tick : Out(1)
-    coming : Out(1)
-        In the clock before; only if it `tells`.
     """
 
     def __init__(self, first: int, period: int, *, tells: bool = False) -> None:
         self._first, self._period = first, period
-        super().__init__({"tick": Out(1), **({"coming": Out(1)} if tells else {})})
+        super().__init__(
+            {
+                "tick": Out(1),
+                **only_if(tells, coming=Out(1)),  # in the clock before
+            }
+        )
 
     @property
     def idle(self) -> tuple[Idle, ...]:

@@ -67,29 +67,6 @@ class Controller(wiring.Component):
     ----------
     multiplier : str
         `serial` or `parallel`.
-
-    Members
-    -------
-    tick : In(1)
-    due : In(1)
-        There is an update: y and w are to be changed.
-    held, position : In(signed)
-    enable : In(1)
-    command_position, command_velocity, command_acceleration : In(signed)
-    n : In(range(longest + 1))
-    current_sum : In(signed)
-        ΣI.
-    clear : Out(1)
-        One clock: the update has been used.
-    valid : Out(1)
-        One clock: `current` is that of this control tick.
-    current : Out(signed)
-    saturated : Out(1)
-    y, w : Out(signed)
-        In step with `valid`.
-    gain_position, gain_velocity, gain_acceleration, gain_disturbance : In(gain_bits)
-    current_limit : In
-        If `form` has gain bits; they must not change from `tick` to `valid`.
     """
 
     def __init__(self, form: ControlForm, multiplier: str = "serial") -> None:
@@ -103,7 +80,7 @@ class Controller(wiring.Component):
         super().__init__(
             {
                 "tick": In(1),
-                "due": In(1),
+                "due": In(1),  # there is an update: y and w are to be changed
                 "held": In(signed(form.velocity_width)),
                 "position": In(signed(form.position_width)),
                 "enable": In(1),
@@ -111,12 +88,12 @@ class Controller(wiring.Component):
                 "command_velocity": In(signed(form.command_width)),
                 "command_acceleration": In(signed(form.acceleration_width)),
                 "n": In(range(form.longest + 1)),
-                "current_sum": In(signed(signed_width(form.most_sum))),
-                "clear": Out(1),
-                "valid": Out(1),
+                "current_sum": In(signed(signed_width(form.most_sum))),  # ΣI
+                "clear": Out(1),  # one clock: the update has been used
+                "valid": Out(1),  # one clock: `current` is that of this control tick
                 "current": Out(current),
                 "saturated": Out(1),
-                "y": Out(signed(signed_width(form.most_y))),
+                "y": Out(signed(signed_width(form.most_y))),  # in step with `valid`
                 "w": Out(signed(signed_width(form.most_w))),
                 **gains,
             }

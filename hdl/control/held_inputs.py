@@ -11,25 +11,14 @@ from tachometry.spec.language.port import Port
 
 
 class HeldInputs(wiring.Component):
-    """Takes all inputs together in the clock before a control tick, unless they are frozen.
-
-    Members
-    -------
-    coming : In(1)
-        A control tick is in the next clock.
-    freeze : In(1)
-    given_… : In
-        One for each port.
-    … : Out
-        What was taken, by the names of the ports.
-    """
+    """Takes all inputs together in the clock before a control tick, unless they are frozen."""
 
     def __init__(self, ports: Iterable[Port]) -> None:
         self._ports = tuple(ports)
         shapes = {name: member.shape for name, member in members(self._ports).items()}
         super().__init__(
             {
-                "coming": In(1),
+                "coming": In(1),  # a control tick is in the next clock
                 "freeze": In(1),
                 **{f"given_{name}": In(shape) for name, shape in shapes.items()},
                 **{name: Out(shape) for name, shape in shapes.items()},

@@ -12,26 +12,15 @@ class _Product(wiring.Component):
     ----------
     factor_bits : int
         p.
-
-    Members
-    -------
-    start : In(1)
-    word : In(signed(word_width))
-        From `start` on, until `done`.
-    factor : In(factor_bits)
-        With `start`.
-    done : Out(1)
-        One clock: the product is valid.
-    product : Out(signed(word_width))
     """
 
     def __init__(self, word_width: int, factor_bits: int) -> None:
         super().__init__(
             {
                 "start": In(1),
-                "word": In(signed(word_width)),
-                "factor": In(factor_bits),
-                "done": Out(1),
+                "word": In(signed(word_width)),  # from `start` on, until `done`
+                "factor": In(factor_bits),  # with `start`
+                "done": Out(1),  # one clock: the product is valid
                 "product": Out(signed(word_width)),
             }
         )

@@ -10,11 +10,6 @@ class SigmaDelta(wiring.Component):
 
     A pulse-width modulator would have a period that delays what it shows; this has none, its ripple is at higher
     frequencies, and it is one adder. Latency: a clock.
-
-    Members
-    -------
-    value : In(signed(width))
-    drive : Out(1)
     """
 
     def __init__(self, width: int) -> None:

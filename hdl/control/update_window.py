@@ -14,27 +14,6 @@ class UpdateWindow(wiring.Component):
     a later one would be of no tick. Where nothing has come for `longest` control ticks, the velocity that is held is
     taken once more. A conventional observer takes the velocity that is held at every control tick, with the current of
     the one before.
-
-    Members
-    -------
-    update : In(1)
-    measured : In(1)
-        Valid with `update`: it is a measurement; else the velocity is only held until one comes.
-    velocity : In(signed)
-        Valid with `update`.
-    tick : In(1)
-    clear : In(1)
-        The window has been used, and a new one begins.
-    add : In(1)
-        A control tick is over, and `current` that of its end.
-    current : In(signed)
-    held : Out(signed)
-        Velocity.
-    due : Out(1)
-        Valid with `tick`: the window is to be used.
-    n : Out(range(longest + 1))
-    current_sum : Out(signed)
-        ΣI.
     """
 
     def __init__(self, form: ControlForm) -> None:
@@ -43,13 +22,17 @@ class UpdateWindow(wiring.Component):
         limit = form.current_limit.bit_length() + 1
         super().__init__(
             {
-                **dict.fromkeys(("update", "measured", "tick", "clear", "add"), In(1)),
-                "velocity": In(signed(form.velocity_width)),
+                "update": In(1),
+                "measured": In(1),  # with `update`: a measurement; else the velocity is only held until one comes
+                "tick": In(1),
+                "clear": In(1),  # the window has been used, and a new one begins
+                "add": In(1),  # a control tick is over, and `current` is that of its end
+                "velocity": In(signed(form.velocity_width)),  # valid with `update`
                 "current": In(signed(limit)),
                 "held": Out(signed(form.velocity_width)),
-                "due": Out(1),
+                "due": Out(1),  # valid with `tick`: the window is to be used
                 "n": Out(range(form.longest + 1)),
-                "current_sum": Out(signed(form.most_sum.bit_length() + 1)),
+                "current_sum": Out(signed(form.most_sum.bit_length() + 1)),  # ΣI
             }
         )
 

@@ -13,23 +13,18 @@ from tachometry.spec.registers.axes import AxesMap
 
 
 class AxesRegisterCore(wiring.Component):
-    """Joins a core of many axes and its registers; see `RegisterCore`.
-
-    Members
-    -------
-    `core_ports` of the registers, less `clk` and `rst`, and
-
-    bus : In(native_port)
-    capture : In(1)
-        Captures in every clock in which it is high.
-    """
+    """Joins a core of many axes and its registers; see `RegisterCore`."""
 
     def __init__(self, registers: AxesMap) -> None:
         self._map = registers
         self.tachometer = AxesTachometer(registers.axes)
         self.bank = RegisterBank(registers)
         super().__init__(
-            {**members(registers.core_ports), "bus": In(native_port(registers.address_width - 2)), "capture": In(1)}
+            {
+                **members(registers.core_ports),
+                "bus": In(native_port(registers.address_width - 2)),
+                "capture": In(1),  # captures in every clock in which it is high
+            }
         )
 
     def elaborate(self, platform: object) -> Module:

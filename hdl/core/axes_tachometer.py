@@ -26,12 +26,7 @@ from tachometry.spec.methods.track_axis import TrackAxis
 
 
 class AxesTachometer(wiring.Component):
-    """Pins of many encoders in, their positions and velocities out.
-
-    Members
-    -------
-    The ports of the spec, less `clk` and `rst`, which are those of the `sync` domain.
-    """
+    """Pins of many encoders in, their positions and velocities out."""
 
     def __init__(self, spec: AxesSpec) -> None:
         self._spec = spec

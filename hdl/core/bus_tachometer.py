@@ -31,10 +31,6 @@ def bridge_on(registers: RegisterMap, bus: Bus) -> Bridge:
 class BusTachometer(wiring.Component):
     """Puts the registers of a tachometer, maybe with a control loop, on a bus.
 
-    Members
-    -------
-    `core_ports` of the registers, less `clk` and `rst`, and the ports of the bus.
-
     Raises
     ------
     ParameterError

@@ -22,10 +22,6 @@ class Demo(wiring.Component):
 
     The settings survive a restart, which resets tachometer, loop, emulator and time.
 
-    Members
-    -------
-    `demo_ports` of the spec, less `clk` and `rst`.
-
     Raises
     ------
     ParameterError

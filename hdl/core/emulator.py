@@ -5,6 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.core.line import EmulatedLine
+from tachometry.hdl.wires.ports import only_if
 from tachometry.spec.registers.emulator import (
     BOUNCE_BITS,
     BOUNCE_WIDTH,
@@ -42,32 +43,6 @@ class EncoderEmulator(wiring.Component):
         Quarter of its period in which the index is high, 0 to 3.
     complemented : tuple of str
         Lines whose complements are there as well, which no broken wire harms.
-
-    Members
-    -------
-    speed : In(signed(32))
-        Phase a clock that it goes to.
-    rate : In(32)
-        Change of the speed in two clocks, in 2^-16; 0: at once.
-    phase_error, duty_a, duty_b : In(signed(8))
-        How late B rises, A falls and B falls, in 2^-10 periods.
-    jitter : In(6)
-        Bits that take part in the random movement, in 2^-10 periods.
-    bounce : In(8)
-        Clocks for which a line bounces after an edge.
-    drop : In(8)
-        So many of 256 edges are left out.
-    glitches : In(8)
-        In so many of 65536 clocks both A and B have the wrong level.
-    broken, stuck : In(3)
-        Of A, B and Z: the line is high; it stays as it is.
-    jump : In(1)
-        Turns by half a period.
-    a, b : Out(1)
-    z : Out(1)
-        High in one quarter of a period in each revolution; only with `lines_per_rev`.
-    a_n, b_n, z_n : Out(1)
-        Of `complemented`.
     """
 
     def __init__(
@@ -78,19 +53,20 @@ class EncoderEmulator(wiring.Component):
         self._complemented = complemented
         super().__init__(
             {
-                "speed": In(signed(PHASE_WIDTH)),
-                "rate": In(PHASE_WIDTH),
+                "speed": In(signed(PHASE_WIDTH)),  # phase a clock that it goes to
+                "rate": In(PHASE_WIDTH),  # change of the speed in two clocks, in 2^-16; 0: at once
+                # How late B rises, A falls and B falls, in 2^-10 periods.
                 **{name: In(signed(ERROR_WIDTH)) for name in ("phase_error", "duty_a", "duty_b")},
-                "jitter": In(JITTER_WIDTH),
-                "bounce": In(BOUNCE_WIDTH),
-                "drop": In(DROP_WIDTH),
-                "glitches": In(NOISE_WIDTH),
-                "broken": In(WIRES_WIDTH),
-                "stuck": In(WIRES_WIDTH),
-                "jump": In(1),
+                "jitter": In(JITTER_WIDTH),  # bits that take part in the random movement, in 2^-10 periods
+                "bounce": In(BOUNCE_WIDTH),  # clocks for which a line bounces after an edge
+                "drop": In(DROP_WIDTH),  # edges of 256 that are left out
+                "glitches": In(NOISE_WIDTH),  # clocks of 65536 in which both A and B have the wrong level
+                "broken": In(WIRES_WIDTH),  # of A, B and Z: the line is high
+                "stuck": In(WIRES_WIDTH),  # of A, B and Z: it stays as it is
+                "jump": In(1),  # turns by half a period
                 "a": Out(1),
                 "b": Out(1),
-                **({} if lines_per_rev is None else {"z": Out(1)}),
+                **only_if(lines_per_rev is not None, z=Out(1)),  # in one quarter of a period in each revolution
                 **{f"{line}_n": Out(1) for line in complemented},
             }
         )

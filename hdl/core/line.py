@@ -4,6 +4,7 @@ from amaranth import Module, Mux, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import only_if
 from tachometry.spec.registers.emulator import BOUNCE_WIDTH
 
 
@@ -11,37 +12,19 @@ class EmulatedLine(wiring.Component):
     """Leaves edges out, and lets the line bounce after the others.
 
     Latency: two clocks.
-
-    Members
-    -------
-    ideal : In(1)
-        The line as it should be.
-    drop : In(1)
-        An edge in this clock is left out: the line keeps its level until the next edge.
-    bounce : In(8)
-        Clocks for which the line bounces.
-    random : In(1)
-        Whether a line that bounces has the wrong level.
-    noise : In(1)
-        The line has the wrong level.
-    broken : In(1)
-        The line is high.
-    line : Out(1)
-    whole : Out(1)
-        The line as it would be if it were not broken. Only if it is asked for.
     """
 
     def __init__(self, *, whole: bool = False) -> None:
         super().__init__(
             {
-                "ideal": In(1),
-                "drop": In(1),
-                "bounce": In(BOUNCE_WIDTH),
-                "random": In(1),
-                "noise": In(1),
+                "ideal": In(1),  # the line as it should be
+                "drop": In(1),  # an edge in this clock is left out: the line keeps its level until the next edge
+                "bounce": In(BOUNCE_WIDTH),  # clocks for which the line bounces
+                "random": In(1),  # whether a line that bounces has the wrong level
+                "noise": In(1),  # the line has the wrong level
                 "broken": In(1),
                 "line": Out(1),
-                **({"whole": Out(1)} if whole else {}),
+                **only_if(whole, whole=Out(1)),  # the line as it would be if it were not broken
             }
         )
 

@@ -20,12 +20,7 @@ _DEMANDS = ("mode", "velocity", "acceleration", "amplitude", "rate")
 
 
 class LoopCore(wiring.Component):
-    """Takes encoder pins and commands, gives the current, and shows all that the tachometer does.
-
-    Members
-    -------
-    The ports of the spec, less `clk` and `rst`, which are those of the `sync` domain.
-    """
+    """Takes encoder pins and commands, gives the current, and shows all that the tachometer does."""
 
     def __init__(self, spec: LoopSpec) -> None:
         self._spec = spec

@@ -19,16 +19,7 @@ _AT_TICK = {"position", _MODULO}
 
 
 class RegisterCore(wiring.Component):
-    """Joins a tachometer, maybe with a control loop, and its registers.
-
-    Members
-    -------
-    `core_ports` of the registers, less `clk` and `rst`, and
-
-    bus : In(native_port)
-    capture : In(1)
-        Captures in every clock in which it is high.
-    """
+    """Joins a tachometer, maybe with a control loop, and its registers."""
 
     def __init__(self, registers: RegisterMap) -> None:
         self._map = registers
@@ -39,7 +30,7 @@ class RegisterCore(wiring.Component):
             {
                 **members(registers.core_ports),
                 "bus": In(native_port(registers.address_width - 2)),
-                "capture": In(1),
+                "capture": In(1),  # captures in every clock in which it is high
             }
         )
 

@@ -43,7 +43,6 @@ def export(
 
     Parameters
     ----------
-    spec : TachometerSpec, AxesSpec or LoopSpec
     name : str
         Name of the module and of the files.
     bus : str or None

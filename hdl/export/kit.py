@@ -27,7 +27,6 @@ def kit(spec: AnySpec, name: str, bus: Bus | None = None) -> dict[str, str]:
 
     Parameters
     ----------
-    spec : TachometerSpec, AxesSpec or LoopSpec
     name : str
         Of the module.
     bus : Bus or None

@@ -22,23 +22,6 @@ class InputConditioner(wiring.Component):
         Names of the lines.
     complemented : tuple of str
         Those of them that come with their complements.
-
-    Members
-    -------
-    a, b … : In(1)
-        Asynchronous pins, one for each line.
-    level_a, level_b … : Out(1)
-        Synchronised and filtered levels.
-    ready_a, ready_b … : Out(1)
-        High from the first clock in which the level of this line before the present one is real as well.
-    a_n, b_n … : In(1)
-        Asynchronous complements, of `complemented`.
-    equal_a, equal_b … : Out(1)
-        The line and its complement are real and equal, filtered neither, two clocks after the pins.
-    clear : In(1)
-        `swallowed_edges` is 0 in the next clock.
-    swallowed_edges : Out(16)
-        Edges that the filter has kept out, two for each glitch; stays at 65534.
     """
 
     def __init__(
@@ -48,12 +31,17 @@ class InputConditioner(wiring.Component):
         self._lines = lines
         self._complemented = complemented
         super().__init__(
-            {name: In(1) for name in lines}
-            | {f"level_{name}": Out(1) for name in lines}
-            | {f"ready_{name}": Out(1) for name in lines}
-            | {f"{name}_n": In(1) for name in complemented}
-            | {f"equal_{name}": Out(1) for name in complemented}
-            | {"clear": In(1), "swallowed_edges": Out(16)}
+            {
+                **{name: In(1) for name in lines},  # asynchronous pins
+                **{f"level_{name}": Out(1) for name in lines},  # synchronised and filtered
+                # From the first clock on in which the level of this line before the present one is real as well.
+                **{f"ready_{name}": Out(1) for name in lines},
+                **{f"{name}_n": In(1) for name in complemented},
+                # The line and its complement are real and equal, filtered neither, two clocks after the pins.
+                **{f"equal_{name}": Out(1) for name in complemented},
+                "clear": In(1),  # `swallowed_edges` is 0 in the next clock
+                "swallowed_edges": Out(16),  # edges that the filter has kept out, two for each glitch; stays at 65534
+            }
         )
         self._filters = {name: GlitchFilter(filter_clocks) for name in lines if filter_clocks}
 

@@ -5,6 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.front_end.tooth_wheel import GapFiller
+from tachometry.hdl.wires.ports import only_if
 from tachometry.spec.core.encoder import Encoder
 from tachometry.spec.core.sensors import Levels, changes, packed_levels
 from tachometry.spec.core.tooth_wheel import ToothWheel
@@ -24,17 +25,6 @@ class QuadratureDecoder(wiring.Component):
     reverse : bool
         Forward is B before A.
 
-    Members
-    -------
-    level_a, level_b : In(1)
-        Levels in this clock.
-    ready : In(1)
-        Low while the level before this one is not real: neither a step nor an error.
-    step : Out(signed(2))
-        −1, 0 or +1.
-    decode_error : Out(1)
-        Both lines changed.
-
     Raises
     ------
     ValueError
@@ -50,9 +40,9 @@ class QuadratureDecoder(wiring.Component):
             {
                 "level_a": In(1),
                 "level_b": In(1),
-                "ready": In(1),
-                "step": Out(signed(2)),
-                "decode_error": Out(1),
+                "ready": In(1),  # low while the level before this one is not real: neither a step nor an error
+                "step": Out(signed(2)),  # −1, 0 or +1
+                "decode_error": Out(1),  # both lines changed
             }
         )
 
@@ -91,27 +81,21 @@ class SensorDecoder(wiring.Component):
 
     It looks up what a change of the lines counts, see `Sensor.change`. Levels that no sensor has, as of halls that are
     all equal, are reported when they come, and the levels before them are remembered.
-
-    Members
-    -------
-    level_a … : In(1)
-        Levels of the lines in this clock.
-    ready : In(1)
-        Low while the levels before these are not real: neither a step nor an error.
-    step : Out(signed(2))
-        −1, 0 or +1.
-    decode_error : Out(1)
-        The lines did what they should not.
-    index, synced : Out(1)
-        Only with a wheel: see `GapFiller`.
     """
 
     def __init__(self, encoder: Encoder, wheel: ToothWheel | None = None) -> None:
         self._encoder = encoder
         self._wheel = wheel
         lines = {f"level_{line}": In(1) for line in encoder.kind.lines}
-        of_wheel = {"index": Out(1), "synced": Out(1)} if wheel else {}
-        super().__init__({**lines, "ready": In(1), "step": Out(signed(2)), "decode_error": Out(1), **of_wheel})
+        super().__init__(
+            {
+                **lines,
+                "ready": In(1),  # low while the levels before these are not real: neither a step nor an error
+                "step": Out(signed(2)),  # −1, 0 or +1
+                "decode_error": Out(1),  # the lines did what they should not
+                **only_if(wheel, index=Out(1), synced=Out(1)),  # see `GapFiller`
+            }
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -27,15 +27,6 @@ class ExternalTick(wiring.Component):
     synchronous : bool
         `tick_in` is of the clock domain already, and a rise in a clock makes it the last of its window.
 
-    Members
-    -------
-    tick_in : In(1)
-        Asynchronous; each level must hold for a clock.
-    last : Out(1)
-        High in the last clock of every window.
-    tick_error : Out(1)
-        A tick came too early, or did not come.
-
     Raises
     ------
     ValueError
@@ -49,7 +40,13 @@ class ExternalTick(wiring.Component):
         self._max_cycles = max_cycles
         self._latency = latency
         self._synchronous = synchronous
-        super().__init__({"tick_in": In(1), "last": Out(1), "tick_error": Out(1)})
+        super().__init__(
+            {
+                "tick_in": In(1),  # asynchronous; each level must hold for a clock
+                "last": Out(1),  # high in the last clock of every window
+                "tick_error": Out(1),  # a tick came too early, or did not come
+            }
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -14,17 +14,6 @@ class GlitchFilter(wiring.Component):
 
     Latency: a level that holds from clock c on is at the output in clock c + `clocks`.
 
-    Members
-    -------
-    level : In(1)
-    valid : In(1)
-        The level is one of the line.
-    filtered : Out(1)
-    known : Out(1)
-        `filtered` is a level that has held long enough.
-    swallowed : Out(1)
-        High for one clock when a level went back before it had held long enough; two edges are swallowed.
-
     Raises
     ------
     ValueError
@@ -35,7 +24,15 @@ class GlitchFilter(wiring.Component):
         if clocks < 1:
             raise ValueError(f"clocks must be at least 1, not {clocks}")
         self._clocks = clocks
-        super().__init__({"level": In(1), "valid": In(1), "filtered": Out(1), "known": Out(1), "swallowed": Out(1)})
+        super().__init__(
+            {
+                "level": In(1),
+                "valid": In(1),  # the level is one of the line
+                "filtered": Out(1),
+                "known": Out(1),  # `filtered` is a level that has held long enough
+                "swallowed": Out(1),  # one clock: a level went back before it had held long enough, with two edges
+            }
+        )
 
     @property
     def idle(self) -> tuple[Idle, ...]:

@@ -5,6 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import only_if
 
 
 class IndexCapture(wiring.Component):
@@ -21,24 +22,6 @@ class IndexCapture(wiring.Component):
         That of the position, at least 2.
     once : bool
         An index is taken only if `arm` was high since the one before.
-
-    Members
-    -------
-    level_z : In(1)
-    ready : In(1)
-        The level before the present one is real.
-    position : In(signed(width))
-        The position of the next clock.
-    arm : In(1)
-        The next index is taken; as late as a rise. Only if once, as is `homed`.
-    homed : Out(1)
-        The index was taken, since `arm`.
-    rises : Out(1)
-        High a clock before `index_valid`.
-    index_position : Out(signed(width))
-        Held until the next index.
-    index_valid : Out(1)
-        One clock per index.
     """
 
     def __init__(self, width: int, latency: int = 2, *, once: bool = False) -> None:
@@ -47,12 +30,13 @@ class IndexCapture(wiring.Component):
         super().__init__(
             {
                 "level_z": In(1),
-                "ready": In(1),
-                "position": In(signed(width)),
-                **({"arm": In(1), "homed": Out(1)} if once else {}),
-                "rises": Out(1),
-                "index_position": Out(signed(width)),
-                "index_valid": Out(1),
+                "ready": In(1),  # the level before the present one is real
+                "position": In(signed(width)),  # the position of the next clock
+                **only_if(once, arm=In(1)),  # the next index is taken; as late as a rise
+                **only_if(once, homed=Out(1)),  # the index was taken, since `arm`
+                "rises": Out(1),  # high a clock before `index_valid`
+                "index_position": Out(signed(width)),  # held until the next index
+                "index_valid": Out(1),  # one clock per index
             }
         )
 

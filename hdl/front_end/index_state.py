@@ -26,17 +26,6 @@ class IndexState(wiring.Component):
     ----------
     state, after : tuple of int
         The levels of the lines, and those that follow them forward.
-
-    Members
-    -------
-    level : In
-        Levels of the lines, the first lowest.
-    level_z : In(1)
-    step : In(signed(2))
-    ready : In(1)
-        All levels, and those of the clock before, are real.
-    index : Out(1)
-    index_wide, index_missed : Out(1)
     """
 
     def __init__(self, state: Levels, after: Levels, latency: int) -> None:
@@ -44,9 +33,10 @@ class IndexState(wiring.Component):
         self._alone = len(state) == 1
         super().__init__(
             {
-                "level": In(len(state)),
+                "level": In(len(state)),  # levels of the lines, the first lowest
                 "step": In(signed(2)),
-                **dict.fromkeys(("level_z", "ready"), In(1)),
+                "level_z": In(1),
+                "ready": In(1),  # all levels, and those of the clock before, are real
                 **dict.fromkeys(("index", "index_wide", "index_missed"), Out(1)),
             }
         )

@@ -16,20 +16,18 @@ class ModuloCounter(wiring.Component):
     ----------
     modulus : int
         N, at least 2.
-    latency : int
-
-    Members
-    -------
-    step : In(signed(2))
-    clear : In(1)
-        The count is 0 in the next clock, whatever has been counted.
-    count : Out
     """
 
     def __init__(self, modulus: int, latency: int = 2) -> None:
         self._modulus = modulus
         self._latency = latency
-        super().__init__({"step": In(signed(2)), "clear": In(1), "count": Out(range(modulus))})
+        super().__init__(
+            {
+                "step": In(signed(2)),
+                "clear": In(1),  # the count is 0 in the next clock, whatever has been counted
+                "count": Out(range(modulus)),
+            }
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -17,19 +17,18 @@ class PinRise(wiring.Component):
     ----------
     latency : int
         That of the position, at least 2.
-
-    Members
-    -------
-    level : In(1)
-    ready : In(1)
-        The level before the present one is real.
-    asked : In(1)
-    rises : Out(1)
     """
 
     def __init__(self, latency: int) -> None:
         self._latency = latency
-        super().__init__({"level": In(1), "ready": In(1), "asked": In(1), "rises": Out(1)})
+        super().__init__(
+            {
+                "level": In(1),
+                "ready": In(1),  # the level before the present one is real
+                "asked": In(1),
+                "rises": Out(1),
+            }
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

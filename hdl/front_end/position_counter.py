@@ -5,6 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import only_if
 
 
 class PositionCounter(wiring.Component):
@@ -20,18 +21,6 @@ class PositionCounter(wiring.Component):
     preset : int or None
         What `value` is where nothing drives it; None: the position cannot be set.
 
-    Members
-    -------
-    step : In(signed(2))
-    clear : In(1)
-        `position` is 0 in the next clock, whatever has been counted.
-    load : In(1)
-        `position` is `value` and the step that comes in the next clock. Only with a preset, as is `value`.
-    value : In(signed(width))
-    next : Out(signed(width))
-        `position` of the next clock, if it is not cleared.
-    position : Out(signed(width))
-
     Raises
     ------
     ValueError
@@ -43,9 +32,17 @@ class PositionCounter(wiring.Component):
             raise ValueError(f"width must be at least 2, not {width}")
         self._latency = latency
         self._loads = preset is not None
-        given = {"load": In(1), "value": In(signed(width), init=preset)} if self._loads else {}
         position = Out(signed(width))
-        super().__init__({"step": In(signed(2)), "clear": In(1), **given, "next": position, "position": position})
+        super().__init__(
+            {
+                "step": In(signed(2)),
+                "clear": In(1),  # `position` is 0 in the next clock, whatever has been counted
+                **only_if(self._loads, load=In(1)),  # `position` is `value` and the step that comes in the next clock
+                **only_if(self._loads, value=In(signed(width), init=preset)),
+                "next": position,  # `position` of the next clock, if it is not cleared
+                "position": position,
+            }
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -6,6 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.saturate import raised_for, saturate_raised
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import only_if
 
 
 class PulseCounter(wiring.Component):
@@ -27,27 +28,6 @@ class PulseCounter(wiring.Component):
         A register for the step, and one for the sum that has been held within its bound, so that `next_count` comes
         from a register, and `tick` two clocks later.
 
-    Members
-    -------
-    step : In(signed(2))
-    last : In(1)
-        High in the last clock of a window.
-    beyond : In(1)
-        Only if stretched: `overflow` is to be raised for this window anyway; valid with `last`.
-    tick : Out(1)
-        One clock, when `pulse_count` is new.
-    pulse_count : Out(signed)
-        m_e, held until the next tick.
-    overflow : Out(1)
-        m_e was saturated; held as long as m_e.
-    coming : Out(1)
-        `tick` is high in the next clock.
-    next_count : Out(signed)
-        What `pulse_count` is then; valid with `coming`.
-    open_sum : Out(signed)
-        Only if not stretched: sum of the steps after the latest `tick`'s window, up to the clock before; if staged, up
-        to two clocks before that.
-
     Raises
     ------
     ValueError
@@ -65,14 +45,16 @@ class PulseCounter(wiring.Component):
         super().__init__(
             {
                 "step": In(signed(2)),
-                "last": In(1),
-                **({"beyond": In(1)} if stretched else {}),
-                "tick": Out(1),
-                "pulse_count": Out(count),
-                "overflow": Out(1),
-                "coming": Out(1),
-                "next_count": Out(count),
-                **({} if stretched else {"open_sum": Out(signed(tick_cycles.bit_length() + 1))}),
+                "last": In(1),  # high in the last clock of a window
+                **only_if(stretched, beyond=In(1)),  # with `last`: `overflow` is to be raised for this window anyway
+                "tick": Out(1),  # one clock, when `pulse_count` is new
+                "pulse_count": Out(count),  # m_e, held until the next tick
+                "overflow": Out(1),  # m_e was saturated; held as long as m_e
+                "coming": Out(1),  # `tick` is high in the next clock
+                "next_count": Out(count),  # what `pulse_count` is then; valid with `coming`
+                # Sum of the steps after the latest `tick`'s window, up to the clock before; if staged, up to two clocks
+                # before that.
+                **only_if(not stretched, open_sum=Out(signed(tick_cycles.bit_length() + 1))),
             }
         )
 

@@ -40,11 +40,6 @@ class SamplingClock(wiring.Component):
     tick_cycles : int
         T, clocks in a window.
 
-    Members
-    -------
-    last : Out(1)
-        High in the last clock of every window.
-
     Raises
     ------
     ValueError
@@ -55,7 +50,7 @@ class SamplingClock(wiring.Component):
         if tick_cycles < 1:
             raise ValueError(f"tick_cycles must be at least 1, not {tick_cycles}")
         self._tick_cycles = tick_cycles
-        super().__init__({"last": Out(1)})
+        super().__init__({"last": Out(1)})  # high in the last clock of every window
 
     @property
     def states(self) -> tuple[int, ...]:

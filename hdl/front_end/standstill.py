@@ -5,6 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
+from tachometry.hdl.wires.ports import only_if
 
 
 class Standstill(wiring.Component):
@@ -18,16 +19,6 @@ class Standstill(wiring.Component):
         Bits of m_e, whose least number, without an opposite, never comes.
     max_shift : int
         A tick may be as long as 2^max_shift nominal ones.
-
-    Members
-    -------
-    tick : In(1)
-    m_e : In(signed(count_width))
-        Valid with `tick`.
-    shift : In(range(max_shift + 1))
-        Only if `max_shift` is not 0: this tick is 2^shift nominal ones; valid with `tick`.
-    stalled : Out(1)
-        From `tick` on, until the next.
     """
 
     def __init__(self, max_ticks: int, count_width: int, *, max_shift: int = 0) -> None:
@@ -35,9 +26,9 @@ class Standstill(wiring.Component):
         super().__init__(
             {
                 "tick": In(1),
-                "m_e": In(signed(count_width)),
-                **({"shift": In(range(max_shift + 1))} if max_shift else {}),
-                "stalled": Out(1),
+                "m_e": In(signed(count_width)),  # valid with `tick`
+                **only_if(max_shift, shift=In(range(max_shift + 1))),  # with `tick`: it is 2^shift nominal ones
+                "stalled": Out(1),  # from `tick` on, until the next
             }
         )
 

@@ -12,28 +12,19 @@ class GapFiller(wiring.Component):
 
     Latency: none. What it finds of a tooth is in the clock of the tooth. A tooth that is put in is as many clocks after
     the one before as the latest two teeth before the gap were apart.
-
-    Parameters
-    ----------
-    wheel : ToothWheel
-
-    Members
-    -------
-    tooth : In(1)
-        High in the clock of a tooth that is there, never in two clocks in a row.
-    filled : Out(1)
-        High in the clock of a tooth, there or not.
-    index : Out(1)
-        This tooth is the first one after a gap.
-    error : Out(1)
-        This tooth is in the gap.
-    synced : Out(1)
-        The gap is known, from the clock after the first index on.
     """
 
     def __init__(self, wheel: ToothWheel) -> None:
         self._wheel = wheel
-        super().__init__({"tooth": In(1), "filled": Out(1), "index": Out(1), "error": Out(1), "synced": Out(1)})
+        super().__init__(
+            {
+                "tooth": In(1),  # high in the clock of a tooth, never in two clocks in a row
+                "filled": Out(1),  # high in the clock of a tooth, there or not
+                "index": Out(1),  # this tooth is the first one after a gap
+                "error": Out(1),  # this tooth is in the gap
+                "synced": Out(1),  # the gap is known, from the clock after the first index on
+            }
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -19,25 +19,19 @@ class AlterationDetector(wiring.Component):
         Bits of m_e.
     seldom : bool
         `tick` and `coming` are never high together.
-
-    Members
-    -------
-    coming : In(1)
-        `tick` follows.
-    tick : In(1)
-    next_count : In(signed(count_width))
-        m_e(i), valid with `coming`.
-    pulse_count : In(signed(count_width))
-        The last m_e whose `tick` has come; valid with `coming` and with `tick`.
-    alteration : Out(1)
-        From `tick` on, until the next.
     """
 
     def __init__(self, count_width: int, *, seldom: bool = False) -> None:
         self._seldom = seldom
         shape = signed(count_width)
         super().__init__(
-            {"coming": In(1), "tick": In(1), "next_count": In(shape), "pulse_count": In(shape), "alteration": Out(1)}
+            {
+                "coming": In(1),  # `tick` follows
+                "tick": In(1),
+                "next_count": In(shape),  # m_e(i), valid with `coming`
+                "pulse_count": In(shape),  # the last m_e whose `tick` has come; valid with `coming` and with `tick`
+                "alteration": Out(1),  # from `tick` on, until the next
+            }
         )
 
     def elaborate(self, platform: object) -> Module:

@@ -17,18 +17,6 @@ class CountWay(wiring.Component):
         Of a count.
     decays, reversals : bool
         Whether there are decays, and whether a count of the other sign leads nowhere.
-
-    Members
-    -------
-    step_before : In(signed(2))
-        The step of the next clock.
-    decays_before, negative_before : In(1)
-        In the next clock, without a step, the velocity may decay; this is its sign.
-    moves_before : Out(1)
-        The step of the next clock leads to another edge.
-    way : Out(signed)
-    negative : Out(1)
-        The sign of the last count up to this clock.
     """
 
     def __init__(self, half: int, *, decays: bool, reversals: bool) -> None:
@@ -37,12 +25,12 @@ class CountWay(wiring.Component):
         self._reversals = reversals
         super().__init__(
             {
-                "step_before": In(signed(2)),
-                "decays_before": In(1),
-                "negative_before": In(1),
-                "moves_before": Out(1),
+                "step_before": In(signed(2)),  # the step of the next clock
+                "decays_before": In(1),  # in the next clock, without a step, the velocity may decay
+                "negative_before": In(1),  # and is negative
+                "moves_before": Out(1),  # the step of the next clock leads to another edge
                 "way": Out(signed((3 * half).bit_length() + 1)),
-                "negative": Out(1),
+                "negative": Out(1),  # the sign of the last count up to this clock
             }
         )
 

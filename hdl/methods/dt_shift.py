@@ -20,32 +20,19 @@ class DtShift(wiring.Component):
         With a target.
     width : int
         Bits of `n`.
-
-    Members
-    -------
-    opens, anew : In(1)
-        A window begins; with a count that has nothing to do with the window before.
-    nominal : In(1)
-        The last clock of a nominal dt.
-    n, high : In
-        What the window that ends has measured: Ndt1, or Nep1 − 1 if `high`.
-    shift : Out
-        k of the window.
-    last : Out(1)
-        With `nominal`: dt·2^k ends; without latency.
     """
 
     def __init__(self, spec: RairanTachometer, width: int) -> None:
         self._spec = spec
         super().__init__(
             {
-                "opens": In(1),
-                "anew": In(1),
-                "nominal": In(1),
-                "n": In(width),
+                "opens": In(1),  # a window begins
+                "anew": In(1),  # with a count that has nothing to do with the window before
+                "nominal": In(1),  # the last clock of a nominal dt
+                "n": In(width),  # Ndt1 of the window that ends, or Nep1 − 1 if `high`
                 "high": In(1),
-                "shift": Out(range(spec.times.max_tick_shift + 1)),
-                "last": Out(1),
+                "shift": Out(range(spec.times.max_tick_shift + 1)),  # k of the window
+                "last": Out(1),  # with `nominal`: dt·2^k ends; without latency
             }
         )
 

@@ -17,25 +17,6 @@ class GapTimer(wiring.Component):
         Periods without a count after which `overdue` is high, and the time begins anew.
     on_lattice : bool
         Timer periods are ticks.
-
-    Members
-    -------
-    coming : In(1)
-        A tick ends in the next clock.
-    count_before : In(1)
-        There is a count in the next clock; on the lattice only if `coming`.
-    period : Out(1)
-        A timer period ends; one does with every tick.
-    count : Out(1)
-        Something was counted in this period.
-    age : Out(range(max_periods + 1), init=1)
-        Periods since the last count, this one included; valid with `period`.
-    opened : Out(1)
-        There was a count in the last `max_periods`; valid with `period`.
-    overdue, overdue_before : Out(1)
-        The last count was `max_periods` ago, and this period has none; the same a clock earlier.
-    silent_before : Out(1)
-        In the next clock a tick ends in which there was no count.
     """
 
     def __init__(self, max_periods: int, *, on_lattice: bool) -> None:
@@ -43,15 +24,15 @@ class GapTimer(wiring.Component):
         self._on_lattice = on_lattice
         super().__init__(
             {
-                "coming": In(1),
-                "count_before": In(1),
-                "period": Out(1),
-                "count": Out(1),
-                "age": Out(range(max_periods + 1), init=1),
-                "opened": Out(1),
-                "overdue": Out(1),
-                "overdue_before": Out(1),
-                "silent_before": Out(1),
+                "coming": In(1),  # a tick ends in the next clock
+                "count_before": In(1),  # there is a count in the next clock; on the lattice only if `coming`
+                "period": Out(1),  # a timer period ends; one does with every tick
+                "count": Out(1),  # something was counted in this period
+                "age": Out(range(max_periods + 1), init=1),  # periods since the last count with this; with `period`
+                "opened": Out(1),  # there was a count in the last `max_periods`; valid with `period`
+                "overdue": Out(1),  # the last count was `max_periods` ago, and this period has none
+                "overdue_before": Out(1),  # the same a clock earlier
+                "silent_before": Out(1),  # in the next clock a tick ends in which there was no count
             }
         )
 

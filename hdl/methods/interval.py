@@ -27,30 +27,6 @@ class IntervalAccumulator(wiring.Component):
     seldom : bool
         A tick has at least three clocks, so that what the numerator has of the ticks before waits in a register.
 
-    Members
-    -------
-    tick : In(1)
-    moves : In(1)
-        m_s moves on: once for every tick, with it or as long after it as m_s is needed.
-    alteration : In(1)
-        Valid from `tick` on, until m_s moves.
-    pulse_count : In(signed(count_width))
-        m_e(i) from `tick` on, until the next.
-    next_count : In(signed(count_width))
-        m_e(i), valid in the clock before `tick`.
-    numerator : Out(signed(numerator_width))
-        d0 + d1, or d1; valid in the clock before `tick`.
-    m_s : Out(range(max_ticks + 1))
-        Length of the window in ticks; as the next two valid from `tick` on, until it moves.
-    closes : Out(1)
-        The window closes.
-    forced : Out(1)
-        The window closes without an alteration.
-    update : Out(1)
-        The window closes in this tick.
-    stalled : Out(1)
-        Nothing was counted in more than `max_ticks` ticks in a row; from `tick` on, until the next.
-
     Raises
     ------
     ValueError
@@ -69,16 +45,16 @@ class IntervalAccumulator(wiring.Component):
         super().__init__(
             {
                 "tick": In(1),
-                "moves": In(1),
-                "alteration": In(1),
-                "pulse_count": In(signed(count_width)),
-                "next_count": In(signed(count_width)),
-                "numerator": Out(signed(numerator_width)),
-                "m_s": Out(range(max_ticks + 1), init=1),
-                "closes": Out(1),
-                "forced": Out(1),
-                "update": Out(1),
-                "stalled": Out(1),
+                "moves": In(1),  # m_s moves on: once for every tick, with it or as long after it as m_s is needed
+                "alteration": In(1),  # valid from `tick` on, until m_s moves
+                "pulse_count": In(signed(count_width)),  # m_e(i) from `tick` on, until the next
+                "next_count": In(signed(count_width)),  # m_e(i), valid in the clock before `tick`
+                "numerator": Out(signed(numerator_width)),  # d0 + d1, or d1; valid in the clock before `tick`
+                "m_s": Out(range(max_ticks + 1), init=1),  # ticks; like the next two, from `tick` on until it moves
+                "closes": Out(1),  # the window closes
+                "forced": Out(1),  # it closes without an alteration
+                "update": Out(1),  # the window closes in this tick
+                "stalled": Out(1),  # from `tick` on: nothing was counted in more than `max_ticks` ticks in a row
             }
         )
 

@@ -27,19 +27,17 @@ class MovingSum(wiring.Component):
         n.
     count_width, sum_width : int
         Bits of a pulse number and of the sum, both signed.
-
-    Members
-    -------
-    tick : In(1)
-    m_e : In(signed(count_width))
-        Valid with `tick`.
-    total : Out(signed(sum_width))
-        Valid with `tick`.
     """
 
     def __init__(self, length: int, *, count_width: int, sum_width: int) -> None:
         self._length = length
-        super().__init__({"tick": In(1), "m_e": In(signed(count_width)), "total": Out(signed(sum_width))})
+        super().__init__(
+            {
+                "tick": In(1),
+                "m_e": In(signed(count_width)),  # valid with `tick`
+                "total": Out(signed(sum_width)),  # valid with `tick`
+            }
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
@@ -87,17 +85,8 @@ class MMethod(wiring.Component):
     A mean over a power of two is a shift; otherwise the sum is multiplied by a constant, as in the S method, and
     correctly rounded like there.
 
-    Latency: an update comes `spec.latency.datapath` clocks after `tick`.
-
-    Members
-    -------
-    tick : In(1)
-    pulse_count : In(signed)
-        m_e, valid with `tick`.
-    updates : Out(stream)
-        `velocity` has `native_frac_bits` fraction bits, `interval` is n, and `forced` is never high. The bounds
-        are those of one count more and less in n ticks, rounded outward; they are valid when none of the n ticks is the
-        first. All is held until the next update.
+    Latency: an update comes `spec.latency.datapath` clocks after `tick`. All of it is held until the next. Its bounds
+    are those of one count more and less in n ticks, rounded outward; they are valid if the first tick is not in these.
     """
 
     def __init__(self, spec: MTachometer) -> None:

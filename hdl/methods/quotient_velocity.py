@@ -7,6 +7,7 @@ from amaranth.lib.wiring import In, Out
 from tachometry.hdl.arithmetic.divider import Divider
 from tachometry.hdl.methods.datapath import stamped
 from tachometry.hdl.output.update import update_layout, update_stream
+from tachometry.hdl.wires.ports import only_if
 from tachometry.hdl.wires.registers import registers
 from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.methods.timed import TimedTachometer
@@ -21,32 +22,6 @@ class QuotientVelocity(wiring.Component):
     does not decay. What begins is told a clock before, so that registers start the divider.
 
     Latency: an update comes `spec.latency.datapath` clocks after `ends` or `decays`, or what would force a 0.
-
-    Members
-    -------
-    ends_before, overdue_before, silent_before : In(1)
-        In the next clock: a measurement ends with a count, only if `free_before`; a 0 is forced; a tick was silent.
-    free_before : Out(1)
-        In the next clock no measurement is being divided.
-    ends, decays : Out(1)
-        A measurement ends with a count; a division begins that lets the velocity decay.
-    decays_before, negative_before : Out(1)
-        The latter in the next clock, and the sign of the velocity then.
-    dividend, addend : In(signed)
-        Two distances in half counts, times the timer periods in a tick, whose sum is divided: of a measurement, of a
-        decay, or 0.
-    distance : In(signed)
-        With `ends`: their sum in counts, else 0.
-    divisor : In(spec.widths.interval)
-        Time in timer periods.
-    beyond_in : In(1)
-        Valid as `dividend`.
-    stamp : In
-        Only with an age: number of ticks so far.
-    known, was_negative : In(1)
-        With `spec.bounds`. `known`: there are bounds. `was_negative`: the sign of the last count.
-    updates : Out(stream)
-        As those of the datapath.
     """
 
     def __init__(self, spec: TimedTachometer) -> None:
@@ -71,15 +46,26 @@ class QuotientVelocity(wiring.Component):
         }
         super().__init__(
             {
-                **{name: In(1) for name in ("ends_before", "overdue_before", "silent_before")},
-                **{name: Out(1) for name in ("free_before", "ends", "decays", "decays_before", "negative_before")},
+                # In the next clock
+                "ends_before": In(1),  # a measurement ends with a count, only if `free_before`
+                "overdue_before": In(1),  # a 0 is forced
+                "silent_before": In(1),  # a tick was silent
+                "free_before": Out(1),  # no measurement is being divided
+                "decays_before": Out(1),
+                "negative_before": Out(1),  # the velocity is negative
+                # In this clock
+                "ends": Out(1),
+                "decays": Out(1),  # a division begins that lets the velocity decay
+                # Two distances in half counts, times the timer periods in a tick, whose sum is divided: those of a
+                # measurement, of a decay, or 0.
                 "dividend": In(signed(spec.form.distance_width + 1)),
                 "addend": In(signed(spec.form.distance_width + 1)),
-                "distance": In(signed(spec.form.distance_width)),
-                "divisor": In(spec.widths.interval),
-                "beyond_in": In(1),
+                "distance": In(signed(spec.form.distance_width)),  # with `ends`: their sum in counts, else 0
+                "divisor": In(spec.widths.interval),  # time in timer periods
+                "beyond_in": In(1),  # with `dividend`: the velocity is too high to be measured
                 **{name: In(width) for name, width in stamped(spec).items()},
-                **({"known": In(1), "was_negative": In(1)} if spec.bounds else {}),
+                **only_if(spec.bounds, known=In(1)),  # there are bounds
+                **only_if(spec.bounds, was_negative=In(1)),  # the last count was
                 "updates": Out(update_stream(update_layout(spec))),
             }
         )

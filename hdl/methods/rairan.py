@@ -9,6 +9,7 @@ from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
 from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.rairan_counters import RairanCounters
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import only_if
 from tachometry.hdl.wires.registers import registers
 from tachometry.spec import RairanTachometer
 
@@ -20,31 +21,20 @@ class RairanMethod(wiring.Component):
     `spec.latency.datapath` clocks after `tick` if it comes with one. There may be an update in every clock. The
     velocity is correctly rounded: within half an LSB of the exact quotient, ties towards +∞.
 
-    Members
-    -------
-    step_now : In(signed(2))
-    last : Out(1)
-        The present clock is the last of dt, and so of a tick.
-    beyond : Out(1)
-        Nep1 is saturated; valid with `last`.
-    tick, pulse_count : In
-        Not used.
-    tick_shift : Out
-        Only if dt is adaptive: k of the window of a tick, valid with `tick`.
-    updates : Out(stream)
-        `interval` is Ndt1 at low speeds, else 1. n1 = `n_ep1`/`n_dt1` of the velocity, 0 and 1 for the velocity 0; with
-        `paper_exact` as in Table 1. If dt is adaptive, both are of dt·2^`dt_shift`. The bounds are n2 and n1, a clock
-        wider and rounded outward.
+    `interval` is Ndt1 at low speeds, else 1. n1 = `n_ep1`/`n_dt1` of the velocity, 0 and 1 for the velocity 0; with
+    `paper_exact` as in Table 1. If dt is adaptive, both are for dt·2^`dt_shift`. The bounds are n2 and n1, a clock
+    wider and rounded outward.
     """
 
     def __init__(self, spec: RairanTachometer) -> None:
         super().__init__(
             {
                 "step_now": In(signed(2)),
-                "last": Out(1),
-                "beyond": Out(1),
+                "last": Out(1),  # the present clock is the last of dt, and so of a tick
+                "beyond": Out(1),  # Nep1 is saturated; valid with `last`
                 **datapath_members(spec),
-                **({"tick_shift": Out(range(spec.times.max_tick_shift + 1))} if spec.adaptive else {}),
+                # With `tick`: k of its window.
+                **only_if(spec.adaptive, tick_shift=Out(range(spec.times.max_tick_shift + 1))),
             }
         )
         self._spec = spec

@@ -7,6 +7,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.methods.dt_shift import DtShift
+from tachometry.hdl.wires.ports import only_if
 from tachometry.spec import RairanTachometer
 
 
@@ -14,28 +15,6 @@ class RairanCounters(wiring.Component):
     """Table 1 of Rairán 2013 at every clock: Cep, Cdt, the clock of dt, and what they make of Nep1 and Ndt1.
 
     Latency: `update` is high in the clock after the count, or the end of dt, that causes it.
-
-    Members
-    -------
-    step : In(signed(2))
-    last : Out(1)
-        High in the clock in which dt ends; without latency.
-    beyond : Out(1)
-        There were more counts in this dt than Cep can hold; valid with `last`.
-    update : Out(1)
-        A new estimate, or an old one found too large.
-    n : Out
-        Ndt1, or Nep1 − 1 if `high`; 0 stands for the velocity 0. This and all below are held until the next update.
-    high, backward : Out(1)
-        The regime, and the direction.
-    forced, at_rest : Out(1)
-        `forced`: the last update came without a count. `at_rest`: it came at the maximum time.
-    n_ep1, n_dt1 : Out
-        Only with `paper_exact`: as in Table 1.
-    shift : Out
-        Only if dt is adaptive: n is of dt·2^shift.
-    loose, unsynced : Out(1)
-        Only with bounds. `loose`: n implies no least speed. `unsynced`: its measurement did not begin in step with dt.
     """
 
     def __init__(self, spec: RairanTachometer) -> None:
@@ -44,18 +23,20 @@ class RairanCounters(wiring.Component):
         super().__init__(
             {
                 "step": In(signed(2)),
-                "last": Out(1),
-                "beyond": Out(1),
-                "update": Out(1),
+                "last": Out(1),  # high in the clock in which dt ends; without latency
+                "beyond": Out(1),  # there were more counts in this dt than Cep can hold; valid with `last`
+                "update": Out(1),  # a new estimate, or an old one found too large
+                # Ndt1, or Nep1 − 1 if `high`; 0 stands for the velocity 0. As all below, held until the next update.
                 "n": Out(range(max(spec.widths.max_pulse_count, spec.timing.max_ticks) + 1)),
-                "high": Out(1),
+                "high": Out(1),  # the regime
                 "backward": Out(1),
-                "forced": Out(1),
-                "at_rest": Out(1),
+                "forced": Out(1),  # the last update came without a count
+                "at_rest": Out(1),  # and at the maximum time
                 # Nep1 and Ndt1 as they are before anything has come.
                 **{port.name: Out(port.width, init=int(port.name == "n_dt1")) for port in ratio},
-                **({"shift": Out(range(spec.times.max_tick_shift + 1))} if spec.adaptive else {}),
-                **({name: Out(1) for name in ("loose", "unsynced")} if spec.bounds else {}),
+                **only_if(spec.adaptive, shift=Out(range(spec.times.max_tick_shift + 1))),  # n is that of dt·2^shift
+                **only_if(spec.bounds, loose=Out(1)),  # n implies no least speed
+                **only_if(spec.bounds, unsynced=Out(1)),  # its measurement did not begin in step with dt
             }
         )
         # Cep − 1, and whether there is any.

@@ -17,28 +17,18 @@ class SMethod(wiring.Component):
     """S-method datapath, eqs. (17) and (21) of Tsuji 2009: from pulse numbers to velocity without a divider.
 
     Latency: an update comes `spec.latency.datapath` clocks after `tick`. The velocity is correctly rounded: within half
-    an LSB of the exact quotient, ties towards +∞.
-
-    Members
-    -------
-    tick : In(1)
-    pulse_count : In(signed)
-        m_e, valid from `tick` on, until the next.
-    coming : In(1)
-        `tick` is high in the next clock.
-    next_count : In(signed)
-        What `pulse_count` is then; valid with `coming`.
-    stalled : Out(1)
-        Of the tick, see `IntervalAccumulator`.
-    updates : Out(stream)
-        `velocity` has `native_frac_bits` fraction bits, `interval` is m_s in ticks. The bounds are those of one count
-        more and less in the window, rounded outward; they are not valid for the first window. All is held until the
-        next update.
+    an LSB of the exact quotient, ties towards +∞. All of an update is held until the next. Its bounds are those of one
+    count more and less in the window, rounded outward; they are not valid for the first window.
     """
 
     def __init__(self, spec: STachometer) -> None:
         super().__init__(
-            {**datapath_members(spec), "coming": In(1), "next_count": In(signed(spec.widths.count)), "stalled": Out(1)}
+            {
+                **datapath_members(spec),
+                "coming": In(1),  # `tick` is high in the next clock
+                "next_count": In(signed(spec.widths.count)),  # what `pulse_count` is then; valid with `coming`
+                "stalled": Out(1),  # of the tick, see `IntervalAccumulator`
+            }
         )
         self._spec = spec
         self.alteration = AlterationDetector(spec.widths.count, seldom=spec.latency.serial)

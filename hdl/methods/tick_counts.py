@@ -25,52 +25,26 @@ def _sums(*sums: tuple[Value, Value, Value]) -> list[Value]:
 
 
 class TickCounts(wiring.Component):
-    """Adds up times and places of the counts of each tick; they are valid from two clocks after it until the next ends.
-
-    Members
-    -------
-    tick : In(1)
-        The last clock of a tick.
-    step : In(signed(2))
-    number : Out
-        Counts that an event takes: the first ones.
-    times : Out
-        Sum of the clocks from each of these to the end of the tick.
-    places : Out(signed)
-        Sum of twice the places of their edges, in counts from the place at the beginning of the tick.
-    kind : Out(2)
-        Lower one of the two positions around the edge of the last of these, modulo 4.
-    down : Out(1)
-        It went backward.
-    last : Out
-        Clocks from the last count to the end of the tick.
-    moved : Out(signed)
-        Forward counts less backward ones.
-    end : Out(2)
-        Position at the end of the tick, since reset, modulo 4.
-    elapsed : Out
-        Ticks since the last one with counts before this one, at most `max_ticks`.
-    length : Out
-        Clocks of the tick.
-    """
+    """Adds up times and places of the counts of each tick, valid from two clocks after it until the next ends."""
 
     def __init__(self, form: Tracking, max_ticks: int) -> None:
         self._form = form
         self._max_ticks = max_ticks
         super().__init__(
             {
-                "tick": In(1),
+                "tick": In(1),  # the last clock of a tick
                 "step": In(signed(2)),
-                "number": Out(form.number_bits),
-                "times": Out(form.times_bits),
+                "number": Out(form.number_bits),  # counts that an event takes: the first ones
+                "times": Out(form.times_bits),  # sum of the clocks from each of these to the end of the tick
+                # Sum of twice the places of their edges, in counts from the place at the beginning of the tick.
                 "places": Out(signed(form.places_bits)),
-                "kind": Out(2),
-                "down": Out(1),
-                "last": Out(range(form.longest_tick)),
-                "moved": Out(signed(form.moved_bits)),
-                "end": Out(2),
-                "elapsed": Out(range(max_ticks + 1), init=max_ticks),
-                "length": Out(range(form.longest_tick + 1), init=form.tick_cycles),
+                "kind": Out(2),  # lower one of both positions around the edge of the last of these, modulo 4
+                "down": Out(1),  # it went backward
+                "last": Out(range(form.longest_tick)),  # clocks from the last count to the end of the tick
+                "moved": Out(signed(form.moved_bits)),  # forward counts less backward ones
+                "end": Out(2),  # position at the end of the tick, since reset, modulo 4
+                "elapsed": Out(range(max_ticks + 1), init=max_ticks),  # ticks since the last one with counts before it
+                "length": Out(range(form.longest_tick + 1), init=form.tick_cycles),  # clocks of the tick
             }
         )
 

@@ -9,27 +9,16 @@ from tachometry.hdl.methods.count_way import CountWay
 from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.gap_timer import GapTimer
 from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
+from tachometry.hdl.wires.ports import only_if
 from tachometry.spec.methods.timed import TimedTachometer
 
 
 class TimedDatapath(wiring.Component):
     """From counts to velocities; `_window` of a method says when a measurement ends (docs/concepts/timed.md).
 
-    Latency: an update comes `spec.latency.datapath` clocks after the `step`, or the `tick`, that causes it.
-
-    Members
-    -------
-    pulse_count : In(signed)
-        m_e.
-    coming : In(1)
-        `pulse_count` is new in the next clock, and a tick has ended.
-    step_before : In(signed(2))
-        The step of the next clock, steps being as late as ticks; only if times are counted in clocks.
-    next_count : In(signed)
-        The next `pulse_count`, valid with `coming`; only if times are counted in ticks.
-    updates : Out(stream)
-        `interval` is in timer periods. `forced`: silence alone caused the update. `out_of_range`, only if that is
-        possible: the velocity was too high to be measured, and is saturated.
+    Latency: an update comes `spec.latency.datapath` clocks after the `step`, or the `tick`, that causes it. `interval`
+    is in timer periods; `forced`: silence alone caused the update; `out_of_range`: the velocity was too high, and is
+    saturated.
     """
 
     def __init__(self, spec: TimedTachometer) -> None:
@@ -38,8 +27,12 @@ class TimedDatapath(wiring.Component):
         self.quotient_velocity = QuotientVelocity(spec)
         if not spec.form.on_lattice:
             self.count_way = CountWay(spec.form.timer_periods, decays=spec.form.decays, reversals=not spec.paper_exact)
-        ahead = ("next_count", spec.widths.count) if spec.form.on_lattice else ("step_before", 2)
-        members = datapath_members(spec) | {"coming": In(1), ahead[0]: In(signed(ahead[1]))}
+        members = {
+            **datapath_members(spec),
+            "coming": In(1),  # `pulse_count` is new in the next clock, and a tick has ended
+            **only_if(spec.form.on_lattice, next_count=In(signed(spec.widths.count))),  # the next `pulse_count`
+            **only_if(not spec.form.on_lattice, step_before=In(signed(2))),  # the step of the next clock
+        }
         super().__init__({name: member for name, member in members.items() if name != "tick"})
         # On the lattice: the sign of the last count, and whether this count is from another edge than that.
         self._was_negative, self._same = Signal(name="was_negative"), Signal(name="same")

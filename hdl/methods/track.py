@@ -17,21 +17,8 @@ class TrackMethod(wiring.Component):
     """Tracking datapath: least squares over a memory that finds its own length (after Tsuji 2009, eq. (22)).
 
     Latency: an update comes `spec.latency.datapath` clocks after every `tick`, and the filter has taken it before the
-    next may come: no update needs a stamp.
-
-    Parameters
-    ----------
-    spec : TrackTachometer
-
-    Members
-    -------
-    tick : In(1)
-    position : In(signed)
-        Valid with `tick`.
-    step : In(signed(2))
-        As late as `tick`.
-    updates : Out(stream)
-        `interval` is the number of ticks since the last one with counts. `forced`: this tick had none.
+    next may come: no update needs a stamp. `interval` is the number of ticks since the last one with counts; `forced`:
+    this tick had none.
     """
 
     def __init__(self, spec: TrackTachometer) -> None:
@@ -39,7 +26,13 @@ class TrackMethod(wiring.Component):
         self.tick_counts = TickCounts(spec.form, spec.timing.max_ticks)
         self.machine = TrackMachine(spec.program)
         self.left = SamplingClock(spec.latency.datapath - 1)
-        super().__init__({**datapath_members(spec), "step": In(signed(2)), "position": In(signed(spec.position_width))})
+        super().__init__(
+            {
+                **datapath_members(spec),
+                "step": In(signed(2)),  # as late as `tick`
+                "position": In(signed(spec.position_width)),  # valid with `tick`
+            }
+        )
 
     @property
     def probes(self) -> dict[str, Value]:

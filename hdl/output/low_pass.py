@@ -34,24 +34,22 @@ class LowPass(wiring.Component):
 
     Parameters
     ----------
-    spec : spec.low_pass.LowPass
     layout : data.StructLayout
         Of an update; all of it but the velocity is handed on as it is.
     clears : bool
         An update that `rests` is taken as it is, whatever its time.
-
-    Members
-    -------
-    tick : In(1)
-    updates : In(stream)
-    filtered : Out(stream)
-        Held until the next.
     """
 
     def __init__(self, spec: low_pass.LowPass, layout: data.StructLayout, *, clears: bool = False) -> None:
         self._spec = spec
         self._clears = clears
-        super().__init__({"tick": In(1), "updates": In(update_stream(layout)), "filtered": Out(update_stream(layout))})
+        super().__init__(
+            {
+                "tick": In(1),
+                "updates": In(update_stream(layout)),
+                "filtered": Out(update_stream(layout)),  # held until the next
+            }
+        )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

@@ -4,6 +4,8 @@ from amaranth import Module, Mux, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import only_if
+
 
 class UpdateAge(wiring.Component):
     """Counts the ticks since the cause of the update, or from reset, on, up to `max_age`.
@@ -16,15 +18,6 @@ class UpdateAge(wiring.Component):
         The age at which the count stops.
     fresh_width : int
         Bits of `fresh`; 0: it is always 0.
-
-    Members
-    -------
-    tick, update : In(1)
-    fresh : In(fresh_width)
-        Ticks between the cause of an update and the update, valid with it; only if it has bits.
-    age : Out(range(max_age + 1))
-    before : Out(range(max_age + 1))
-        The age of the clock before.
     """
 
     def __init__(self, max_age: int, fresh_width: int = 0) -> None:
@@ -34,9 +27,9 @@ class UpdateAge(wiring.Component):
             {
                 "tick": In(1),
                 "update": In(1),
-                **({"fresh": In(fresh_width)} if fresh_width else {}),
+                **only_if(fresh_width, fresh=In(fresh_width)),  # with `update`: ticks from its cause to it
                 "age": Out(range(max_age + 1)),
-                "before": Out(range(max_age + 1)),
+                "before": Out(range(max_age + 1)),  # the age of the clock before
             }
         )
 

@@ -22,17 +22,9 @@ class _VelocityOutput(wiring.Component):
 
     Parameters
     ----------
-    output : spec.velocity_output.VelocityOutput
     layout : data.StructLayout
         Of an update in counts per tick. All its velocities become those of the unit, bounds rounded outward; the rest
         is handed on as it is.
-
-    Members
-    -------
-    updates : In(stream)
-        An update stays until the next.
-    shown : Out(stream)
-        The update in the unit of the output, with `velocity_overflow`; held until the next.
     """
 
     def __init__(self, output: velocity_output.VelocityOutput, layout: data.StructLayout) -> None:
@@ -42,7 +34,11 @@ class _VelocityOutput(wiring.Component):
             name: output.rounding(towards) for name, towards in VELOCITIES.items() if name in layout.members
         }
         super().__init__(
-            {"updates": In(update_stream(layout)), "shown": Out(update_stream(shown_layout(layout, output)))}
+            {
+                "updates": In(update_stream(layout)),  # an update stays until the next
+                # The update in the unit of the output, with `velocity_overflow`; held until the next.
+                "shown": Out(update_stream(shown_layout(layout, output))),
+            }
         )
 
     def _show(self, m: Module, update: data.View, totals: dict[str, Value]) -> data.View:

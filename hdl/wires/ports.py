@@ -21,6 +21,11 @@ def members(ports: Iterable[Port]) -> dict[str, Any]:
     }
 
 
+def only_if(condition: object, **flows: Any) -> dict[str, Any]:
+    """Return members that a box has only under a condition."""
+    return flows if condition else {}
+
+
 def follow(m: Module, box: wiring.Component, source: wiring.Component, names: Iterable[str]) -> None:
     """Set ports of a box to those of the same names of another."""
     m.d.comb += [getattr(box, name).eq(getattr(source, name)) for name in names]

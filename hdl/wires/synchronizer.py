@@ -15,7 +15,6 @@ class Synchronizer(FFSynchronizer):
     ----------
     pin : Signal, in
         One, or several that are independent.
-    level : Signal, out
     """
 
     def __init__(self, pin: Signal, level: Signal) -> None:
