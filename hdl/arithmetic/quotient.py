@@ -11,6 +11,7 @@ from tachometry.hdl.arithmetic.carried_reciprocal import CarriedReciprocal
 from tachometry.hdl.arithmetic.reciprocal import DividedReciprocal, LookedUpReciprocal
 from tachometry.hdl.arithmetic.remainder_scaler import RemainderScaler
 from tachometry.hdl.arithmetic.scaler import PipelinedScaler, SerialScaler, WideSerialScaler
+from tachometry.hdl.wires.ports import only_if
 from tachometry.spec.formats import carried_reciprocal, reciprocal
 
 
@@ -33,6 +34,25 @@ class _TakesRemainder(Protocol):
     r: Signal
 
 
+_Shape = reciprocal.Reciprocal | carried_reciprocal.CarriedReciprocal
+
+
+def _reciprocal(shape: _Shape) -> LookedUpReciprocal | DividedReciprocal | CarriedReciprocal:
+    if isinstance(shape, carried_reciprocal.CarriedReciprocal):
+        return CarriedReciprocal(shape)
+    if isinstance(shape, reciprocal.DividedReciprocal):
+        return DividedReciprocal(shape)
+    return LookedUpReciprocal(shape)
+
+
+def _scaler(shape: _Shape, width: int, serial: bool) -> Callable[..., _Scaler]:
+    if isinstance(shape, carried_reciprocal.CarriedReciprocal):
+        return RemainderScaler
+    if not serial:
+        return PipelinedScaler
+    return WideSerialScaler if shape.is_wide(width) else SerialScaler
+
+
 class Quotient(wiring.Component):
     """Computes base + N/m, and bounds of it, correctly rounded and without a divider.
 
@@ -46,9 +66,10 @@ class Quotient(wiring.Component):
     shape : spec.reciprocal.Reciprocal or spec.carried_reciprocal.CarriedReciprocal
         Widths and contents of the reciprocal. A carried one is multiplied all at once.
     quotients : dict
-        By the name of each quotient its bits, and which way it is rounded: to the nearest (0), down (−1) or up (1).
+        By the name of each quotient its bits, the way it is rounded: to the nearest (0), down (−1) or up (1), and what
+        is added to N for it.
     numerator_width : int
-        Bits of N and of N ± margin, signed.
+        Bits of N and of all that is added to it, signed.
     tag : data.StructLayout
         What travels along.
     serial : bool
@@ -60,49 +81,30 @@ class Quotient(wiring.Component):
 
     def __init__(
         self,
-        shape: reciprocal.Reciprocal | carried_reciprocal.CarriedReciprocal,
+        shape: _Shape,
         *,
-        quotients: Mapping[str, tuple[int, int]],
+        quotients: Mapping[str, tuple[int, int, int]],
         numerator_width: int,
         tag: data.StructLayout,
         serial: bool,
-        margin: int = 0,
         constant: int | None = None,
     ) -> None:
-        self._margins = {name: towards * margin for name, (_, towards) in quotients.items()}
-        self.reciprocal: LookedUpReciprocal | DividedReciprocal | CarriedReciprocal | None = None
-        self._constant = 0
-        inputs, travels = {}, tag
-        if constant is None:
-            # `moves`: the last clock with this m. A carried reciprocal restricts the next m.
-            inputs = {"m": In(range(shape.max_m + 1)), "moves": In(1)}
-            travels = data.StructLayout({"m": range(shape.max_m + 1), **tag.members})
-        if isinstance(shape, carried_reciprocal.CarriedReciprocal):
-            self.reciprocal = CarriedReciprocal(shape)
-        elif constant is not None:
-            self._constant = shape.value(constant)
-        elif isinstance(shape, reciprocal.DividedReciprocal):
-            self.reciprocal = DividedReciprocal(shape)
-        else:
-            self.reciprocal = LookedUpReciprocal(shape)
-
-        def scaler(width: int) -> Callable[..., _Scaler]:
-            if isinstance(shape, carried_reciprocal.CarriedReciprocal):
-                return RemainderScaler
-            if not serial:
-                return PipelinedScaler
-            return WideSerialScaler if shape.is_wide(width) else SerialScaler
-
+        self._margins = {name: margin for name, (_, _, margin) in quotients.items()}
+        self._constant = 0 if constant is None else shape.value(constant)
+        self.reciprocal = None if constant is not None else _reciprocal(shape)
+        # `moves`: the last clock with this m. A carried reciprocal restricts the next m.
+        m = In(range(shape.max_m + 1))
+        travels = data.StructLayout({**only_if(constant is None, m=m.shape), **tag.members})
         self.scalers = {
-            name: scaler(width)(
+            name: _scaler(shape, width, serial)(
                 shape, base_width=width - shape.frac_bits, numerator_width=numerator_width, tag=travels, towards=towards
             )
-            for name, (width, towards) in quotients.items()
+            for name, (width, towards, _) in quotients.items()
         }
-        results = {name: signed(width) for name, (width, _) in quotients.items()} | travels.members
+        results = {name: signed(width) for name, (width, _, _) in quotients.items()} | travels.members
         super().__init__(
             {
-                **inputs,
+                **only_if(constant is None, m=m, moves=In(1)),
                 "load": In(1),  # `base` and `numerator` are valid
                 # The clock after `load`, with `m` and `tag`; m has been valid as long as its reciprocal takes.
                 "start": In(1),

@@ -58,24 +58,21 @@ class AxesDatapath(wiring.Component):
         )
         self.quotient = Quotient(
             axis.form.looked_up,
-            quotients={"velocity": (axis.widths.native, 0)},
+            quotients={"velocity": (axis.widths.native, 0, 0)},
             numerator_width=axis.form.numerator_width,
             tag=data.StructLayout({"forced": 1}),
             serial=True,
         )
-        self.velocity_output: PipelinedVelocityOutput | None = None
-        if axis.scale.output is not None:
-            self.velocity_output = PipelinedVelocityOutput(axis.scale.output, update_layout(axis))
+        output = axis.scale.output
+        self.velocity_output = None if output is None else PipelinedVelocityOutput(output, update_layout(axis))
         super().__init__(
             {
                 "complete": In(1),  # `count` is handed over; the turns begin with the clock after that of axis 0
                 "slot": In(range(spec.slots)),  # that the count belongs to
                 "count": In(signed(axis.times.longest_tick.bit_length() + 1)),
-                # With `count`, where the index resets it; else the position is the sum of the counts.
-                **only_if(axis.front_end.index_resets, handed_position=In(signed(axis.position_width))),
+                **only_if(axis.front_end.index_resets, handed_position=In(signed(axis.position_width))),  # else a sum
                 "tick": Out(1),  # one clock for every axis in every tick
-                # Valid with `tick`, as are the next four.
-                "axis": Out(len(self.turns.axis)),
+                "axis": Out(len(self.turns.axis)),  # valid with `tick`, as are the next four
                 "pulse_count": Out(signed(axis.widths.count)),
                 "position": Out(signed(axis.position_width)),
                 "overflow": Out(1),
@@ -84,7 +81,7 @@ class AxesDatapath(wiring.Component):
                 "velocity": Out(signed(axis.widths.velocity)),
                 "interval": Out(axis.widths.interval),
                 "forced": Out(1),
-                **only_if(axis.scale.output is not None, velocity_overflow=Out(1)),
+                **only_if(output is not None, velocity_overflow=Out(1)),
             }
         )
 

@@ -24,6 +24,8 @@ from tachometry.spec.methods.axes import AxesSpec
 from tachometry.spec.methods.axis import WARM_UP
 from tachometry.spec.methods.track_axis import TrackAxis
 
+_Values = dict[str, Value]  # by their names
+
 
 class AxesTachometer(wiring.Component):
     """Pins of many encoders in, their positions and velocities out."""
@@ -71,7 +73,7 @@ class AxesTachometer(wiring.Component):
         m.submodules.rounds = rounds = self.rounds
         m.submodules.axis_counters = counters = self.axis_counters
         m.submodules.datapath = datapath = self.datapath
-        level: dict[str, Value] = {pin.name: Signal(pin.width, name=f"level_{pin.name}") for pin in spec.ports.pins}
+        level: _Values = {pin.name: Signal(pin.width, name=f"level_{pin.name}") for pin in spec.ports.pins}
         for name, levels in level.items():
             m.submodules[f"sync_{name}"] = Synchronizer(getattr(self, name), levels)
         if spec.axis.external_tick:
@@ -95,25 +97,26 @@ class AxesTachometer(wiring.Component):
         self._show(m, TICK, datapath.tick, "axis", datapath.axis, datapath)
         self._show(m, UPDATE, datapath.velocity_valid, "axis", datapath.axis, datapath)
         if self.axis_index is not None:
-            m.submodules.axis_index = index = self.axis_index
-            state, all_known = spec.axis.front_end.index_state, known["z"] & known["a"] & known["b"]
-            m.d.comb += [
-                index.slot.eq(at["slot"]),
-                index.ready.eq(at["ready"]),
-                index.known.eq(at["ready"] & known["z"] if state is None else at["ready"] & all_known),
-                index.level_z.eq(
-                    level["z"] if state is None else level["z"] & in_state((level["a"], level["b"]), state)
-                ),
-                index.step.eq(counters.step),
-            ]
-            if spec.axis.front_end.index_resets:
-                m.d.comb += datapath.handed_position.eq(index.position)
-            self._show(m, INDEX, index.index_valid, "index_axis", index.axis, index)
+            self._index(m, self.axis_index, at, level, known)
         return m
 
-    def _looks(
-        self, m: Module, levels: dict[str, Value]
-    ) -> tuple[dict[str, Value], dict[str, Value], dict[str, Value]]:
+    def _index(self, m: Module, index: AxisIndex, at: _Values, level: _Values, known: _Values) -> None:
+        """Capture the position of an axis at its index."""
+        m.submodules.axis_index = index
+        front = self._spec.axis.front_end
+        state, all_known = front.index_state, known["z"] & known["a"] & known["b"]
+        m.d.comb += [
+            index.slot.eq(at["slot"]),
+            index.ready.eq(at["ready"]),
+            index.known.eq(at["ready"] & known["z"] if state is None else at["ready"] & all_known),
+            index.level_z.eq(level["z"] if state is None else level["z"] & in_state((level["a"], level["b"]), state)),
+            index.step.eq(self.axis_counters.step),
+        ]
+        if front.index_resets:
+            m.d.comb += self.datapath.handed_position.eq(index.position)
+        self._show(m, INDEX, index.index_valid, "index_axis", index.axis, index)
+
+    def _looks(self, m: Module, levels: _Values) -> tuple[_Values, _Values, _Values]:
         """Return of the axis whose slot it is its place in the tick, its levels, and whether they are known by then."""
         rounds = self.rounds
         level = {name: of_slot(value, rounds.slot) for name, value in levels.items()}

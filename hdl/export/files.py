@@ -43,11 +43,8 @@ def export(
 
     Parameters
     ----------
-    name : str
-        Name of the module and of the files.
     bus : str or None
-        The bus for its registers, one of `spec.registers.buses.BUSES`, or `none`; None: `none`, or what the target
-        needs.
+        The bus for its registers, one of `spec.registers.buses.BUSES`, or `none`; None: that of the target, or `none`.
     baud : int or None
         Bits a second of a bus that has them; None: its default.
     target : str
@@ -59,8 +56,7 @@ def export(
     ------
     ValueError
         If `name` cannot be the name of a Verilog module; if there is no such bus, or the clock cannot make its bits; if
-        the target needs another bus or another core; if the bus cannot reach all registers; if there is none
-        for an interrupt.
+        the target needs another bus or core; if the bus cannot reach all registers; if an interrupt has none.
     """
     on = bus_of(bus_for(target, bus), baud, irq=irq)
     described = manifest_of(spec, name, bus, baud, target, irq)

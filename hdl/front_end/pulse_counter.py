@@ -75,17 +75,7 @@ class PulseCounter(wiring.Component):
         held: Value = count
         overflow: Value = Const(0)
         if self._stretched:
-            # Beyond its bound the sum stays where it is. A register knows it, so that nothing waits for a comparison.
-            left = Signal()
-            beyond = Signal()
-            with m.If(step[0] & (count == Mux(step[-1], 1 - most, most - 1))):
-                m.d.sync += left.eq(1)
-            with m.If(left):
-                m.d.sync += count.eq(count)
-            with m.If(complete):
-                m.d.sync += left.eq(0)
-            m.d.sync += beyond.eq(self.beyond)
-            held, overflow = Mux(left, Mux(count[-1], -self._max_count, self._max_count), count), left | beyond
+            held, overflow = self._stay(m, count, step, complete)
         elif start:
             held, overflow = saturate_raised(m, raised, self._max_count)
         fresh: Value = step + start if start else step
@@ -101,3 +91,16 @@ class PulseCounter(wiring.Component):
         with m.If(coming):
             m.d.sync += [self.pulse_count.eq(held), self.overflow.eq(overflow)]
         return m
+
+    def _stay(self, m: Module, count: Signal, step: Signal, complete: Signal) -> tuple[Value, Value]:
+        """Let the sum stay beyond its bound, which a register knows, so that nothing waits for a comparison."""
+        left = Signal()
+        beyond = Signal()
+        with m.If(step[0] & (count == Mux(step[-1], -self._max_count, self._max_count))):
+            m.d.sync += left.eq(1)
+        with m.If(left):
+            m.d.sync += count.eq(count)
+        with m.If(complete):
+            m.d.sync += left.eq(0)
+        m.d.sync += beyond.eq(self.beyond)
+        return Mux(left, Mux(count[-1], -self._max_count, self._max_count), count), left | beyond

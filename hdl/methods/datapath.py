@@ -8,7 +8,7 @@ from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Member, Out
 
 from tachometry.hdl.output.update import VELOCITIES, update_layout, update_stream
-from tachometry.spec import TachometerSpec
+from tachometry.spec import MTachometer, STachometer, TachometerSpec
 
 
 class Datapath(Protocol):
@@ -69,7 +69,8 @@ def stamped(spec: TachometerSpec) -> dict[str, int]:
     return {"stamp": spec.widths.stamp} if spec.widths.stamp else {}
 
 
-def quotients(spec: TachometerSpec) -> dict[str, tuple[int, int]]:
-    """Return bits of each velocity of an update, and which way it is rounded."""
-    members = update_layout(spec).members
-    return {name: (members[name].width, towards) for name, towards in VELOCITIES.items() if name in members}
+def quotients(spec: STachometer | MTachometer) -> dict[str, tuple[int, int, int]]:
+    """Return the velocities of an update as quotients: bits, way of rounding, and what is added to the numerator."""
+    members, margin = update_layout(spec).members, spec.form.margin
+    each = ((name, towards) for name, towards in VELOCITIES.items() if name in members)
+    return {name: (members[name].width, towards, towards * margin) for name, towards in each}

@@ -1,6 +1,6 @@
 """The window of a measurement: its length and the pulse numbers at its ends."""
 
-from amaranth import Const, Module, Mux, Signal, signed
+from amaranth import Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -86,17 +86,20 @@ class IntervalAccumulator(wiring.Component):
         domain = m.d.sync if self._seldom else m.d.comb
         domain += known.eq((opening if self._seldom else opens) - (last << 1) if self._cancel else -last)
         m.d.comb += self.numerator.eq(known + self.next_count)
+        self._rest(m, longest & ~opening.any())
+        return m
 
-        silent = ~last.any()
+    def _rest(self, m: Module, longest: Value) -> None:
+        """Report rest from the tick on in which it is certain; `longest`: a longest window opened without a count."""
+        silent = ~self.pulse_count.any()
         was_silent = Signal(init=1)  # m_e(i−1) is 0
         rests = Signal()
         nearly = Signal()  # the last tick ended a longest window, in which only the opening tick had a count
         m.d.comb += self.stalled.eq(
             # A longest window without an alteration goes on as it began, but for its opening tick; and a silence begins
             # in the tick that opens a window, or in the one after it.
-            Mux(self.tick, silent & (rests | nearly | (longest & ~opening.any() & was_silent)), rests)
+            Mux(self.tick, silent & (rests | nearly | (longest & was_silent)), rests)
         )
         m.d.sync += [was_silent.eq(silent), rests.eq(self.stalled)]
         with m.If(self.tick):
             m.d.sync += nearly.eq(self.forced & silent)
-        return m

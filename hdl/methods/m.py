@@ -104,7 +104,6 @@ class MMethod(wiring.Component):
                 numerator_width=spec.form.numerator_width,
                 tag=self._tag,
                 serial=spec.latency.serial,
-                margin=spec.form.margin,
                 constant=spec.average,
             )
 
@@ -158,13 +157,12 @@ class MMethod(wiring.Component):
         velocities, finer = quotients(self._spec), self._spec.bound.error_bits
         left = shift - finer
         valid = Signal()
-        layout = {name: signed(width) for name, (width, _) in velocities.items()} | self._tag.members
+        layout = {name: signed(width) for name, (width, _, _) in velocities.items()} | self._tag.members
         new = registers(data.StructLayout(layout), "new")
         m.d.sync += valid.eq(self.tick)
         with m.If(self.tick):
             m.d.sync += [
-                new[name].eq(((total << finer) + count * self._spec.form.margin) << left)
-                for name, (_, count) in velocities.items()
+                new[name].eq(((total << finer) + margin) << left) for name, (_, _, margin) in velocities.items()
             ]
             m.d.sync += [new[name].eq(known[name]) for name in self._tag.members]
         return valid, new

@@ -13,6 +13,15 @@ from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.methods.timed import TimedTachometer
 
 
+def _bound_divider(spec: TimedTachometer) -> Divider:
+    scale_bits = spec.widths.native_frac_bits - spec.bound.error_bits
+    return Divider(
+        divisor_width=(spec.form.max_interval + 1).bit_length(),
+        integer_bits=spec.form.quotient_bits - scale_bits,
+        scale_bits=scale_bits,
+    )
+
+
 class QuotientVelocity(wiring.Component):
     """Divides distance by time, rounds, and holds the result; between measurements the velocity may decay.
 
@@ -26,7 +35,7 @@ class QuotientVelocity(wiring.Component):
 
     def __init__(self, spec: TimedTachometer) -> None:
         self._spec = spec
-        f, error_bits = spec.widths.native_frac_bits, spec.bound.error_bits
+        f = spec.widths.native_frac_bits
         # Distances are divided in half counts.
         self.divider = Divider(
             divisor_width=spec.widths.interval,
@@ -36,14 +45,7 @@ class QuotientVelocity(wiring.Component):
             # Of 1½ counts, in half counts.
             zeros=(spec.form.timer_periods & -spec.form.timer_periods).bit_length() - 1,
         )
-        self.bound_dividers = {
-            name: Divider(
-                divisor_width=(spec.form.max_interval + 1).bit_length(),
-                integer_bits=spec.form.quotient_bits - (f - error_bits),
-                scale_bits=f - error_bits,
-            )
-            for name in (BOUNDS if spec.bounds else ())
-        }
+        self.bound_dividers = {name: _bound_divider(spec) for name in (BOUNDS if spec.bounds else ())}
         super().__init__(
             {
                 # In the next clock
@@ -76,6 +78,28 @@ class QuotientVelocity(wiring.Component):
         new = registers(self.updates.p.shape(), "new")
         m.d.comb += self.updates.p.eq(new)
         m.submodules.divider = divider = self.divider
+        measuring, forced, beyond = self._start(m)
+        nearer, beyond_most, velocity = self._bounded(m, measuring, new.velocity, measuring & self._too_far(m))
+        update = Signal()
+        m.d.comb += update.eq(divider.done & (measuring | nearer if spec.form.decays else 1))
+        m.d.sync += self.updates.valid.eq(update)
+        with m.If(update):
+            m.d.sync += [new.velocity.eq(velocity), new.interval.eq(divider.by), new.forced.eq(forced)]
+            if spec.form.flags_range:
+                m.d.sync += new.out_of_range.eq(beyond | beyond_most)
+        if spec.widths.stamp:
+            stamp = Signal(spec.widths.stamp, reset_less=True)
+            with m.If(divider.start):
+                m.d.sync += stamp.eq(self.stamp)
+            with m.If(update):
+                m.d.sync += new.stamp.eq(stamp)
+        if spec.bounds:
+            self._bounds(m, new, update)
+        return m
+
+    def _start(self, m: Module) -> tuple[Signal, Signal, Signal]:
+        """Start the divider; return whether it measures, whether a 0 is forced, and whether the speed is too high."""
+        spec, divider = self._spec, self.divider
         measuring = Signal()
         start = Signal()
         if spec.form.decays:
@@ -97,24 +121,7 @@ class QuotientVelocity(wiring.Component):
         forced, beyond = (Signal(name=name, reset_less=True) for name in ("forced", "beyond"))
         with m.If(start):
             m.d.sync += [measuring.eq(~self.decays), forced.eq(~self.ends), beyond.eq(self.beyond_in)]
-
-        nearer, beyond_most, velocity = self._bounded(m, measuring, new.velocity, measuring & self._too_far(m))
-        update = Signal()
-        m.d.comb += update.eq(divider.done & (measuring | nearer if spec.form.decays else 1))
-        m.d.sync += self.updates.valid.eq(update)
-        with m.If(update):
-            m.d.sync += [new.velocity.eq(velocity), new.interval.eq(divider.by), new.forced.eq(forced)]
-            if spec.form.flags_range:
-                m.d.sync += new.out_of_range.eq(beyond | beyond_most)
-        if spec.widths.stamp:
-            stamp = Signal(spec.widths.stamp, reset_less=True)
-            with m.If(divider.start):
-                m.d.sync += stamp.eq(self.stamp)
-            with m.If(update):
-                m.d.sync += new.stamp.eq(stamp)
-        if spec.bounds:
-            self._bounds(m, new, update)
-        return m
+        return measuring, forced, beyond
 
     def _too_far(self, m: Module) -> Value:
         """Tell, while a distance is divided, whether it is more than the divider takes.
@@ -156,13 +163,7 @@ class QuotientVelocity(wiring.Component):
         negative: Value = velocity[-1]
         bounded: Value = ~measuring
         if spec.form.saturates:
-            negative = Signal(name="negative", reset_less=True)
-            most = Signal(reset_less=True)
-            limit = spec.widths.max_count << spec.widths.native_frac_bits
-            m.d.sync += most.eq(Mux(negative, divider.next_digit_of(-limit), divider.next_digit_of(limit)))
-            sign = Mux(self.decays, self.negative_before, self.distance[-1])
-            with m.If(divider.start):
-                m.d.sync += [negative.eq(sign), most.eq(~sign)]
+            negative, most = self._greatest(m)
             bound = Mux(measuring, most, bound) if spec.form.decays else most
             bounded = Const(1)
         m.d.comb += [
@@ -177,6 +178,18 @@ class QuotientVelocity(wiring.Component):
         with m.If(divider.start):
             m.d.sync += Cat(nearer, farther).eq(0)
         return nearer, farther if spec.form.saturates else Const(0), result
+
+    def _greatest(self, m: Module) -> tuple[Signal, Signal]:
+        """Return the sign of the quotient, and the digit of the greatest speed with this sign."""
+        divider = self.divider
+        negative = Signal(reset_less=True)
+        most = Signal(reset_less=True)
+        limit = self._spec.widths.max_count << self._spec.widths.native_frac_bits
+        m.d.sync += most.eq(Mux(negative, divider.next_digit_of(-limit), divider.next_digit_of(limit)))
+        sign = Mux(self.decays, self.negative_before, self.distance[-1])
+        with m.If(divider.start):
+            m.d.sync += [negative.eq(sign), most.eq(~sign)]
+        return negative, most
 
     def _bounds(self, m: Module, new: data.View, update: Value) -> None:
         """Add two more dividers, with the latency of the first, for the least and the greatest possible velocity."""

@@ -54,22 +54,14 @@ class RairanMethod(wiring.Component):
         m = Module()
         spec = self._spec
         m.submodules.counters = counters = self.counters
-        m.submodules.table = memory = Memory(shape=spec.form.table_width, depth=spec.form.depth, init=spec.form.table)
-        read = memory.read_port()
         tag = [counters.n, counters.high, counters.backward, counters.forced, counters.at_rest]
         if spec.paper_exact:
             tag += [counters.n_ep1, counters.n_dt1]
         if spec.adaptive:
             tag += [counters.shift]
         update, n, high, backward, forced, at_rest, *more = delay(m, counters.update, *tag, clocks=2)
-        entry = Signal(spec.form.table_width)
-        m.d.sync += entry.eq(read.data)
-        m.d.comb += [
-            counters.step.eq(self.step_now),
-            self.last.eq(counters.last),
-            self.beyond.eq(counters.beyond),
-            read.addr.eq(counters.n[: len(read.addr)]),
-        ]
+        m.d.comb += [counters.step.eq(self.step_now), self.last.eq(counters.last), self.beyond.eq(counters.beyond)]
+        entry = self._entry(m)
         if counters.dt is not None:
             m.d.comb += self.tick_shift.eq(*delay(m, counters.dt.shift, clocks=2))
         m.d.sync += self.updates.valid.eq(update)
@@ -77,7 +69,7 @@ class RairanMethod(wiring.Component):
         low, counts = Mux(high | ~n.any(), 1, n), Mux(high, n + 1, n.any())
         new = registers(self.updates.p.shape(), "new", init={"n_dt1": 1})
         m.d.comb += self.updates.p.eq(new)
-        stamp = delay(m, self.stamp) if spec.widths.stamp else ()
+        stamp = delay(m, self.stamp) if spec.widths.stamp else []
         # At rest no update corrects what an upset has done to the outputs.
         shown = update | at_rest
         with m.If(shown):
@@ -91,13 +83,22 @@ class RairanMethod(wiring.Component):
             ]
             if spec.adaptive:
                 m.d.sync += new.dt_shift.eq(shift)
-            if spec.widths.stamp:
-                m.d.sync += new.stamp.eq(*stamp)
+            m.d.sync += [new.stamp.eq(value) for value in stamp]
             if "rests" in new.shape().members:
                 m.d.sync += new.rests.eq(at_rest)
         if spec.bounds:
             self._bounds(m, new, shown=shown, backward=backward)
         return m
+
+    def _entry(self, m: Module) -> Signal:
+        """Return the entry of the table, two clocks after the counters have changed."""
+        form = self._spec.form
+        m.submodules.table = memory = Memory(shape=form.table_width, depth=form.depth, init=form.table)
+        read = memory.read_port()
+        entry = Signal(form.table_width)
+        m.d.sync += entry.eq(read.data)
+        m.d.comb += read.addr.eq(self.counters.n[: len(read.addr)])
+        return entry
 
     def _bounds(self, m: Module, new: data.View, *, shown: Value, backward: Signal) -> None:
         """Look up both bounds; backwards, they are negated and exchanged."""

@@ -69,6 +69,11 @@ class RairanCounters(wiring.Component):
                 m.d.sync += late.eq(0)
             self._update_to_the_letter(m, opens)
             return m
+        self._count_windows(m, pulse, opens, late, due)
+        return m
+
+    def _count_windows(self, m: Module, pulse: Signal, opens: Signal, late: Signal, due: Value) -> None:
+        """Open a window at the first count after dt, and at one of the other sign."""
         moved = Signal()
         turns = Signal()
         fresh = Signal()  # the first count after reset or rest
@@ -92,7 +97,6 @@ class RairanCounters(wiring.Component):
                 self.dt.n.eq(measured),
             ]
         self._update(m, pulse=pulse, opens=opens, turns=turns, fresh=fresh)
-        return m
 
     def _of_dt(self, constant: Callable[[int], int]) -> Value | int:
         """Return a constant that depends on k of dt·2^k."""
@@ -150,7 +154,7 @@ class RairanCounters(wiring.Component):
         return held
 
     def _is(self, constant: Callable[[int], int]) -> Value:
-        """Return Cdt is a constant that depends on k of dt·2^k."""
+        """Return whether Cdt equals a constant that depends on k of dt·2^k."""
         return self.c_dt == self._of_dt(constant)
 
     def _update(self, m: Module, *, pulse: Signal, opens: Signal, turns: Signal, fresh: Signal) -> None:
@@ -173,44 +177,36 @@ class RairanCounters(wiring.Component):
         more = (self.c_dt + ~n[:bits] + in_step)[bits] & ~n[bits:].any()
         falls = self._at_end(m, Mux(self.high, waited.any(), more & self.n.any()) if spec.bound_decay else Const(0))
 
-        def set_(
-            n: Value | int,
-            *,
-            update: Value | int = 1,
-            high: int = 0,
-            forced: int = 0,
-            at_rest: int = 0,
-            loose: Value | int = 0,
-            unsynced: Value | int = 0,
-        ) -> None:
-            if self.dt is not None:
-                m.d.sync += self.shift.eq(self.dt.shift)
-            if spec.bounds:
-                m.d.sync += [self.loose.eq(loose), self.unsynced.eq(unsynced)]
-            m.d.sync += [
-                self.update.eq(update),
-                self.n.eq(n),
-                self.high.eq(high),
-                self.forced.eq(forced),
-                self.at_rest.eq(at_rest),
-            ]
-
         m.d.sync += self.update.eq(0)
         with m.If(turns):
-            set_(0)
+            self._set(m, 0)
         with m.Elif(self.last & several):
-            set_(self.c_more, high=1)
+            self._set(m, self.c_more, high=1)
         with m.Elif(self.last & (pulse | (one & self.high))):
             # Ndt1 ← 1 by a count just at the end of dt, or Nep1 ← 1.
-            set_(1, loose=~pulse)
+            self._set(m, 1, loose=~pulse)
         with m.Elif(opens & ~fresh & ((self.c_dt != 1) | ~self.high)):
-            set_(self.c_dt, unsynced=~in_step)
+            self._set(m, self.c_dt, unsynced=~in_step)
         with m.Elif(waits & self.longest):
             # At rest no update would correct it after an upset.
-            set_(0, update=~self.rest, forced=1, at_rest=1)
+            self._set(m, 0, update=~self.rest, forced=1, at_rest=1)
         if spec.bound_decay:
             with m.Elif(waits & falls):
-                set_(waited, forced=1, loose=1)
+                self._set(m, waited, forced=1, loose=1)
+
+    def _set(self, m: Module, n: Value | int, **flags: Value | int) -> None:
+        """Set the estimate, its flags, and `update` unless that is given; what is not given becomes 0."""
+        if self.dt is not None:
+            m.d.sync += self.shift.eq(self.dt.shift)
+        if self._spec.bounds:
+            m.d.sync += [self.loose.eq(flags.get("loose", 0)), self.unsynced.eq(flags.get("unsynced", 0))]
+        m.d.sync += [
+            self.update.eq(flags.get("update", 1)),
+            self.n.eq(n),
+            self.high.eq(flags.get("high", 0)),
+            self.forced.eq(flags.get("forced", 0)),
+            self.at_rest.eq(flags.get("at_rest", 0)),
+        ]
 
     def _update_to_the_letter(self, m: Module, opens: Signal) -> None:
         """Follow lines 5 to 9 of Table 1."""

@@ -46,7 +46,6 @@ class SMethod(wiring.Component):
             numerator_width=spec.form.numerator_width,
             tag=data.StructLayout({"forced": 1, **stamped(spec), **({"bounds_valid": 1} if spec.bounds else {})}),
             serial=spec.latency.serial,
-            margin=spec.form.margin,
         )
 
     @property

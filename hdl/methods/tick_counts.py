@@ -47,6 +47,14 @@ class TickCounts(wiring.Component):
                 "length": Out(range(form.longest_tick + 1), init=form.tick_cycles),  # clocks of the tick
             }
         )
+        # Those of the tick that has not ended.
+        self.open_number = Signal.like(self.number)
+        self.open_times = Signal.like(self.times)
+        self.open_places = Signal.like(self.places)
+        self.open_kind = Signal.like(self.kind)
+        self.open_down = Signal.like(self.down)
+        self.open_last = Signal.like(self.last)
+        self.open_moved = Signal.like(self.moved)
 
     @property
     def idle(self) -> tuple[Idle, ...]:
@@ -56,22 +64,18 @@ class TickCounts(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        form = self._form
-        of_tick = ("number", "times", "places", "kind", "down", "last", "moved")
-        number, times, places, kind, down, last, moved = (
-            Signal.like(getattr(self, name), name=f"open_{name}") for name in of_tick
-        )
+        number, moved, places = self.open_number, self.open_moved, self.open_places
         fresh = Signal()
         position = Signal(2)
         counts, backward = self.step.any(), self.step[-1]
         takes = Signal()
-        m.d.comb += takes.eq(counts & (number != form.most_number))
+        m.d.comb += takes.eq(counts & (number != self._form.most_number))
         # A count backward has its place one below that of a count forward.
-        lower = Cat(bit ^ (backward & ~moved[:place].any()) for place, bit in enumerate(moved[: form.number_bits + 1]))
+        lower = Cat(bit ^ (backward & ~moved[:at].any()) for at, bit in enumerate(moved[: self._form.number_bits + 1]))
         place = Cat(C(0, 1), lower & takes.replicate(len(lower))).as_signed()  # and one more
-        next_last, next_times, next_moved, next_places, waited = _sums(
-            (last, C(0, 1), C(1, 1)),
-            (times, number & ~1, number[0]),
+        last, times, next_moved, next_places, waited = _sums(
+            (self.open_last, C(0, 1), C(1, 1)),
+            (self.open_times, number & ~1, number[0]),
             (moved, backward.replicate(len(moved)), counts & ~backward),
             (places, place, takes),
             (self.elapsed, C(0, 1), self.elapsed != self._max_ticks),
@@ -79,11 +83,11 @@ class TickCounts(wiring.Component):
         m.d.sync += [
             fresh.eq(self.tick),
             position.eq(position + self.step),
-            last.eq(Mux(counts, 0, next_last)),
-            times.eq(Mux(fresh, 0, next_times)),
+            self.open_last.eq(Mux(counts, 0, last)),
+            self.open_times.eq(Mux(fresh, 0, times)),
         ]
         with m.If(takes):
-            m.d.sync += [kind.eq((position - backward)[:2]), down.eq(backward)]
+            m.d.sync += [self.open_kind.eq((position - backward)[:2]), self.open_down.eq(backward)]
         # These begin anew with the tick: as a reset of registers that takes no cells.
         next_number = number + takes
         m.d.sync += [number.eq(next_number), moved.eq(next_moved), places.eq(next_places)]
@@ -95,17 +99,21 @@ class TickCounts(wiring.Component):
                 self.places.eq(next_places),
                 self.elapsed.eq(Mux(self.number.any(), 1, waited)),
             ]
+        self._show(m, fresh, position)
+        return m
+
+    def _show(self, m: Module, fresh: Signal, position: Signal) -> None:
+        """Show the counts of the tick that has ended."""
         with m.If(fresh):
             m.d.sync += [
-                self.times.eq(times),
-                self.kind.eq(kind),
-                self.down.eq(down),
-                self.last.eq(last),
+                self.times.eq(self.open_times),
+                self.kind.eq(self.open_kind),
+                self.down.eq(self.open_down),
+                self.last.eq(self.open_last),
                 self.end.eq(position),
             ]
-        if form.external:
+        if self._form.external:
             length = Signal.like(self.length, name="open_length", init=1)
             m.d.sync += length.eq(length + 1)
             with m.If(self.tick):
                 m.d.sync += [self.length.eq(length), length.eq(1)]
-        return m

@@ -67,26 +67,7 @@ class TimedDatapath(wiring.Component):
         spec = self._spec
         m.submodules.gap_timer = timer = self.gap_timer
         m.submodules.quotient_velocity = quotient = self.quotient_velocity
-        if spec.form.on_lattice:
-            negative, was_negative = self.pulse_count[-1], self._was_negative
-            m.d.comb += [
-                self._same.eq(1 if spec.paper_exact else negative == was_negative),
-                timer.count_before.eq(self.coming & self.next_count.any()),
-            ]
-            with m.If(timer.count):
-                m.d.sync += was_negative.eq(negative)
-            decay = Mux(quotient.decays, Mux(quotient.negative_before, -3, 3), 0)
-            addend = Mux(quotient.ends, self._way << 1, decay)
-        else:
-            m.submodules.count_way = way = self.count_way
-            m.d.comb += [
-                way.step_before.eq(self.step_before),
-                way.decays_before.eq(quotient.decays_before),
-                way.negative_before.eq(quotient.negative_before),
-                # Bit 0 of a step tells that it is one.
-                timer.count_before.eq(self.step_before[0]),
-            ]
-            addend, was_negative = way.way, way.negative
+        addend, was_negative = self._added(m)
         ends_before, before, distance, time = self._window(m)
         wiring.connect(m, quotient.updates, wiring.flipped(self.updates))
         m.d.comb += [
@@ -111,3 +92,25 @@ class TimedDatapath(wiring.Component):
                 quotient.known.eq(~quotient.beyond_in & (begun | timer.opened)),
             ]
         return m
+
+    def _added(self, m: Module) -> tuple[Value, Value]:
+        """Return the part of the dividend that is known last, in half counts, and the sign of the last count."""
+        timer, quotient = self.gap_timer, self.quotient_velocity
+        if not self._spec.form.on_lattice:
+            m.submodules.count_way = way = self.count_way
+            m.d.comb += [
+                way.step_before.eq(self.step_before),
+                way.decays_before.eq(quotient.decays_before),
+                way.negative_before.eq(quotient.negative_before),
+                timer.count_before.eq(self.step_before[0]),  # there is a step
+            ]
+            return way.way, way.negative
+        negative, was_negative = self.pulse_count[-1], self._was_negative
+        m.d.comb += [
+            self._same.eq(1 if self._spec.paper_exact else negative == was_negative),
+            timer.count_before.eq(self.coming & self.next_count.any()),
+        ]
+        with m.If(timer.count):
+            m.d.sync += was_negative.eq(negative)
+        decay = Mux(quotient.decays, Mux(quotient.negative_before, -3, 3), 0)
+        return Mux(quotient.ends, self._way << 1, decay), was_negative

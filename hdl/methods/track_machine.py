@@ -123,6 +123,11 @@ class TrackMachine(wiring.Component):
                 "stalled": Out(1),  # of a tick without a count
             }
         )
+        self._store_program()
+        self._declare()
+
+    def _store_program(self) -> None:
+        program = self._program
         self._layout = layout = _layout(program)
         # Nothing needs them to be in order, so a shift register with feedback takes the place of a counter.
         self._states = at = states_of(len(program.code.instructions).bit_length())
@@ -140,12 +145,11 @@ class TrackMachine(wiring.Component):
         self._fetch = self._rom.read_port()
         self._read = self._words.read_port()
         self._write = self._words.write_port()
-        self._declare(depth)
 
-    def _declare(self, depth: int) -> None:
+    def _declare(self) -> None:
         # Fetch, read, execute.
         self.first = Signal(init=1)  # the words are to be reset
-        self.pc = Signal(range(depth), init=self._state("reset"))
+        self.pc = Signal(range(len(self._states) + 1), init=self._state("reset"))
         self.place = Signal.like(self.pc)  # of the instruction that is fetched
         self.fetched = Signal()
         self.active = Signal()  # `now` is executed

@@ -1,5 +1,6 @@
 """The low-pass filter for fluctuating measurement time."""
 
+from contextlib import nullcontext
 from typing import Any
 
 from amaranth import Cat, Const, Module, Mux, Signal, signed
@@ -21,6 +22,23 @@ class _Waiting:
         self.take = Signal()  # the filter begins with it
         self.following = registers(layout, "following", reset_less=True)
         self.interval = Signal.like(elapsed.age, reset_less=True)
+
+
+class _Working:
+    """Holds the signals of a product of y − u and a factor."""
+
+    def __init__(self, spec: low_pass.LowPass, layout: Any) -> None:
+        width = spec.native_width + spec.extra_bits
+        self.working = Signal()
+        self.adding = Signal()
+        self.rounding = Signal()
+        self.update = registers(layout, "update", reset_less=True)
+        self.y = Signal(signed(width))  # in 2^−extra of an LSB
+        self.d = Signal(signed(width + 1), reset_less=True)
+        self.total = Signal.like(self.d, reset_less=True)
+        self.factor = Signal(spec.factor_bits, reset_less=True)
+        self.step = Signal(range(spec.factor_bits + 2), reset_less=True)
+        self.second = Signal(reset_less=True)  # of two factors
 
 
 class LowPass(wiring.Component):
@@ -80,54 +98,42 @@ class LowPass(wiring.Component):
             ]
 
     def _filter(self, m: Module, next_one: _Waiting, filtered: Any) -> None:
-        """Move the state, in 2^−extra of an LSB, towards the update, a bit of the factor a clock."""
-        spec, layout = self._spec, self.updates.p.shape()
+        """Move the state towards the update, a bit of the factor a clock."""
+        spec, at = self._spec, _Working(self._spec, self.updates.p.shape())
         extra, bits = spec.extra_bits, spec.factor_bits
-        take, following = next_one.take, next_one.following
-        working = Signal()
-        adding = Signal()
-        rounding = Signal()
-        update = registers(layout, "update", reset_less=True)
-        y = Signal(signed(spec.native_width + extra))
-        d = Signal(signed(spec.native_width + extra + 1), reset_less=True)
-        total = Signal.like(d, reset_less=True)
-        factor = Signal(bits, reset_less=True)
-        step = Signal(range(bits + 2), reset_less=True)
-        second = Signal(reset_less=True)
+        take, following, step, total = next_one.take, next_one.following, at.step, at.total
         clear = following.rests if self._clears else Const(0)
         low, *high = self._factors(m, take, next_one.interval)
         last = step == bits + 1
-        m.d.comb += take.eq(next_one.waiting & ~working & ~adding)
+        m.d.comb += take.eq(next_one.waiting & ~at.working & ~at.adding)
+        addend = Mux(at.factor[0], at.d, 0)
         m.d.sync += [
             step.eq(step + 1),
-            factor.eq(factor >> 1),
+            at.factor.eq(at.factor >> 1),
             # The last addition rounds.
-            total.eq((Cat(step == bits, total).as_signed() + Cat(step == bits, Mux(factor[0], d, 0)).as_signed()) >> 2),
-            adding.eq(working & last & (second if high else 1)),
-            rounding.eq(adding),
-            self.filtered.valid.eq(rounding),
+            total.eq((Cat(step == bits, total).as_signed() + Cat(step == bits, addend).as_signed()) >> 2),
+            at.adding.eq(at.working & last & (at.second if high else 1)),
+            at.rounding.eq(at.adding),
+            self.filtered.valid.eq(at.rounding),
         ]
         with m.If(step == 0):
-            m.d.sync += [factor.eq(Mux(second, high[0], low) if high else low), total.eq(0)]
+            m.d.sync += [at.factor.eq(Mux(at.second, high[0], low) if high else low), total.eq(0)]
         with m.If(last):
-            m.d.sync += [step.eq(0), d.eq(total), second.eq(1)]
-            if high:
-                with m.If(second):
-                    m.d.sync += working.eq(0)
-            else:
-                m.d.sync += working.eq(0)
+            m.d.sync += [step.eq(0), at.d.eq(total), at.second.eq(1)]
+            with m.If(at.second) if high else nullcontext():
+                m.d.sync += at.working.eq(0)
         with m.If(take):
             m.d.sync += [
-                working.eq(1),
+                at.working.eq(1),
                 step.eq(0),
-                second.eq(0),
-                update.eq(following),
-                d.eq(Mux(clear, 0, y - (following.velocity << extra))),
+                at.second.eq(0),
+                at.update.eq(following),
+                at.d.eq(Mux(clear, 0, at.y - (following.velocity << extra))),
             ]
-        with m.If(adding):
-            m.d.sync += y.eq((update.velocity << extra) + d)
-        with m.If(rounding):
-            m.d.sync += [filtered.eq(update), filtered.velocity.eq((y + (1 << (extra - 1))) >> extra)]
+        with m.If(at.adding):
+            m.d.sync += at.y.eq((at.update.velocity << extra) + at.d)
+        with m.If(at.rounding):
+            m.d.sync += [filtered.eq(at.update), filtered.velocity.eq((at.y + (1 << (extra - 1))) >> extra)]
 
     def _factors(self, m: Module, take: Signal, interval: Signal) -> list[Signal]:
         """Return E of each table, valid in the clock after `take` and held until the next."""

@@ -22,7 +22,7 @@ class FlatQuotient(wiring.Component):
     def __init__(self, spec: STachometer, *, serial: bool, towards: int = 0) -> None:
         self.box = Quotient(
             spec.form.reciprocal,
-            quotients={"velocity": (spec.widths.velocity, towards)},
+            quotients={"velocity": (spec.widths.velocity, towards, 0)},
             numerator_width=spec.form.numerator_width,
             tag=data.StructLayout({"mark": 1}),
             serial=serial,

@@ -40,26 +40,31 @@ _INTERFACES = {
 BUSES = (*_INTERFACES, "none")
 
 
+def _holes(spec: AnySpec, bus: Bus | None) -> dict[str, Any]:
+    if bus is None:
+        return {"clock": "clk", "reset": "rst", "polarity": "ACTIVE_HIGH", "bus": "", "irq": False}
+    there, registers = _INTERFACES[bus.name], registers_on(spec, bus)
+    return {
+        "clock": there.clock,
+        "reset": there.reset,
+        "polarity": "ACTIVE_LOW",
+        "bus": there.name,
+        "registers": registers,
+        "irq": registers.irq,
+        "range": max(_LEAST_RANGE, 1 << registers.address_width),
+    }
+
+
 def vivado(spec: AnySpec, name: str, bus: Bus | None, made: Mapping[str, str]) -> dict[str, str]:
     """Return an IP in the folder `NAME_ip`, whose module contains the core, with copies, as `Target.files` says."""
     ports = ports_on(spec, bus)
     there = _INTERFACES[bus.name] if bus else None
     outer = {port.name: port.name for port in ports}
-    holes: dict[str, Any] = {"clock": "clk", "reset": "rst", "polarity": "ACTIVE_HIGH", "bus": ""}
     kinds = {STREAM: "axis"} if spec.tachometer.stream else {}
-    if bus is not None and there is not None:
-        registers = registers_on(spec, bus)
+    if there is not None:
         outer |= {"clk": there.clock, "rst": there.reset}
         kinds = {there.name: there.kind} | kinds
-        holes = {
-            "clock": there.clock,
-            "reset": there.reset,
-            "polarity": "ACTIVE_LOW",
-            "bus": there.name,
-            "registers": registers,
-            "irq": registers.irq,
-            "range": max(_LEAST_RANGE, 1 << registers.address_width),
-        }
+    holes = _holes(spec, bus)
     clock_hz = spec.timing.clock_hz
     names = [port.name for port in ports]
     interfaces = [
@@ -70,7 +75,7 @@ def vivado(spec: AnySpec, name: str, bus: Bus | None, made: Mapping[str, str]) -
     files = render_files(
         _MADE,
         name,
-        **{"irq": False, **holes},
+        **holes,
         interfaces=interfaces,
         logical={port: f"{kind}:1.0 {one} {its[port]}" for one, kind, its in interfaces for port in its},
         method=spec.tachometer.method,
