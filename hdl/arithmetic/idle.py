@@ -1,7 +1,7 @@
 """A simulation may skip clocks in which only registers move whose way is known, and nothing else happens."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Protocol, Self, runtime_checkable
 
 
@@ -26,7 +26,7 @@ class Idle:
                 return tuple(map(outside, value))
             return f"{box}.{value}" if value and isinstance(value, str) else value
 
-        return replace(self, **{field.name: outside(getattr(self, field.name)) for field in fields(self)})
+        return replace(self, **{name: outside(value) for name, value in vars(self).items()})
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from tachometry.hdl.axes.turns import Turns
 from tachometry.hdl.output.update import update_layout
 from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import by_name, only_if
 from tachometry.spec.methods.axes import AxesSpec
 from tachometry.spec.methods.s_axis import DECIDE, READ, SAxis
 
@@ -30,7 +30,8 @@ class _Turn:
         self.decides = datapath.turns.step[DECIDE]
         self.after = Signal(kept)
         handed = ("count", "handed_position") if resets else ("count",)
-        self.handed = Signal(data.StructLayout({name: getattr(datapath, name).shape() for name in handed}))
+        shapes = {name: port.shape() for name, port in by_name(datapath, handed).items()}
+        self.handed = Signal(data.StructLayout(shapes))
         self.before = Signal(kept)
 
 
@@ -112,7 +113,7 @@ class AxesDatapath(wiring.Component):
         m.d.comb += [
             turns.begin.eq(self.complete & (self.slot == 0)),
             write_count.addr.eq(self.slot),
-            *(write_count.data[name].eq(getattr(self, name)) for name in shape.members),
+            *(write_count.data[name].eq(port) for name, port in by_name(self, shape.members).items()),
             write_count.en.eq(self.complete),
             read_count.addr.eq(turns.axis),
         ]

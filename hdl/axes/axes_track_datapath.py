@@ -15,7 +15,7 @@ from tachometry.hdl.axes.track_turns import SHOWN_AFTER, TrackTurns, turn_layout
 from tachometry.hdl.output.update import shown_layout, update_layout
 from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import by_name, follow, only_if
 from tachometry.spec.methods.axes import AxesSpec
 from tachometry.spec.methods.axis import output_cycles
 from tachometry.spec.methods.track_axis import TrackAxis
@@ -77,7 +77,7 @@ class AxesTrackDatapath(wiring.Component):
         length = self._length(m)
         for number, turns in enumerate(self.machines):
             m.submodules[f"machine_{number}"] = turns
-            m.d.comb += [getattr(turns, name).eq(getattr(self, name)) for name in ("complete", "slot", "count")]
+            follow(m, turns, self, ("complete", "slot", "count"))
             m.d.comb += turns.length.eq(length)
             if self._axis.front_end.index_resets:
                 m.d.comb += turns.handed_position.eq(self.handed_position)
@@ -93,8 +93,8 @@ class AxesTrackDatapath(wiring.Component):
             self.tick.eq(valid),
             self.velocity_valid.eq(valid),
             self.axis.eq(whose),
-            *(getattr(self, name).eq(ticks[name]) for name in tick_layout(self._axis).members),
-            *(getattr(self, name).eq(shown[name]) for name in self._update.members),
+            *(port.eq(ticks[name]) for name, port in by_name(self, tick_layout(self._axis).members).items()),
+            *(port.eq(shown[name]) for name, port in by_name(self, self._update.members).items()),
         ]
         return m
 
@@ -109,11 +109,12 @@ class AxesTrackDatapath(wiring.Component):
         reads = delay(m, *comes)
         adds = delay(m, *reads)
         shows = delay(m, *adds)
-        m.d.comb += read.addr.eq(self._of(comes, "axis"))
+        m.d.comb += read.addr.eq(self._of(comes, [turns.axis for turns in self.machines]))
         (of_axis,) = delay(m, read.addr, clocks=SHOWN_AFTER - 1)
         known = Signal(turn_layout(self._axis))
         found = Signal(turn_layout(self._axis))
-        m.d.comb += [known.eq(self._of(reads, "turn")), found.eq(self._of(shows, "turn"))]
+        turns = [Value.cast(turns.turn) for turns in self.machines]
+        m.d.comb += [known.eq(self._of(reads, turns)), found.eq(self._of(shows, turns))]
         after, counts = self._added(m, read.data, known)
         m.d.comb += [write.addr.eq(of_axis), write.data.eq(after), write.en.eq(reduce(or_, shows))]
         return self._held(m, write.en, of_axis, after, counts, found)
@@ -165,9 +166,9 @@ class AxesTrackDatapath(wiring.Component):
             ]
         return valid, whose, ticks, new
 
-    def _of(self, strobes: Sequence[Signal], name: str) -> Value:
-        """Return what that machine has whose strobe is high; two never are at once."""
-        values = [Value.cast(getattr(turns, name)) for turns in self.machines]
+    @staticmethod
+    def _of(strobes: Sequence[Signal], values: Sequence[Value]) -> Value:
+        """Return the value of the machine whose strobe is high; two never are at once."""
         return reduce(lambda rest, one: Mux(one[0], one[1], rest), zip(strobes[1:], values[1:], strict=True), values[0])
 
     def _length(self, m: Module) -> Signal:

@@ -8,6 +8,7 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import by_name
 
 
 class AxisFilter(wiring.Component):
@@ -44,18 +45,19 @@ class AxisFilter(wiring.Component):
         m.submodules.memory = memory = Memory(shape=kept, depth=self._slots, init=[])
         read = memory.read_port()
         write = memory.write_port()
-        lines = (getattr(self, f"level_{name}") for name in self._lines)
+        lines = by_name(self, self._lines, "level_{}").values()
         round_ = self.slot, self.first, self.last, self.ready, self.real
         slot, first, last, ready, real, *levels = delay(m, *round_, *lines, clocks=2)
         # Block RAM is slow.
         before = Signal(kept)
         after = Signal(kept)
         m.d.sync += before.eq(read.data)
+        filtered, known = by_name(self, self._lines, "filtered_{}"), by_name(self, self._lines, "known_{}")
         for name, level in zip(self._lines, levels, strict=True):
             new = self._next(m, before[name], level, name)
             m.d.sync += [
-                getattr(self, f"filtered_{name}").eq(before[name].filtered),
-                getattr(self, f"known_{name}").eq(before[name].before & real),
+                filtered[name].eq(before[name].filtered),
+                known[name].eq(before[name].before & real),
                 after[name].eq(Mux(real, new.as_value(), 0)),
             ]
         m.d.sync += [

@@ -6,6 +6,8 @@ from amaranth import Module, Shape, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import by_name
+
 
 class HeldOutputs(wiring.Component):
     """Holds every value of every axis in a register.
@@ -33,9 +35,10 @@ class HeldOutputs(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
+        new = by_name(self, self._names)
         for axis in range(self._axes):
             mine = Signal(name=f"of_{axis}")
             m.d.comb += mine.eq(self.strobe & (self.axis == axis))
             with m.If(mine):
-                m.d.sync += [getattr(self, f"{name}_{axis}").eq(getattr(self, name)) for name in self._names]
+                m.d.sync += [held.eq(new[name]) for name, held in by_name(self, new, f"{{}}_{axis}").items()]
         return m

@@ -8,7 +8,7 @@ from amaranth.lib.wiring import In, Out
 from tachometry.hdl.axes.axis_tick_counts import BLOCK, counts_layout
 from tachometry.hdl.methods.track_machine import TrackMachine
 from tachometry.hdl.output.update import update_layout
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import by_name, drive, only_if
 from tachometry.spec.formats.tracking import PLACE_BITS, WIDTH
 from tachometry.spec.methods.axes import AxesSpec
 from tachometry.spec.methods.track_axis import TrackAxis
@@ -87,7 +87,7 @@ class TrackTurns(wiring.Component):
             m.d.sync += [running.eq(1), clock.eq(-self._number * plan.apart), turn.eq(0), self.axis.eq(self._number)]
         counts, position = self._handed(m, reads)
         names = ("number", "times", "places", "last", "moved", "kind", "end", "down")
-        m.d.comb += [getattr(machine, name).eq(counts[name]) for name in names]
+        drive(m, machine, {name: counts[name] for name in names})
         m.d.comb += [machine.begin.eq(begins), machine.length.eq(self.length)]
         if n > 1:
             m.d.comb += machine.axis.eq(turn)
@@ -96,7 +96,7 @@ class TrackTurns(wiring.Component):
             self.turn.first.eq(first),
             self.turn.moved.eq(counts.moved),
             self.turn.counted.eq(counts.number.any()),
-            *(self.turn[name].eq(getattr(machine, name)) for name in _FOUND),
+            *(self.turn[name].eq(port) for name, port in by_name(machine, _FOUND).items()),
             self.turn.place.eq(machine.position_fine >> (PLACE_BITS - axis.fine_bits - 1)),
         ]
         if position is not None:
@@ -105,8 +105,8 @@ class TrackTurns(wiring.Component):
 
     def _handed(self, m: Module, reads: Value) -> tuple[data.View, Signal | None]:
         """Return counts of the axis that has its turn, and its position if an index may reset it."""
-        names = ("count", "handed_position") if self._axis.front_end.index_resets else ("count",)
-        shape = data.StructLayout({name: getattr(self, name).shape() for name in names})
+        ports = by_name(self, ("count", "handed_position") if self._axis.front_end.index_resets else ("count",))
+        shape = data.StructLayout({name: port.shape() for name, port in ports.items()})
         depth = 1 << len(self.slot)  # behind the last turn the axis is one more than there are
         m.submodules.handed_over = handed = Memory(shape=shape, depth=depth, init=[], attrs=BLOCK)
         read = handed.read_port()
@@ -114,7 +114,7 @@ class TrackTurns(wiring.Component):
         taken = Signal(shape)
         m.d.comb += [
             write.addr.eq(self.slot),
-            *(write.data[name].eq(getattr(self, name)) for name in names),
+            *(write.data[name].eq(port) for name, port in ports.items()),
             write.en.eq(self.complete),
             read.addr.eq(self.axis),
         ]

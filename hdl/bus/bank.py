@@ -10,6 +10,7 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.bus.counter import SaturatingCounter
 from tachometry.hdl.bus.native import native_port
+from tachometry.hdl.wires.ports import by_name
 from tachometry.spec.registers.field import WORD, Field, Register
 from tachometry.spec.registers.map import COUNTER_WIDTH, RegisterMap
 
@@ -51,7 +52,7 @@ class RegisterBank(wiring.Component):
         capture = self._control(m, here, hold)
         captured, lost = self._captured(m, capture)
         shown = {**captured, **self._counts(m, lost=lost), "clear": Const(0), "hold": hold, **self._settings(m, here)}
-        shown |= {field.port: getattr(self, field.port) for field in self._map.live}
+        shown |= by_name(self, (field.port for field in self._map.live))
         self._answer(m, shown)
         return m
 
@@ -69,10 +70,11 @@ class RegisterBank(wiring.Component):
 
     def _captured(self, m: Module, capture: Signal) -> tuple[dict[str, Value], Value]:
         """Return what was captured, by names, and whether an update is lost: the one before it was not captured."""
-        taken: dict[str, Value] = {port.name: getattr(self, port.name) for port in self._map.ports}
+        taken: dict[str, Value] = by_name(self, (port.name for port in self._map.ports))
         waiting = {flag: Signal(name=f"{flag}_waits") for flag in self._map.events}
+        events = by_name(self, self._map.events.values())
         for flag, waits in waiting.items():
-            taken[flag] = waits | getattr(self, self._map.events[flag])
+            taken[flag] = waits | events[self._map.events[flag]]
             m.d.sync += waits.eq(taken[flag] & ~capture)
         captured: dict[str, Value] = {
             name: Signal.like(Value.cast(value), name=f"captured_{name}", reset_less=False)
@@ -102,11 +104,12 @@ class RegisterBank(wiring.Component):
     def _settings(self, m: Module, here: dict[str, Value]) -> dict[str, Value]:
         """Return the settings by their names, as they are read."""
         read: dict[str, Value] = {}
+        settings = by_name(self, (field.port for field in self._map.settings))
         for register in self._map:
             for field in register.fields:
                 if not (field.writable and field.port):
                     continue
-                value, given = getattr(self, field.port), self.bus.write_data[field.low : field.low + field.width]
+                value, given = settings[field.port], self.bus.write_data[field.low : field.low + field.width]
                 read[field.port] = Const(0) if field.single else value
                 with m.If(self.bus.write & here[register.name]):
                     if field.single:
@@ -119,7 +122,7 @@ class RegisterBank(wiring.Component):
     def _counts(self, m: Module, *, lost: Value) -> dict[str, Value]:
         """Return the counters of COUNTERS by their names."""
         events = {"decode_errors": self.decode_error, "overflows": self.tick & self.overflow, "lost_updates": lost}
-        if hasattr(self, "tick_error"):
+        if "tick_error" in self.signature.members:
             events["tick_errors"] = self.tick_error
         counts = {}
         for name in self._map.counted:

@@ -7,7 +7,14 @@ from amaranth import Cat, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import by_name, follow
 from tachometry.spec.registers.map import RegisterMap
+
+_KINDS = {
+    "enable": In(1),  # the event raises `irq`
+    "clear": In(1),
+    "pending": Out(1),  # it waits, from the clock after it on
+}
 
 
 class Interrupts(wiring.Component):
@@ -15,15 +22,10 @@ class Interrupts(wiring.Component):
 
     def __init__(self, registers: RegisterMap, axes: int = 1) -> None:
         self._events = [*registers.interrupts]
-        kinds = {
-            "enable": In(1),  # the event raises `irq`
-            "clear": In(1),
-            "pending": Out(1),  # it waits, from the clock after it on
-        }
         super().__init__(
             {
                 **{event: In(1) for event in self._events if event != "stall"},
-                **{f"irq_{kind}_{event}": flow for kind, flow in kinds.items() for event in self._events},
+                **{f"irq_{kind}_{event}": flow for kind, flow in _KINDS.items() for event in self._events},
                 "ticks": In(axes),
                 "stalled": In(axes),  # the shaft of the axis stands still
                 "irq": Out(1),  # an enabled event waits, a clock later
@@ -36,11 +38,11 @@ class Interrupts(wiring.Component):
         m.d.sync += rested.eq((self.stalled & self.ticks) | (rested & ~self.ticks))
         stall = (self.stalled & self.ticks & ~rested).any()
         raised: list[Value] = []
+        comes = {"stall": stall} | by_name(self, (event for event in self._events if event != "stall"))
+        enable, clear, pending = (by_name(self, self._events, f"irq_{kind}_{{}}") for kind in _KINDS)
         for event in self._events:
-            enable, clear, pending = (getattr(self, f"irq_{kind}_{event}") for kind in ("enable", "clear", "pending"))
-            comes = stall if event == "stall" else getattr(self, event)
-            m.d.sync += pending.eq(comes | (pending & ~clear))
-            raised.append(pending & enable)
+            m.d.sync += pending[event].eq(comes[event] | (pending[event] & ~clear[event]))
+            raised.append(pending[event] & enable[event])
         m.d.sync += self.irq.eq(reduce(or_, raised))
         return m
 
@@ -48,14 +50,13 @@ class Interrupts(wiring.Component):
 def connect(m: Module, box: Interrupts, bank: wiring.Component, core: wiring.Component) -> None:
     """Connect what a bank and a core of one axis or many have by the names of the box, and its output."""
     m.submodules.interrupts = box
-    for name, member in box.signature.members.items():
-        if name.startswith("irq_"):
-            source, target = (box, bank) if member.flow == Out else (bank, box)
-            m.d.comb += getattr(target, name).eq(getattr(source, name))
-    late = [core.tick_error] if hasattr(core, "tick_error") else []
+    flows = {name: member.flow for name, member in box.signature.members.items() if name.startswith("irq_")}
+    follow(m, box, bank, (name for name, flow in flows.items() if flow == In))
+    follow(m, bank, box, (name for name, flow in flows.items() if flow == Out))
+    late = [core.tick_error] if "tick_error" in core.signature.members else []
     m.d.comb += [box.overflow.eq(core.tick & bank.overflow), box.error.eq(reduce(or_, late, core.decode_error))]
-    if hasattr(box, "probe"):
+    if "probe" in box.signature.members:
         strobes = [name for name in core.signature.members if name.startswith("probe_valid")]
-        m.d.comb += box.probe.eq(Cat(getattr(core, name) for name in strobes).any())
-    if hasattr(box, "index"):
+        m.d.comb += box.probe.eq(Cat(by_name(core, strobes).values()).any())
+    if "index" in box.signature.members:
         m.d.comb += box.index.eq(core.index_valid)

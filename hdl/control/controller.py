@@ -12,6 +12,7 @@ from amaranth.lib.wiring import In, Out
 from tachometry.hdl.arithmetic.idle import Idle, IdleProduct
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.control.product import ParallelProduct, SerialProduct
+from tachometry.hdl.wires.ports import by_name
 from tachometry.spec.control.form import GAINS, GUARD_BITS, ControlForm, Term
 from tachometry.spec.control.ports import GAIN_PORTS
 from tachometry.spec.language.units import signed_width
@@ -210,7 +211,8 @@ class Controller(wiring.Component):
         form = self._form
         values: dict[Term, ValueLike] = {one: each.values[0] for one, each in form.terms.items()}
         if form.gain_bits:
-            values |= {one: getattr(self, GAIN_PORTS[one]) << form.gain_shift for one in GAINS}
+            gains = by_name(self, GAIN_PORTS.values())
+            values |= {one: gains[GAIN_PORTS[one]] << form.gain_shift for one in GAINS}
         if form.longest > 1:
             tabled = self._tabled(m, term, load)
             values |= dict.fromkeys((one for one in form.terms if one.tabled), tabled)

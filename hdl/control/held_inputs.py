@@ -6,7 +6,7 @@ from amaranth import Module
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.wires.ports import members
+from tachometry.hdl.wires.ports import by_name, members
 from tachometry.spec.language.port import Port
 
 
@@ -14,8 +14,8 @@ class HeldInputs(wiring.Component):
     """Takes all inputs together in the clock before a control tick, unless they are frozen."""
 
     def __init__(self, ports: Iterable[Port]) -> None:
-        self._ports = tuple(ports)
-        shapes = {name: member.shape for name, member in members(self._ports).items()}
+        shapes = {name: member.shape for name, member in members(ports).items()}
+        self._names = tuple(shapes)
         super().__init__(
             {
                 "coming": In(1),  # a control tick is in the next clock
@@ -28,5 +28,6 @@ class HeldInputs(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         with m.If(self.coming & ~self.freeze):
-            m.d.sync += [getattr(self, port.name).eq(getattr(self, f"given_{port.name}")) for port in self._ports]
+            given = by_name(self, self._names, "given_{}")
+            m.d.sync += [port.eq(given[name]) for name, port in by_name(self, self._names).items()]
         return m

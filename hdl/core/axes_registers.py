@@ -8,7 +8,7 @@ from tachometry.hdl.bus.bank import RegisterBank
 from tachometry.hdl.bus.interrupts import Interrupts, connect
 from tachometry.hdl.bus.native import native_port
 from tachometry.hdl.core.axes_tachometer import AxesTachometer
-from tachometry.hdl.wires.ports import follow, members
+from tachometry.hdl.wires.ports import by_name, drive, follow, members
 from tachometry.spec.registers.axes import AxesMap
 
 
@@ -38,20 +38,18 @@ class AxesRegisterCore(wiring.Component):
         whose = {"updated": (core.velocity_valid, core.axis)}
         if spec.tachometer.index:
             whose["indexed"] = (core.index_valid, core.index_axis)
-        overflows = []
-        for axis in range(spec.axes):
-            overflows.append(getattr(core, f"overflow_{axis}") & (core.axis == axis))
-            m.d.comb += [
-                getattr(bank, f"{event}_now_{axis}").eq(strobe & (number == axis))
-                for event, (strobe, number) in whose.items()
-            ]
+        axes = range(spec.axes)
+        for axis in axes:
+            events = {event: strobe & (number == axis) for event, (strobe, number) in whose.items()}
+            drive(m, bank, events, f"{{}}_now_{axis}")
+        overflows = [overflow & (core.axis == axis) for axis, overflow in by_name(core, axes, "overflow_{}").items()]
         m.d.comb += [bank.capture.eq(self.capture), bank.overflow.eq(Cat(overflows).any())]
         if self._map.irq:
             box = Interrupts(self._map, spec.axes)
             connect(m, box, bank, core)
             m.d.comb += [
-                box.ticks.eq(Cat(core.tick & (core.axis == axis) for axis in range(spec.axes))),
-                box.stalled.eq(Cat(getattr(core, f"stalled_{axis}") for axis in range(spec.axes))),
+                box.ticks.eq(Cat(core.tick & (core.axis == axis) for axis in axes)),
+                box.stalled.eq(Cat(by_name(core, axes, "stalled_{}").values())),
                 self.irq.eq(box.irq),
             ]
         return m

@@ -17,7 +17,7 @@ from tachometry.hdl.axes.held_outputs import HeldOutputs
 from tachometry.hdl.axes.rounds import Rounds
 from tachometry.hdl.front_end.index_state import in_state
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import follow, members
+from tachometry.hdl.wires.ports import by_name, drive, follow, members
 from tachometry.hdl.wires.synchronizer import Synchronizer
 from tachometry.spec.language.port import INDEX, TICK, UPDATE
 from tachometry.spec.methods.axes import AxesSpec
@@ -74,14 +74,16 @@ class AxesTachometer(wiring.Component):
         m.submodules.axis_counters = counters = self.axis_counters
         m.submodules.datapath = datapath = self.datapath
         level: _Values = {pin.name: Signal(pin.width, name=f"level_{pin.name}") for pin in spec.ports.pins}
-        for name, levels in level.items():
-            m.submodules[f"sync_{name}"] = Synchronizer(getattr(self, name), levels)
+        for name, pin in by_name(self, level).items():
+            m.submodules[f"sync_{name}"] = Synchronizer(pin, level[name])
         if spec.axis.external_tick:
             m.d.comb += [rounds.tick_in.eq(level["tick_in"]), self.tick_error.eq(rounds.tick_error)]
         at, level, known = self._looks(m, {name: level[name] for name in spec.axis.front_end.lines})
         level |= {name: ~level[name] for name in spec.axis.encoder.inverted}
         m.d.comb += [
-            *(getattr(counters, name).eq(at[name]) for name in ("slot", "first", "last")),
+            counters.slot.eq(at["slot"]),
+            counters.first.eq(at["first"]),
+            counters.last.eq(at["last"]),
             counters.ready.eq(at["ready"] & known["a"] & known["b"]),
             counters.level_a.eq(level["a"]),
             counters.level_b.eq(level["b"]),
@@ -123,28 +125,24 @@ class AxesTachometer(wiring.Component):
         names = ("slot", "first", "last", "ready")
         if self.axis_filter is None:
             known = dict.fromkeys(level, rounds.ready)
-            return {name: getattr(rounds, name) for name in names}, level, known
+            return by_name(rounds, names), level, known
         m.submodules.axis_filter = box = self.axis_filter
         follow(m, box, rounds, (*names, "real"))
-        m.d.comb += [getattr(box, f"level_{name}").eq(value) for name, value in level.items()]
-        return (
-            {name: getattr(box, f"seen_{name}") for name in names},
-            {name: getattr(box, f"filtered_{name}") for name in level},
-            {name: getattr(box, f"known_{name}") for name in level},
-        )
+        drive(m, box, level, "level_{}")
+        return by_name(box, names, "seen_{}"), by_name(box, level, "filtered_{}"), by_name(box, level, "known_{}")
 
     def _show(self, m: Module, name: str, strobe: Value, axis_name: str, axis: Value, box: wiring.Component) -> None:
         """Show what is new with a strobe: as it comes, or held for each axis."""
-        values = {port.name: getattr(box, port.name) for port in self._spec.axis.ports.outputs if port.held_by == name}
+        values = by_name(box, (port.name for port in self._spec.axis.ports.outputs if port.held_by == name))
         del values[name]
         if self._spec.parallel:
             shapes = {value: signal.shape() for value, signal in values.items()}
             held = HeldOutputs(self._spec.axes, len(axis), shapes)
             m.submodules[f"held_{name}"] = held
             m.d.comb += [held.strobe.eq(strobe), held.axis.eq(axis)]
-            m.d.comb += [getattr(held, value).eq(signal) for value, signal in values.items()]
-            values = {f"{value}_{k}": getattr(held, f"{value}_{k}") for value in shapes for k in range(self._spec.axes)}
+            drive(m, held, values)
+            values = by_name(held, (f"{value}_{k}" for value in shapes for k in range(self._spec.axes)))
             strobe, axis = delay(m, strobe, axis)
-        m.d.comb += [getattr(self, port).eq(value) for port, value in {name: strobe, **values}.items()]
+        drive(m, self, {name: strobe, **values})
         if name != UPDATE:  # its axis is that of its tick
-            m.d.comb += getattr(self, axis_name).eq(axis)
+            drive(m, self, {axis_name: axis})

@@ -8,7 +8,7 @@ from tachometry.hdl.bus.uart import UartBridge
 from tachometry.hdl.core.bus_tachometer import bridge_on
 from tachometry.hdl.core.emulator import EncoderEmulator
 from tachometry.hdl.core.register_core import RegisterCore
-from tachometry.hdl.wires.ports import follow, hand_through, members
+from tachometry.hdl.wires.ports import by_name, drive, follow, hand_through, members
 from tachometry.hdl.wires.synchronizer import Synchronizer
 from tachometry.spec.registers.buses import CAPTURE, Bus
 from tachometry.spec.registers.demo import ENCODER_LINES, PERIOD_WIDTH, DemoMap, demo_ports, emulated
@@ -81,16 +81,16 @@ class Demo(wiring.Component):
         """Give the core its pins, or the lines of the emulator and a tick in each period."""
         core, emulator, bank = self.core, self.emulator, self.core.bank
         follow(m, emulator, bank, (field.port for field in self._map.emulated))
-        for line in self._map.spec.front_end.complemented:
-            name = f"{line}_n"
-            m.d.comb += getattr(core, name).eq(Mux(bank.emulated, getattr(emulator, name), ~getattr(self, line)))
-        for pin in (pin for pin in self._map.spec.ports.pins if hasattr(self, pin.name)):
-            emulated = getattr(emulator, pin.name) if pin.name in self._lines else period  # the external tick
-            if pin.name in self._map.spec.front_end.controls:
-                emulated = getattr(self, pin.name)
-            if pin.name in self._lines:
-                m.d.comb += getattr(self, f"emulated_{pin.name}").eq(emulated)
-            m.d.comb += getattr(core, pin.name).eq(Mux(bank.emulated, emulated, getattr(self, pin.name)))
+        front = self._map.spec.front_end
+        pins = by_name(self, (pin.name for pin in self._map.spec.ports.pins if pin.name in self.signature.members))
+        lines = by_name(emulator, self._lines)
+        for line, whole in by_name(emulator, front.complemented, "{}_n").items():
+            drive(m, core, {f"{line}_n": Mux(bank.emulated, whole, ~pins[line])})
+        for name, pin in pins.items():
+            emulated = pin if name in front.controls else lines.get(name, period)  # the external tick
+            if name in lines:
+                drive(m, self, {f"emulated_{name}": emulated})
+            drive(m, core, {name: Mux(bank.emulated, emulated, pin)})
 
     def _enable(self, m: Module) -> None:
         """Give the loop its enable, which comes from a pin, and which many flip-flops follow."""

@@ -5,7 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.core.line import EmulatedLine
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import by_name, only_if
 from tachometry.spec.registers.emulator import (
     BOUNCE_BITS,
     BOUNCE_WIDTH,
@@ -123,6 +123,7 @@ class EncoderEmulator(wiring.Component):
         ends = {"a": self.duty_a, "b": self.duty_b}
         low, high = NOISE_BIT + NOISE_WIDTH, NOISE_BIT + 2 * NOISE_WIDTH
         noise = ~random[low:high].any() & (random[NOISE_BIT:low] < self.glitches)
+        outputs, inverted = by_name(self, starts), by_name(self, self._complemented, "{}_n")
         for k, name in enumerate(starts):
             m.submodules[f"line_{name}"] = line = EmulatedLine(whole=name in self._complemented)
             since = Signal(FINE_WIDTH, name=f"since_{name}")
@@ -133,11 +134,11 @@ class EncoderEmulator(wiring.Component):
                 line.noise.eq(noise),
                 line.broken.eq(self.broken[k]),
                 line.bounce.eq(self.bounce),
-                getattr(self, name).eq(line.line),
+                outputs[name].eq(line.line),
             ]
             m.d.sync += line.ideal.eq(since < _HALF + ends[name])
             if name in self._complemented:
-                m.d.comb += getattr(self, f"{name}_n").eq(~line.whole)
+                m.d.comb += inverted[name].eq(~line.whole)
 
     def _index(self, m: Module, fine: Signal, turns: object) -> None:
         """Drive the index line, in a quarter of the first period."""

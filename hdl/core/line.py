@@ -39,7 +39,7 @@ class EmulatedLine(wiring.Component):
             left.eq(Mux(left == 0, 0, left - 1)),
             self.line.eq(whole | self.broken),
         ]
-        if hasattr(self, "whole"):
+        if "whole" in self.signature.members:
             m.d.sync += self.whole.eq(whole)
         with m.If((self.ideal ^ before) & ~self.drop):
             m.d.sync += [level.eq(self.ideal), left.eq(self.bounce)]

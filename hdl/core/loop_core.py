@@ -11,7 +11,7 @@ from tachometry.hdl.control.held_inputs import HeldInputs
 from tachometry.hdl.control.sigma_delta import SigmaDelta
 from tachometry.hdl.control.update_window import UpdateWindow
 from tachometry.hdl.core.tachometer import Tachometer
-from tachometry.hdl.wires.ports import follow, hand_through, members
+from tachometry.hdl.wires.ports import by_name, drive, follow, hand_through, members
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.ports import GAIN_PORTS
 
@@ -41,7 +41,7 @@ class LoopCore(wiring.Component):
     @property
     def idle(self) -> tuple[Idle, ...]:
         """Registers that a simulation may move on."""
-        boxes = {name: getattr(self, name) for name in ("tachometer", "control_clock", "controller")}
+        boxes = {"tachometer": self.tachometer, "control_clock": self.control_clock, "controller": self.controller}
         return (IdleSum("sigma_delta.left"), IdleEcho("sigma_delta.drive"), *idle_of(boxes))
 
     def elaborate(self, platform: object) -> Module:
@@ -63,9 +63,7 @@ class LoopCore(wiring.Component):
             return self
         m.submodules.held_inputs = held
         m.d.comb += [held.coming.eq(self.control_clock.coming), held.freeze.eq(self.freeze)]
-        m.d.comb += [
-            getattr(held, f"given_{port.name}").eq(getattr(self, port.name)) for port in self._spec.held_inputs
-        ]
+        drive(m, held, by_name(self, (port.name for port in self._spec.held_inputs)), "given_{}")
         follow(m, self.controller, held, (*GAIN_PORTS.values(), "current_limit"))
         return held
 
@@ -80,7 +78,7 @@ class LoopCore(wiring.Component):
             generator.enable.eq(self.enable),
             generator.position.eq(self.tachometer.position),
         ]
-        m.d.comb += [getattr(generator, name).eq(getattr(given, f"generator_{name}")) for name in _DEMANDS]
+        drive(m, generator, by_name(given, _DEMANDS, "generator_{}"))
         follow(m, self, generator, _COMMANDS)
         return generator
 

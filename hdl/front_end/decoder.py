@@ -5,7 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.front_end.tooth_wheel import GapFiller
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import by_name, only_if
 from tachometry.spec.core.encoder import Encoder
 from tachometry.spec.core.sensors import Levels, changes, packed_levels
 from tachometry.spec.core.tooth_wheel import ToothWheel
@@ -100,7 +100,7 @@ class SensorDecoder(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         encoder, sensor = self._encoder, self._encoder.kind
-        level = Cat(getattr(self, f"level_{line}") for line in sensor.lines)
+        level = Cat(by_name(self, sensor.lines, "level_{}").values())
         past = Signal(len(level))
         table = changes(encoder.sensor, encoder.decoding)
         forward, backward, wrong = (

@@ -119,10 +119,10 @@ class RairanMethod(wiring.Component):
             lowest = Cat(lowest, counters.loose)
         else:
             lowest = Mux(counters.loose, 0, lowest)
-        places = {"lower": lowest, "upper": Cat(counters.high, above)}
+        upper = Cat(counters.high, above)
+        places = {"lower": (lowest, spec.form.lower_table), "upper": (upper, spec.form.upper_table)}
         entries: dict[str, Signal] = {}
-        for name, place in places.items():
-            table = getattr(spec.form, f"{name}_table")
+        for name, (place, table) in places.items():
             m.submodules[name] = memory = Memory(shape=width, depth=len(table), init=table)
             read = memory.read_port()
             entries[name] = entry = Signal(width, name=name)

@@ -9,6 +9,7 @@ from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.tick_counts import TickCounts
 from tachometry.hdl.methods.track_machine import TrackMachine
+from tachometry.hdl.wires.ports import follow
 from tachometry.spec import TrackTachometer
 from tachometry.spec.formats.tracking import PLACE_BITS
 
@@ -62,7 +63,7 @@ class TrackMethod(wiring.Component):
             m.d.sync += [position.eq(self.position), awaited.eq(1)]
         m.d.comb += [counts.tick.eq(self.tick), counts.step.eq(self.step), machine.begin.eq(self.tick)]
         names = ("number", "times", "places", "last", "moved", "length", "kind", "end", "down")
-        m.d.comb += [getattr(machine, name).eq(getattr(counts, name)) for name in names]
+        follow(m, machine, counts, names)
         new = self.updates.p
         shift = PLACE_BITS - spec.fine_bits
         m.d.sync += self.updates.valid.eq(ready)

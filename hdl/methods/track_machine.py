@@ -13,6 +13,7 @@ from tachometry.hdl.arithmetic.idle import Idle, IdleBox
 from tachometry.hdl.front_end.sampling_clock import state_after, states_of
 from tachometry.hdl.methods.block_unit import BlockUnit
 from tachometry.hdl.methods.serial_unit import SerialUnit
+from tachometry.hdl.wires.ports import by_name
 from tachometry.spec.formats.tracking import PLACE_BITS, WIDTH
 from tachometry.spec.formats.tracking_code import (
     ADDRESS_BITS,
@@ -317,10 +318,9 @@ class TrackMachine(wiring.Component):
         shows = Signal(3)
         domain = m.d.sync if self._two else m.d.comb
         domain += shows.eq(Mux(self.go, self.now.output, 0))
-        for number, name in enumerate(OUTPUTS):
-            if name:
-                with m.If(shows == number):
-                    m.d.sync += getattr(self, name).eq(~self.made[-1] if name == "stalled" else self.made)
+        for name, port in by_name(self, filter(None, OUTPUTS)).items():
+            with m.If(shows == OUTPUTS.index(name)):
+                m.d.sync += port.eq(~self.made[-1] if name == "stalled" else self.made)
 
     def _begin(self, m: Module) -> None:
         """Begin an operation of the unit, or wait for it."""
@@ -366,7 +366,8 @@ class TrackMachine(wiring.Component):
         """Return the inputs of the tick as words."""
         t = self._program.form.time_bits
         shifts = {"counts": PLACE_BITS, "places": _PLACES_BITS, "times": t, "last": t, "moved": PLACE_BITS, "length": t}
-        return [getattr(self, "number" if name == "counts" else name) << shifts.get(name, 0) for name in INPUTS]
+        ports = by_name(self, (name for name in INPUTS if name != "counts")) | {"counts": self.number}
+        return [ports[name] << shifts.get(name, 0) for name in INPUTS]
 
     def _stored(self, word: Value) -> Value:
         """Return the address of a word that is stored, which may be the offset of the last count's edge."""

@@ -13,7 +13,8 @@ def delay(m: Module, *values: ValueLike, clocks: int = 1, only_if: Value | None 
     for _ in range(clocks):
         registers = []
         for value in values:
-            name = getattr(Value.cast(value), "name", "value").removesuffix("_late")
+            followed = Value.cast(value)
+            name = followed.name.removesuffix("_late") if isinstance(followed, Signal) else "value"
             register = Signal.like(value, name=f"{name}_late")
             m.d.sync += register.eq(value)
             if only_if is not None:  # the reset of a flip-flop is free, where a gate is not

@@ -1,14 +1,15 @@
 """Ports of the exported core as members of a component, and ports of boxes that have the same names."""
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeVar
 
-from amaranth import Module, signed
+from amaranth import Module, ValueLike, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.spec import Port
 
+_Name = TypeVar("_Name", str, int)
 _FLOW = {"input": In, "output": Out}
 
 
@@ -26,9 +27,19 @@ def only_if(condition: object, **flows: Any) -> dict[str, Any]:
     return flows if condition else {}
 
 
+def by_name(box: wiring.Component, names: Iterable[_Name], form: str = "{}") -> dict[_Name, Any]:
+    """Return ports of a box by names or numbers, which stand in the names of the ports where `form` has braces."""
+    return {name: getattr(box, form.format(name)) for name in names}
+
+
+def drive(m: Module, box: wiring.Component, values: Mapping[_Name, ValueLike], form: str = "{}") -> None:
+    """Set ports of a box to values; see `by_name`."""
+    m.d.comb += [port.eq(values[name]) for name, port in by_name(box, values, form).items()]
+
+
 def follow(m: Module, box: wiring.Component, source: wiring.Component, names: Iterable[str]) -> None:
     """Set ports of a box to those of the same names of another."""
-    m.d.comb += [getattr(box, name).eq(getattr(source, name)) for name in names]
+    drive(m, box, by_name(source, names))
 
 
 def hand_through(m: Module, outer: wiring.Component, inner: wiring.Component, names: Iterable[str]) -> None:
