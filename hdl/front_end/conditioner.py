@@ -6,6 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, idle_of
 from tachometry.hdl.front_end.glitch_filter import GlitchFilter
+from tachometry.hdl.wires.ports import by_name
 from tachometry.hdl.wires.synchronizer import Synchronizer
 
 
@@ -56,24 +57,26 @@ class InputConditioner(wiring.Component):
         clocks_since_reset = Signal(3)
         m.d.sync += clocks_since_reset.eq((clocks_since_reset << 1) | 1)
         swallowed = []
-        for name in self._lines:
-            level = Signal(name=f"synchronised_{name}") if self._filter_clocks else getattr(self, f"level_{name}")
-            m.submodules[f"sync_{name}"] = Synchronizer(getattr(self, name), level)
-            if name in self._complemented:
+        levels, readies = (by_name(self, self._lines, form) for form in ("level_{}", "ready_{}"))
+        complements, equals = (by_name(self, self._complemented, form) for form in ("{}_n", "equal_{}"))
+        for name, pin in by_name(self, self._lines).items():
+            level = Signal(name=f"synchronised_{name}") if self._filter_clocks else levels[name]
+            m.submodules[f"sync_{name}"] = Synchronizer(pin, level)
+            if name in complements:
                 other = Signal(name=f"synchronised_{name}_n")
-                m.submodules[f"sync_{name}_n"] = Synchronizer(getattr(self, f"{name}_n"), other)
-                m.d.comb += getattr(self, f"equal_{name}").eq(clocks_since_reset[1] & (level == other))
+                m.submodules[f"sync_{name}_n"] = Synchronizer(complements[name], other)
+                m.d.comb += equals[name].eq(clocks_since_reset[1] & (level == other))
             if self._filter_clocks:
                 m.submodules[f"filter_{name}"] = line = self._filters[name]
                 m.d.comb += [
                     line.level.eq(level),
                     line.valid.eq(clocks_since_reset[1]),
-                    getattr(self, f"level_{name}").eq(line.filtered),
+                    levels[name].eq(line.filtered),
                 ]
-                m.d.sync += getattr(self, f"ready_{name}").eq(line.known)
+                m.d.sync += readies[name].eq(line.known)
                 swallowed.append(line.swallowed)
             else:
-                m.d.comb += getattr(self, f"ready_{name}").eq(clocks_since_reset[-1])
+                m.d.comb += readies[name].eq(clocks_since_reset[-1])
         if self._filter_clocks:
             glitches = Signal(15)
             sum_ = Signal(16)
