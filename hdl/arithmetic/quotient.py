@@ -70,8 +70,6 @@ class Quotient(wiring.Component):
         is added to N for it.
     numerator_width : int
         Bits of N and of all that is added to it, signed.
-    tag : data.StructLayout
-        What travels along.
     serial : bool
         Step by step: `start` may come again as soon as the result has, and m, which moves then, and `tag` must stay as
         they are until then. Otherwise it may come in every clock.

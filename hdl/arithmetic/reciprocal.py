@@ -13,11 +13,6 @@ class LookedUpReciprocal(wiring.Component):
 
     Latency: q is there two clocks after m. The register behind the table is what the memories of many FPGAs have
     built in; without it, the way out of a memory and on to an adder limits the clock.
-
-    Parameters
-    ----------
-    reciprocal : spec.reciprocal.Reciprocal
-        Widths and contents.
     """
 
     def __init__(self, reciprocal: spec.Reciprocal) -> None:

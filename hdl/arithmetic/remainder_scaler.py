@@ -34,8 +34,6 @@ class RemainderScaler(wiring.Component):
 
     Parameters
     ----------
-    base_width, numerator_width : int
-        Bits of `base` and `numerator`, both signed.
     tag : data.StructLayout
         What travels along with a value; `m` is a field of it.
     towards : int

@@ -20,10 +20,6 @@ class _Scaler(wiring.Component):
 
     Parameters
     ----------
-    base_width, numerator_width : int
-        Bits of `base` and `numerator`, both signed.
-    tag : data.StructLayout
-        What travels along with a value.
     towards : int
         Round to the nearest (0), down (−1) or up (1).
     """

@@ -15,11 +15,6 @@ class AxisFilter(wiring.Component):
     """Passes a level of an axis when it was the same at `looks` looks that follow each other; see `GlitchFilter`.
 
     Latency: what is seen in a slot is at the outputs three clocks later, and so are the other inputs.
-
-    Parameters
-    ----------
-    lines : sequence of str
-        Names of the lines.
     """
 
     def __init__(self, *, slots: int, looks: int, lines: Sequence[str]) -> None:

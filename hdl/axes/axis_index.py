@@ -17,8 +17,6 @@ class AxisIndex(wiring.Component):
 
     Parameters
     ----------
-    width : int
-        Bits of a position.
     resets : bool
         A rise sets the position to 0.
     """

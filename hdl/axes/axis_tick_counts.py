@@ -37,8 +37,6 @@ class AxisTickCounts(AxisCounters):
 
     Parameters
     ----------
-    form : Tracking
-        That of an axis.
     reverse : bool
         Forward is B before A.
     """

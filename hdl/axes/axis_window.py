@@ -12,8 +12,6 @@ class AxisWindow(wiring.Component):
     ----------
     max_ticks, kept_ticks : int
         Longest window, and what a forced update leaves of it.
-    count_width, numerator_width : int
-        Bits of m_e and of the numerator.
     cancel : bool
         Eq. (21) of Tsuji 2009 instead of eq. (17).
     """

@@ -13,11 +13,6 @@ class HeldOutputs(wiring.Component):
     """Holds every value of every axis in a register.
 
     Latency: a value is in its register in the clock after its strobe.
-
-    Parameters
-    ----------
-    values : mapping of str to Shape
-        What comes with the strobe.
     """
 
     def __init__(self, axes: int, axis_width: int, values: Mapping[str, Shape]) -> None:

@@ -14,10 +14,6 @@ class Rounds(wiring.Component):
 
     Parameters
     ----------
-    slots : int
-        Clocks of a round.
-    rounds : int
-        Rounds of a tick.
     external : tuple of int or None
         Fewest and most rounds of a tick whose end comes from outside.
     warm_up : int

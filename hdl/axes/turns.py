@@ -9,11 +9,6 @@ class Turns(wiring.Component):
     """Gives the datapath to one axis after the other, for some clocks each.
 
     After reset each has a turn before any tick: the datapath has nothing else to do, and clears its memory.
-
-    Parameters
-    ----------
-    cycles : int
-        Clocks of a turn.
     """
 
     def __init__(self, axes: int, cycles: int) -> None:

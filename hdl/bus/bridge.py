@@ -11,13 +11,7 @@ from tachometry.spec.registers.map import RegisterMap
 
 
 class Bridge(wiring.Component):
-    """From a bus to the native port; `bus` is the name of the bus.
-
-    Parameters
-    ----------
-    more : flows
-        Members beyond those of the bus.
-    """
+    """From a bus to the native port; `bus` is the name of the bus."""
 
     bus = ""
 

@@ -6,13 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 
 class SaturatingCounter(wiring.Component):
-    """Counts the clocks of an event, and stays at its greatest value.
-
-    Parameters
-    ----------
-    width : int
-        Bits.
-    """
+    """Counts the clocks of an event, and stays at its greatest value."""
 
     def __init__(self, width: int) -> None:
         super().__init__(

@@ -36,11 +36,6 @@ class TelemetrySender(wiring.Component):
     """Sends all captured registers in a frame, as `spec.registers.frames` describes it.
 
     The registers are captured in the clock in which the frame begins.
-
-    Parameters
-    ----------
-    bit_cycles : int
-        Clocks of a bit.
     """
 
     def __init__(self, registers: RegisterMap, bit_cycles: int) -> None:

@@ -13,8 +13,6 @@ class TickPosition(wiring.Component):
 
     Parameters
     ----------
-    width : int
-        Bits of the position.
     sum_width : int
         Bits of `open_sum`; 0 if there is none, and a register keeps the position.
     """

@@ -24,13 +24,7 @@ _HEADER, _ADDRESS, _DATA, _CHECK = range(4)
 
 
 class _Characters:
-    """Holds the signals of the character that is received or sent.
-
-    Parameters
-    ----------
-    cycles : int
-        Clocks of a bit.
-    """
+    """Holds the signals of the character that is received or sent."""
 
     def __init__(self, cycles: int) -> None:
         self.line = Signal()  # the input, synchronised

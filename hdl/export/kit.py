@@ -23,15 +23,7 @@ _TURNS, _FEW_TURNS = (40, 16), (8, 4)
 
 
 def kit(spec: AnySpec, name: str, bus: Bus | None = None) -> dict[str, str]:
-    """Return texts by file name, those of `KIT`.
-
-    Parameters
-    ----------
-    name : str
-        Of the module.
-    bus : Bus or None
-        On which its registers are.
-    """
+    """Return texts by file name, those of `KIT`."""
     ports = ports_on(spec, bus)
     return render_files(
         KIT,

@@ -19,8 +19,6 @@ class InputConditioner(wiring.Component):
     ----------
     filter_clocks : int
         Clocks for which a level must hold; 0 for no filter.
-    lines : tuple of str
-        Names of the lines.
     complemented : tuple of str
         Those of them that come with their complements.
     """

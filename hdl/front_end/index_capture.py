@@ -16,8 +16,6 @@ class IndexCapture(wiring.Component):
 
     Parameters
     ----------
-    width : int
-        Bits of the position.
     latency : int
         That of the position, at least 2.
     once : bool

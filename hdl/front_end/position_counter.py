@@ -16,8 +16,6 @@ class PositionCounter(wiring.Component):
 
     Parameters
     ----------
-    width : int
-        Bits of the position.
     preset : int or None
         What `value` is where nothing drives it; None: the position cannot be set.
 

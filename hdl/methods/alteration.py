@@ -15,8 +15,6 @@ class AlterationDetector(wiring.Component):
 
     Parameters
     ----------
-    count_width : int
-        Bits of m_e.
     seldom : bool
         `tick` and `coming` are never high together.
     """

@@ -18,8 +18,6 @@ class DtShift(wiring.Component):
     ----------
     spec : RairanTachometer
         With a target.
-    width : int
-        Bits of `n`.
     """
 
     def __init__(self, spec: RairanTachometer, width: int) -> None:

@@ -20,8 +20,6 @@ class IntervalAccumulator(wiring.Component):
     ----------
     max_ticks, kept_ticks : int
         Longest window, and what a forced update leaves of it.
-    count_width, numerator_width : int
-        Bits of m_e and of the numerator.
     cancel : bool
         Eq. (21) instead of eq. (17).
     seldom : bool

@@ -25,8 +25,6 @@ class MovingSum(wiring.Component):
     ----------
     length : int
         n.
-    count_width, sum_width : int
-        Bits of a pulse number and of the sum, both signed.
     """
 
     def __init__(self, length: int, *, count_width: int, sum_width: int) -> None:

@@ -14,8 +14,6 @@ class UpdateAge(wiring.Component):
 
     Parameters
     ----------
-    max_age : int
-        The age at which the count stops.
     fresh_width : int
         Bits of `fresh`; 0: it is always 0.
     """
