@@ -49,8 +49,7 @@ demo: $(LINKED) ## a drive with a real disc: Verilog, waveforms, methods beside 
 	BIN=$(BIN) sh docs/demo.sh
 
 figures: $(LINKED) ## the papers' figures anew in build/figures, and what the papers say of them, written to docs/measured/figures.md
-	$(BIN)/tachometry figures -o build/figures
-	$(BIN)/python bench/figures.py build/figures/claims.csv
+	PYTHONPATH=examples:bench $(BIN)/python -m papers --page docs/measured/figures.md
 
 # $(call apt,COMMAND,PACKAGE,PAGE): a program that is no package of Python.
 define apt
@@ -159,11 +158,11 @@ dist: $(VENV)/.made ## wheel and sdist in build/dist, checked; ADDRESS and MAIL 
 	$(BIN)/pyroma -n 9 build/dist.new/*.tar.gz
 	rm -rf build/dist && mv build/dist.new build/dist
 
-lint: $(VENV)/.test ## ruff, and mypy --strict over layers, benchmarks and tests
+lint: $(VENV)/.test ## ruff, and mypy --strict over layers, benchmarks, examples and tests
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy -p tachometry
-	$(BIN)/mypy bench tests
+	$(BIN)/mypy bench examples tests
 
 clean: ## remove what was built, and the environment
 	rm -rf build $(VENV) *.egg-info

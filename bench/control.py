@@ -10,13 +10,15 @@ from pathlib import Path
 
 from gain_figure import Found, save_usable_gains
 from gate_check import check
-from pages import markdown, stamp, write_block
+from pages import ROOT, markdown, stamp, write_block
 from usable_gain import IDEAL, KINDS, REAL, TASK, TICKS, setting, usable, variants
 
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.engines.loop import Observer
-from tachometry.sim.figures.tsuji_loops import SOLUTIONS, Cosine, deviation, solution
 from tachometry.sim.studies.loops.control import Outcome, Task, each_seed, mean, outcome_of
+
+sys.path.append(str(ROOT / "examples"))
+from papers.tsuji_loops import SOLUTIONS, Cosine, deviation, solution
 
 DISCS = {"ideal disc": IDEAL, "real disc": REAL}
 SLOW = {

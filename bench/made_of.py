@@ -25,7 +25,6 @@ from tracking import rms
 from tachometry.boards.monitor.columns import columns
 from tachometry.cli.explore import answers
 from tachometry.hdl import core_of
-from tachometry.sim.figures import FIGURES
 from tachometry.spec import METHODS, of_texts
 from tachometry.spec.registers.demo import DemoMap
 
@@ -92,8 +91,8 @@ MADE_OF: dict[str, Callable[[str], object]] = {
     "docs/measured/control.md": lambda _: tracking(),  # tests/cli/commands/test_loop_docs.py has the loops about S
     "docs/measured/control.png": lambda _: block(MEASURED / "control.md", "gains"),
     **{
-        f"docs/measured/figures/{name}.png": lambda _, name=name: block(MEASURED / "figures.md", name)  # type: ignore[misc]
-        for name in FIGURES
+        f"docs/measured/figures/{file.name}": lambda _, name=file.stem: block(MEASURED / "figures.md", name)  # type: ignore[misc]
+        for file in MEASURED.glob("figures/*.png")
     },
     "docs/measured/health.md": lambda _: [f"{told(one, SEED):.7f}" for one in EXAMPLES],
     "docs/measured/size.md": measured_core,

@@ -23,7 +23,7 @@ readme = load("readme")
 
 RUN_BY = "make test"  # this is part of it
 # Most of the time; they run for less in the test without a compiler, and in those of their commands.
-SLOW = ("make demo", "iverilog", *(f"tachometry {name} " for name in ("verify", "plan", "sweep", "figures", "compare")))
+SLOW = ("make demo", "iverilog", *(f"tachometry {name} " for name in ("verify", "plan", "sweep", "compare")))
 
 
 def blocks(language: str, text: str = TEXT) -> list[str]:

@@ -24,7 +24,6 @@ COMMANDS = {
     "compare": "Compare methods on the same edges.",
     "sweep": "Run methods over ranges of options and speeds, on all processors.",
     "loop": "Close a velocity loop about a core: motor, observer, controller.",
-    "figures": "Draw the papers' figures anew, and say which agree.",
     "verify": "Hold all engines against the golden models, in many configurations.",
     "check": "Check that generated cores are what their manifests say, and do what the golden model does.",
     "build": "Build a core for a board: a bitstream, or a project for the vendor's tools.",

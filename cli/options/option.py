@@ -360,17 +360,11 @@ def _suffix(*allowed: str) -> Callable[[click.Context, click.Parameter, Path | N
         if path is not None and path.suffix.lower() not in allowed:
             names = ", ".join(allowed[:-1]) + " or " * (len(allowed) > 1) + allowed[-1]
             raise click.BadParameter(f"file must end in {names}, not {str(path)!r}")
-        if path is not None and path.suffix.lower() in _PICTURES:
-            check_plots(parameter.opts[0])
+        if path is not None and path.suffix.lower() in _PICTURES and importlib.util.find_spec("matplotlib") is None:
+            raise OSError(f"{parameter.opts[0]} needs Matplotlib: pip install 'tachometry[plot]'")
         return path
 
     return check
-
-
-def check_plots(what: str) -> None:
-    """Refuse with an OSError, before any work is done, what cannot be drawn."""
-    if importlib.util.find_spec("matplotlib") is None:
-        raise OSError(f"{what} needs Matplotlib: pip install 'tachometry[plot]'")
 
 
 def output(name: str, *, help: str, suffixes: tuple[str, ...] = ()) -> Callable[[Any], Any]:

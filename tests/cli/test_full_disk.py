@@ -20,7 +20,6 @@ COMMANDS = {
     f"compare {CORE} {MOTION} --methods s,m --csv c.csv --plot p.pdf --tradeoff t.csv": "c.csv p.pdf t.csv",
     f"plan {CORE} --csv c.csv --plot p.png": "c.csv p.png",
     f"plan {CORE} --methods s,m --csv c.csv --plot p.pdf": "c.csv p.pdf",
-    "figures --only rairan2 --no-hdl -o out": "out/rairan2.svg out/rairan2.png out/rairan2.csv out/claims.csv",
     f"{LOOP} --csv c.csv --log l.csv --plot p.png": "c.csv l.csv p.png",
     f"{KIT} none": "out/tachometer.v out/tachometer.json out/test_tachometer.py out/tachometer_driver.h",
     f"generate {CORE} -o out --for litex": "out/tachometer_litex.py",

@@ -30,7 +30,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize("flag", ["--help", "-h"])
 def test_commands_are_listed(flag: str, capsys: pytest.CaptureFixture[str]) -> None:
     text = shown(capsys, flag)
-    for command in "plan generate simulate replay compare sweep loop figures build program monitor".split():
+    for command in "plan generate simulate replay compare sweep loop build program monitor".split():
         assert f"\n  {command} " in text
     assert max(map(len, text.splitlines())) <= 80
 
@@ -134,7 +134,7 @@ finally:
     assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("line", ["plan --ppr 9 --plot p.png", "figures -o out", "plan --ppr 9 --csv c.csv"])
+@pytest.mark.parametrize("line", ["plan --ppr 9 --plot p.png", "plan --ppr 9 --csv c.csv"])
 def test_pictures_without_matplotlib_are_refused_before_any_work(
     line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -167,8 +167,8 @@ def test_the_output_is_utf8_in_any_locale(monkeypatch: pytest.MonkeyPatch, tmp_p
     written = io.BytesIO()
     monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written, encoding="ascii"))
     monkeypatch.chdir(tmp_path)
-    assert run("figures", "--only", "rairan2", "--no-hdl") == 0
-    assert "Rairán 2013" in written.getvalue().decode("utf-8")
+    assert run("help", "generate", "--method") == 0
+    assert "Rairán 2013" in " ".join(written.getvalue().decode("utf-8").split())
 
 
 def test_a_home_that_cannot_be_written(

@@ -40,7 +40,6 @@ COMMANDS = {
     f"replay in.csv {RUN} --engine pysim": "t.csv p.png v.vcd v.gtkw",
     f"compare {CORE} --motion constant:3000rpm:3ms --methods s,difference --csv c.csv --plot p.pdf": "c.csv p.pdf",
     f"plan {CORE} --methods s,m --csv c.csv --plot p.pdf": "c.csv p.pdf",
-    "figures --only rairan2 --no-hdl -o out": "out/rairan2.svg out/rairan2.png out/rairan2.csv out/claims.csv",
     f"{LOOP} --csv c.csv --log l.csv --plot p.png": "c.csv l.csv p.png",
     f"sweep {SWEEP} --results r.parquet --plot p.png": "r.parquet p.png",
     "verify --methods m --engines cxxrtl --jobs 1": "",

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from papers.lab import Lab
+from papers.result import Claim, Curve, Panel, Result
 from tachometry.sim.encoder.motion import FloatArray, cos2pi, parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines.loop import Gains, Log, Motor, Observer
-from tachometry.sim.figures.lab import Lab
-from tachometry.sim.figures.result import Claim, Curve, Panel, Result
 from tachometry.sim.studies.loops.control import Command, Load, Setting, Task, as_shown, each_seed, mean
 from tachometry.spec import Encoder, MTachometer, MTTachometer, STachometer, TachometerSpec, Timing
 

@@ -1,7 +1,5 @@
 """Figures are measured in a lab: a virtual encoder, golden models, and the hardware beside them."""
 
-from collections.abc import Callable
-
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import Motion, Vibration, parse_motion
 from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
@@ -19,8 +17,6 @@ class Lab:
     ----------
     hdl : bool
         Whether the hardware is simulated where a figure asks for it; else its golden model alone.
-    progress : callable or None
-        Called with the share of the figure that is done.
     whole : bool
         Whether control loops are run with six seeds and all gains; else with one seed and a few gains.
 
@@ -30,20 +26,16 @@ class Lab:
         Values in which hardware and golden model differed.
     first : list of str
         The first of them in each signal.
-    locked : int
-        Clocks over which the hardware was compared.
     seeds : range
         Of runs of control loops.
     """
 
-    def __init__(self, hdl: bool = True, progress: Callable[[float], None] | None = None, whole: bool = True) -> None:
+    def __init__(self, hdl: bool = True, whole: bool = True) -> None:
         self._hdl = hdl
         self.whole = whole
         self.seeds = range(6 if whole else 1)
-        self._progress = progress
         self.mismatches = 0
         self.first: list[str] = []
-        self.locked = 0
 
     def turn(
         self,
@@ -71,17 +63,11 @@ class Lab:
         """Return what the core shows, by its golden model."""
         return golden.run(spec, PinTrace.of(encoding.recording, spec))
 
-    def lockstep(self, spec: TachometerSpec, encoding: Encoding, begin: float = 0.0, end: float = 1.0) -> Run:
-        """Return what `golden` gives, compared with the hardware in Amaranth's simulator.
-
-        It takes the figure from the share `begin` of its work to the share `end`.
-        """
+    def lockstep(self, spec: TachometerSpec, encoding: Encoding) -> Run:
+        """Return the result of `golden`, compared with the hardware in Amaranth's simulator."""
         if not self._hdl:
             return self.golden(spec, encoding)
-        trace, report = PinTrace.of(encoding.recording, spec), self._progress
-        progress = None if report is None else (lambda done: report(begin + (end - begin) * done / trace.n_clocks))
-        found = lockstep(spec, trace, PySim(), progress=progress)
+        found = lockstep(spec, PinTrace.of(encoding.recording, spec), PySim())
         self.mismatches += found.n_mismatches
         self.first += [f"{spec.method} method: {mismatch}" for mismatch in found.first]
-        self.locked += trace.n_clocks
         return found.expected

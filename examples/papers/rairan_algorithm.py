@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tachometry.sim.figures.lab import Lab
-from tachometry.sim.figures.result import Claim, Curve, Panel, Result
+from papers.lab import Lab
+from papers.result import Claim, Curve, Panel, Result
 from tachometry.sim.theory.rairan import (
     rairan_eq01_update_time,
     rairan_eq03_error,

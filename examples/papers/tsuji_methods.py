@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from papers.drawing import GOLDEN, reduced
+from papers.lab import Lab
+from papers.result import Claim, Curve, Panel, Result, percent
 from tachometry.sim.encoder.motion import FloatArray
-from tachometry.sim.figures.drawing import GOLDEN, reduced
-from tachometry.sim.figures.lab import Lab
-from tachometry.sim.figures.result import Claim, Curve, Panel, Result, percent
 from tachometry.sim.theory.performance import Performance, m_performance, mt_performance, s_performance, t_performance
 from tachometry.sim.theory.tsuji import tsuji_eq14_resolution, tsuji_eq18_resolution, unit_velocity
 from tachometry.spec import Encoder, MTachometer, MTTachometer, STachometer, TachometerSpec, Timing, TTachometer

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
+from papers.lab import Lab
+from papers.result import Claim, Curve, Panel, Result
+from papers.tsuji_methods import AVERAGE, COUNTS, TICK, UNIT, lattice_mt
 from tachometry.sim.encoder.motion import FloatArray
 from tachometry.sim.encoder.virtual import Encoding
-from tachometry.sim.figures.lab import Lab
-from tachometry.sim.figures.result import Claim, Curve, Panel, Result
-from tachometry.sim.figures.tsuji_methods import AVERAGE, COUNTS, TICK, UNIT, lattice_mt
 from tachometry.sim.golden.methods.s import alterations
 from tachometry.sim.signals.run import Run
 from tachometry.sim.signals.tables import held_velocity
@@ -171,8 +171,8 @@ def fig12(lab: Lab) -> Result:
     truth = encoding.true_speed(instants)
     slow, fast = truth < UNIT / 4, truth > 2 * UNIT
     curves, runs = {}, {}
-    for number, (name, spec) in enumerate(specs.items()):
-        runs[name] = lab.lockstep(spec, encoding, number / len(specs), (number + 1) / len(specs))
+    for name, spec in specs.items():
+        runs[name] = lab.lockstep(spec, encoding)
         curves[name] = _steps(name, runs[name], spec)
     within, far_within, most = _deviation(runs["S"], specs["S"], encoding)
     panels, rms = [], {}

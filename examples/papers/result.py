@@ -1,14 +1,10 @@
 """A figure is data: panels with curves, and the paper's claims with the values that were computed."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from tachometry.sim.figures.lab import Lab
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,16 +55,6 @@ class Result:
     @property
     def agrees(self) -> bool:
         return all(claim.agrees for claim in self.claims)
-
-
-@dataclass(frozen=True)
-class Entry:
-    """Describes a figure that can be computed."""
-
-    name: str
-    compute: "Callable[[Lab], Result]"
-    seconds: float  # about what it takes
-    compiled: bool = False  # whether it needs a C++ compiler
 
 
 def percent(part: NDArray[np.bool_]) -> float:

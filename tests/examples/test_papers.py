@@ -1,22 +1,27 @@
 """The papers' figures: what they must show, and that docs/measured/figures.md says what they say."""
 
+import csv
 import functools
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import replace
 from importlib import import_module
+from pathlib import Path
 from types import FunctionType
 from typing import Any
 
 import numpy as np
 import pytest
+from papers import FIGURES, LOOPS, tsuji_loops
+from papers.__main__ import main
+from papers.lab import Lab
+from papers.result import Result
 from support import docs
 from support.nightly import only
 
 from tachometry.sim.encoder.virtual import Encoding
-from tachometry.sim.figures import FIGURES, tsuji_loops
-from tachometry.sim.figures.lab import Lab
-from tachometry.sim.figures.result import Result
+from tachometry.sim.golden.methods import m as m_method
+from tachometry.sim.golden.quotient import round_quotient
 from tachometry.sim.signals.run import Run
 from tachometry.sim.theory.performance import Performance
 from tachometry.sim.theory.table1 import Row, table1_rows
@@ -35,7 +40,6 @@ DISAGREE = {
 
 
 # Of what only a part is run here; the page has what `make figures` gives.
-LOOPS = [name for name, entry in FIGURES.items() if entry.compiled]
 # Of the three that run a control loop one is enough, as they differ in what is drawn.
 QUICK = [name for name in FIGURES if name not in LOOPS[:-1]]
 
@@ -43,7 +47,7 @@ QUICK = [name for name in FIGURES if name not in LOOPS[:-1]]
 @functools.cache
 def computed(name: str) -> Result:
     """Return a figure without its hardware, which tests/test_lockstep.py holds against the golden models."""
-    return FIGURES[name].compute(Lab(hdl=False, whole=False))
+    return FIGURES[name](Lab(hdl=False, whole=False))
 
 
 @pytest.mark.parametrize("name", only(QUICK, FIGURES))
@@ -117,7 +121,7 @@ class Remembering(Lab):
 @pytest.mark.parametrize("name", [name for name in FIGURES if name not in LOOPS])
 def test_every_claim_can_be_refuted(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """By an equation that gives three times as much, or a third, by a wrong Table 1 or by wrong golden models."""
-    compute = FIGURES[name].compute
+    compute = FIGURES[name]
     module = import_module(compute.__module__)
     left = {claim.paper for claim in computed(name).claims if claim.agrees}
 
@@ -161,7 +165,7 @@ def test_every_claim_of_a_loop_can_be_refuted(name: str, monkeypatch: pytest.Mon
         for wrong in all_wrong:
             if left:
                 monkeypatch.setattr(tsuji_loops, what, wrong)
-                found = FIGURES[name].compute(Lab(hdl=False, whole=False))
+                found = FIGURES[name](Lab(hdl=False, whole=False))
                 left &= {claim.paper for claim in found.claims if claim.agrees}
                 monkeypatch.undo()
     assert not left
@@ -208,3 +212,35 @@ def test_golden_models_lie_on_the_lines_of_tsuji6_and_below_those_of_tsuji7() ->
             else:
                 assert np.all(dots.y <= expected * 1.01), label
                 assert np.any(dots.y > 0.5 * expected), label
+
+
+def test_files_and_page_of_a_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("<!-- tsuji6 -->\n<!-- end of tsuji6 -->\n")
+    (tmp_path / "figures").mkdir()
+    for folder in ("one", "two"):
+        assert main(["--only", "tsuji6", "-o", str(tmp_path / folder), "--page", str(page)]) == 0
+    names = {f"tsuji6.{kind}" for kind in ("svg", "png", "csv")}
+    made = [{file.name: file.read_bytes() for file in (tmp_path / folder).iterdir()} for folder in ("one", "two")]
+    assert made[0].keys() == names
+    assert made[0] == made[1]
+    assert (tmp_path / "figures" / "tsuji6.png").read_bytes() == made[0]["tsuji6.png"]
+    _, table = docs.page("measured/figures.md").split("<!-- tsuji6 -->\n")
+    assert page.read_text() == f"<!-- tsuji6 -->\n{table.split('<!-- end of')[0]}<!-- end of tsuji6 -->\n"
+    assert "tsuji6: Tsuji 2009, Fig. 6, " in capsys.readouterr().out
+    with (tmp_path / "one" / "tsuji6.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == ["panel", "curve", "speed (rad/s)", "y"]
+    assert {row["panel"] for row in rows} == {"T_m (ms)"}
+    assert float(next(row for row in rows if row["curve"] == "S")["y"]) == 10
+
+
+def test_a_mismatch_of_the_hardware_is_an_error(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A golden model with a fault, on a short run: the hardware differs, and the exit status is 1."""
+    turn = Lab.turn
+    monkeypatch.setattr(Lab, "turn", lambda lab, spec, motion, **more: turn(lab, spec, "ramp:0:40rad/s:400ms", **more))
+    monkeypatch.setattr(m_method, "round_quotient", lambda *args: round_quotient(*args) + 1)
+    assert main(["--only", "tsuji12", "-o", str(tmp_path)]) == 1
+    assert "m method: velocity_valid.velocity[0]: expected 1, got 0" in capsys.readouterr().out

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from papers.lab import Lab
+from papers.result import Claim, Curve, Panel, Result
 from tachometry.sim.encoder.motion import FloatArray
 from tachometry.sim.encoder.virtual import Encoding
-from tachometry.sim.figures.lab import Lab
-from tachometry.sim.figures.result import Claim, Curve, Panel, Result
 from tachometry.sim.signals.run import Run
 from tachometry.sim.theory.rairan import (
     rairan_eq04_max_error,

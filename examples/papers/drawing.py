@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from tachometry.sim.figures.result import Curve, Panel, Result
+from papers.result import Curve, Panel, Result
 from tachometry.sim.plots.style import columns, save_figure
 from tachometry.sim.signals.files import write_csv
 
@@ -35,16 +35,6 @@ def write_data(path: Path, result: Result) -> None:
         for x, y in zip(curve.x.tolist(), curve.y.tolist(), strict=True)
     )
     write_csv(path, ("panel", "curve", _plain(x_label), "y"), rows)
-
-
-def write_claims(path: Path, results: dict[str, Result]) -> None:
-    """Write a CSV with a row per claim: the figure, what the paper says, what was found, whether they agree."""
-    rows = (
-        (name, result.source, claim.paper, claim.found, "yes" if claim.agrees else "no")
-        for name, result in results.items()
-        for claim in result.claims
-    )
-    write_csv(path, ("figure", "source", "paper", "found", "agrees"), rows)
 
 
 def _plain(label: str) -> str:
