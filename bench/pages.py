@@ -1,20 +1,85 @@
-"""Pages of the docs that the benchmarks write, their tables, and the hashes of what they show."""
+"""Pages of the docs that the benchmarks write: their tables, their data, and the hashes of what they show."""
 
+import argparse
 import json
-from collections.abc import Sequence
+import re
+import subprocess
+import sys
+import sysconfig
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
+
+from jinja2 import StrictUndefined, Template
 
 from tachometry.sim.build import digest
 from tachometry.sim.signals.files import replacing
 
 ROOT = Path(__file__).resolve().parent.parent
-STAMPS = ROOT / "docs" / "measured" / "made_of.json"
+MEASURED = ROOT / "docs" / "measured"
+STAMPS = MEASURED / "made_of.json"
+_MEASURED_AT = re.compile(r"\nLast measured at commit .*\n\Z")
+
+
+def data(name: str) -> dict[str, Any]:
+    """Return the contents of bench/NAME.toml."""
+    return tomllib.loads((ROOT / "bench" / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+def filled(name: str, **holes: object) -> str:
+    """Return bench/templates/NAME with its holes filled."""
+    text = (ROOT / "bench" / "templates" / name).read_text(encoding="utf-8")
+    return Template(text, undefined=StrictUndefined, keep_trailing_newline=True).render(**holes)
+
+
+def tachometry(*words: object) -> str:
+    """Run the command, with its errors shown; return its output. It raises CalledProcessError if it fails."""
+    command = [f"{sysconfig.get_path('scripts')}/tachometry", *map(str, words)]
+    return subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, cwd=ROOT).stdout
 
 
 def markdown(columns: Sequence[str], rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> str:
     """Return a table for a page, numbers to the right; `left` are the columns of words."""
     rules = ["---" if column in left else "---:" for column in range(len(columns))]
     return "".join(f"| {' | '.join(row)} |\n" for row in (columns, rules, *rows))
+
+
+def count(text: str) -> int:
+    """Return a whole number of at least 1, for argparse."""
+    if (number := int(text)) < 1:
+        raise argparse.ArgumentTypeError(f"must be at least 1, not {number}")
+    return number
+
+
+def measure(
+    page: Path,
+    blocks: Mapping[str, Callable[..., str]],
+    words: Sequence[str] | None = None,
+    usual: Sequence[str] = (),
+    **numbers: int | None,
+) -> None:
+    """Measure blocks of a page, print each and write it: the command of a script.
+
+    Parameters
+    ----------
+    blocks : mapping of str to callable
+        By the name of the block: returns its text.
+    usual : sequence of str
+        Blocks that are measured if none is named; none: all.
+    **numbers : int or None
+        Defaults of options that the blocks take: whole numbers of at least 1.
+    """
+    parser = argparse.ArgumentParser(description=(sys.modules["__main__"].__doc__ or "").splitlines()[0])
+    parser.add_argument("--only", nargs="+", choices=blocks, default=usual or [*blocks], help="some of the tables")
+    parser.add_argument("-o", "--output", type=Path, default=page, metavar="PAGE", help="page to change (%(default)s)")
+    for name, default in numbers.items():
+        parser.add_argument(f"--{name}", type=count, default=default, metavar="N", help="(%(default)s)")
+    given = parser.parse_args(words)
+    for name in given.only:
+        text = blocks[name](**{number: getattr(given, number) for number in numbers})
+        print(text, flush=True)
+        write_block(given.output, name, text)
 
 
 def write(page: Path, text: str) -> None:
@@ -48,10 +113,24 @@ def hash_of(file: str, part: str = "") -> str:
     return digest(MADE_OF[file](part))[:16]
 
 
+def commit() -> str:
+    """Return the commit that is checked out; with a plus if a file of Python differs from it."""
+    git = ["git", "-C", str(Path(__file__).parent)]
+    done = subprocess.run([*git, "rev-parse", "--short=10", "HEAD"], capture_output=True, text=True)
+    changed = subprocess.run([*git, "diff", "--quiet", "HEAD", "--", ":/*.py"], capture_output=True).returncode
+    return (done.stdout.strip() or "unknown") + "+" * bool(changed)
+
+
 def stamp(file: Path, *parts: str) -> None:
-    """Write the hashes of a file, or of parts of it, if the file is in `made_of.MADE_OF`."""
+    """Put the commit at the end of a measured page, and keep the hashes of a file, or of its parts.
+
+    Hashes are kept of the files in `made_of.MADE_OF`.
+    """
     if not file.resolve().is_relative_to(ROOT):
         return
+    if file.suffix == ".md" and file.resolve().is_relative_to(MEASURED):
+        text = _MEASURED_AT.sub("", file.read_text(encoding="utf-8"))
+        write(file, f"{text}\nLast measured at commit {commit()}.\n")
     from made_of import MADE_OF
 
     if (name := file.resolve().relative_to(ROOT).as_posix()) in MADE_OF:

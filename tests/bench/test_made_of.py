@@ -78,12 +78,16 @@ def test_a_netlist_has_no_names_and_no_order_of_ports() -> None:
     assert first not in [made_of.netlist(one) for one in (Sum(init=1), Sum(minus=True))]
 
 
-def test_a_block_that_is_written_gets_its_hash(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pages, "ROOT", tmp_path)
-    monkeypatch.setattr(pages, "STAMPS", tmp_path / "made_of.json")
+def test_a_block_that_is_written_gets_its_hash_and_the_commit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, path in (("ROOT", tmp_path), ("MEASURED", tmp_path), ("STAMPS", tmp_path / "made_of.json")):
+        monkeypatch.setattr(pages, name, path)
     monkeypatch.setattr(made_of, "MADE_OF", {"page.md": lambda part: part})
     pages.STAMPS.write_text('{"other": "1"}')
     for name in ("page.md", "other.md"):
         (tmp_path / name).write_text("<!-- one -->\n<!-- end of one -->\n")
-        pages.write_block(tmp_path / name, "one", "text\n")
+        for commit in ("12ab", "34cd+"):
+            monkeypatch.setattr(pages, "commit", lambda commit=commit: commit)
+            pages.write_block(tmp_path / name, "one", "text\n")
+        assert (tmp_path / name).read_text().endswith("<!-- end of one -->\n\nLast measured at commit 34cd+.\n")
+        assert (tmp_path / name).read_text().count("Last measured") == 1
     assert json.loads(pages.STAMPS.read_text()) == {"other": "1", "page.md one": pages.hash_of("page.md", "one")}
