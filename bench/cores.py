@@ -1,13 +1,12 @@
 """The cores of `cores.toml`, which `make size` measures."""
 
 import inspect
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from amaranth.lib import wiring
+from pages import data
 
 from tachometry.boards.fpga import ecp5_memory
 from tachometry.hdl import core_of
@@ -21,7 +20,7 @@ from tachometry.spec.control import AnySpec
 from tachometry.spec.registers.buses import bus_of, ports_on, registers_on
 from tachometry.spec.registers.demo import DemoMap, demo_manifest, demo_ports
 
-_DATA = tomllib.loads(Path(__file__).with_name("cores.toml").read_text(encoding="utf-8"))
+_DATA = data("cores")
 
 
 @dataclass(frozen=True)
@@ -37,6 +36,7 @@ class Configuration:
     bus: str = "none"
     demo: bool = False  # with emulator and telemetry
     without_max_speed: str = ""
+    missed: str = ""
     after: str = ""  # source of a script that changes the netlist, see `Target`
 
     @property
