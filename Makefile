@@ -103,11 +103,11 @@ mutate: $(VENV)/.test icarus ## how many wrong cores the tests notice, written t
 bench: $(VENV)/.test ## speed of the golden models, of the engines and of sweeps, written to docs/measured/bench.md and sweep.md
 	$(BIN)/python bench/golden.py -o docs/measured/bench.md
 	$(BIN)/python bench/engines.py -o docs/measured/bench.md
-	$(BIN)/python bench/sweep.py -o docs/measured/sweep.md
+	$(BIN)/python bench/sweep.py
 	$(BIN)/python bench/monitor.py -o docs/guides/monitor.svg
 
 verify: $(VENV)/.test ## every method on every engine against the golden models, a billion clocks, written to docs/measured/verify.md
-	$(BIN)/python bench/verify.py --clocks 1000000000 -o docs/measured/verify.md
+	$(BIN)/python bench/verify.py
 
 compare: $(LINKED) ## all methods and what others use in several situations, written to docs/measured/compare.md
 	$(BIN)/python bench/compare.py
@@ -115,12 +115,12 @@ compare: $(LINKED) ## all methods and what others use in several situations, wri
 studies: $(VENV)/.test ## control loops, tracking, encoders, changes of flip-flops, written to docs/measured
 	$(BIN)/python bench/encoder.py
 	$(BIN)/python bench/health.py
-	$(BIN)/python bench/toggles.py -o docs/measured/toggles.md
-	$(BIN)/python bench/tracking.py -o docs/measured/track.md
-	$(BIN)/python bench/control.py -o docs/measured/control.md --plot docs/measured/control.png
+	$(BIN)/python bench/toggles.py
+	$(BIN)/python bench/tracking.py
+	$(BIN)/python bench/control.py
 
 size: $(VENV)/.size ## cells, Fmax and latency on ECP5 and iCE40, written to docs/measured/size.md
-	$(BIN)/python bench/size.py -o docs/measured/size.md
+	$(BIN)/python bench/size.py
 
 bitstreams: $(VENV)/.boards icarus ## bitstreams of three boards in build, their figures in docs/measured/boards.md, and all checks of bitstreams
 	$(BIN)/python bench/boards.py

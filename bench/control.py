@@ -1,21 +1,25 @@
-"""Measures what a velocity loop about a core can do, mean of seeds, for docs/measured/control.md."""
+"""Measures velocity loops about a core, mean of seeds, for docs/measured/control.md."""
 
-import argparse
-import functools
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from pathlib import Path
+from fractions import Fraction
+from functools import partial
+from itertools import product
+from typing import NamedTuple
 
-from gain_figure import Found, save_usable_gains
-from gate_check import check
-from pages import ROOT, markdown, stamp, write_block
-from usable_gain import IDEAL, KINDS, REAL, TASK, TICKS, setting, usable, variants
+from loops import IDEAL, KINDS, REAL, TASK, TICKS, check, setting, usable, variants
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from pages import MEASURED, ROOT, markdown, measure, stamp
 
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.engines.loop import Observer
+from tachometry.sim.plots.style import COLOURS, save_figure
 from tachometry.sim.studies.loops.control import Outcome, Task, each_seed, mean, outcome_of
+from tachometry.spec.language.units import format_time
 
 sys.path.append(str(ROOT / "examples"))
 from papers.tsuji_loops import SOLUTIONS, Cosine, deviation, solution
@@ -27,6 +31,26 @@ SLOW = {
     "10 rad/s": "ramp:0:10rad/s:300ms+constant:10rad/s:900ms",
 }
 SHOWN_TICKS = {1e-3: "1 ms", 1e-4: "100 µs", 20e-6: "20 µs", 1e-6: "1 µs", 20e-9: "one clock, 20 ns"}
+PAGE, PICTURE = MEASURED / "control.md", MEASURED / "control.png"
+
+
+class Best(NamedTuple):
+    """The greatest usable gain (1/s) of a method at a control tick (s), and its outcome."""
+
+    disc: str
+    name: str
+    seconds: float
+    gain: float
+    outcome: Outcome
+
+
+# The figure: label, levels and value of each row of panels, and inches.
+SHOWN: tuple[tuple[str, tuple[float, ...], Callable[[Best], float]], ...] = (
+    ("usable $k_v$ (1/s)", (50, 100, 200, 400), lambda one: one.gain),
+    ("dip under 0.2 Nm (rad/s)", (0.1, 0.2, 0.4, 0.8), lambda one: one.outcome.dip or 0.0),
+    ("current above 50 Hz (A rms)", (0.0, 0.2, 0.4, 0.6, 0.8, 1.0), lambda one: one.outcome.sound),
+)
+WIDTH, HEIGHT, LEFT, TOP, BOTTOM, ACROSS, DOWN, PANEL = 9.0, 6.5, 0.75, 0.7, 0.65, 0.25, 0.25, 3.9
 
 
 def cell(outcome: Outcome) -> str:
@@ -35,50 +59,87 @@ def cell(outcome: Outcome) -> str:
     return ", ".join(f"{value:.3g}" for value in (outcome.rms, outcome.largest, outcome.dip, outcome.sound))
 
 
-def usable_gains(seeds: Sequence[int], jobs: int) -> tuple[str, list[Found]]:
-    """Return a row per disc and method: at each tick the usable gain and what comes of it; and the same for the
-    figure.
-    """
+def usable_gains(seeds: int, jobs: int | None) -> tuple[str, list[Best]]:
+    """Return a row per disc and method: at each tick the usable gain and its outcome; and all of them."""
     rows, found = [], []
-    for disc, encoder in DISCS.items():
-        for kind in KINDS:
-            row = [disc, kind.name]
-            for seconds in TICKS:
-                if kind.method == "track" and seconds < kind.shortest:
-                    row.append("")  # the core has a new velocity every 20 µs
-                    continue
-                best = usable(lambda kv: setting(kind, kv, seconds, encoder), seeds, jobs)  # noqa: B023
-                print(disc, kind.name, seconds, best, file=sys.stderr, flush=True)
-                row.append(f"{best[0]:g}: {cell(best[1])}" if best else "-")
-                if best is not None:
-                    found.append(Found(disc, kind.name, seconds, *best))
-            rows.append(row)
+    for (disc, encoder), kind in product(DISCS.items(), KINDS):
+        row = [disc, kind.name]
+        for seconds in TICKS:
+            if kind.method == "track" and seconds < kind.shortest:
+                row.append("")  # the core has a new velocity every 20 µs
+                continue
+            best = usable(lambda kv: setting(kind, kv, seconds, encoder), range(seeds), jobs)  # noqa: B023
+            print(disc, kind.name, seconds, best, file=sys.stderr, flush=True)
+            row.append(f"{best[0]:g}: {cell(best[1])}" if best else "-")
+            found += [Best(disc, kind.name, seconds, *best)] if best else []
+        rows.append(row)
     heads = ["disc", "method", *(SHOWN_TICKS[seconds] for seconds in TICKS)]
     return markdown(heads, rows, left=range(len(heads))), found
 
 
-def weights(seeds: Sequence[int], jobs: int) -> str:
+def gains(seeds: int, jobs: int | None) -> str:
+    """Return the table of usable gains, and draw it."""
+    table, found = usable_gains(seeds, jobs)
+    save_figure(PICTURE, lambda: drawn(found))
+    return table
+
+
+def drawn(found: Sequence[Best]) -> Figure:
+    """Return usable gain, dip and current over the tick: a column per disc, a curve per method."""
+    discs, names = list(dict.fromkeys(one.disc for one in found)), list(dict.fromkeys(one.name for one in found))
+    ticks, n_rows = sorted({one.seconds for one in found}), len(SHOWN)
+    figure = Figure(figsize=(WIDTH, HEIGHT))
+    FigureCanvasAgg(figure)
+    tall = (HEIGHT - TOP - BOTTOM - DOWN * (n_rows - 1)) / n_rows
+    for row, (label, levels, value) in enumerate(SHOWN):
+        first = None
+        for column, disc in enumerate(discs):
+            low = HEIGHT - TOP - (row + 1) * tall - row * DOWN
+            place = ((LEFT + column * (PANEL + ACROSS)) / WIDTH, low / HEIGHT, PANEL / WIDTH, tall / HEIGHT)
+            axes = figure.add_axes(place, sharey=first)
+            first = first or axes
+            for name, colour, mark in zip(names, COLOURS, "os^DvP", strict=False):
+                shown = sorted((one.seconds, value(one)) for one in found if (one.disc, one.name) == (disc, name))
+                x, y = [one[0] for one in shown], [one[1] for one in shown]
+                axes.plot(x, y, color=colour, marker=mark, markersize=4, linewidth=1, label=name)
+            axes.set_xscale("log")
+            axes.set_yscale("linear" if row == n_rows - 1 else "log")
+            axes.set_xticks(ticks, [format_time(Fraction(f"{tick:.6g}")) for tick in ticks])
+            axes.set_yticks(levels, [f"{level:g}" for level in levels])
+            axes.minorticks_off()
+            axes.tick_params(labelbottom=row == n_rows - 1, labelleft=column == 0)
+            axes.set_title(disc if row == 0 else "", loc="left", fontsize=9)
+            if column == 0:
+                axes.set_ylabel(label)
+                axes.yaxis.set_label_coords(-0.13, 0.5)
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="upper center", ncols=len(names), fontsize=8)
+    figure.text(0.5, 0.02, "control tick", ha="center", fontsize=9)
+    return figure
+
+
+def weights(seeds: int, jobs: int | None) -> str:
     """Return ticks of 20 µs: the observer with every tick, and with every update, for S and M/T."""
     rows = []
     for disc, encoder in DISCS.items():
         for kv in (40.0, 80.0, 160.0):
-            found = [cell(outcome_of(setting(kind, kv, 20e-6, encoder), seeds, jobs)) for kind in KINDS]
+            found = [cell(outcome_of(setting(kind, kv, 20e-6, encoder), range(seeds), jobs)) for kind in KINDS]
             rows.append((disc, f"{kv:g}", *found))
     return markdown(("disc", "k_v", *(kind.name for kind in KINDS)), rows, left=range(len(KINDS) + 2))
 
 
-def assumptions(seeds: Sequence[int], jobs: int) -> str:
+def assumptions(seeds: int, jobs: int | None) -> str:
     """Return what is changed against the real disc, ticks of 1 ms and 20 µs, k_v = 40 and 80."""
     rows: dict[str, list[str]] = {}
     for kv, seconds in ((40.0, 1e-3), (80.0, 20e-6)):
         base = setting(KINDS[0], kv, seconds, REAL)
         conventional = replace(base, gains=replace(base.gains, way=Observer.CONVENTIONAL))
         for name, varied in (*variants(base), ("the conventional observer", conventional)):
-            rows.setdefault(name, [name]).append(cell(outcome_of(varied, seeds, jobs)))
+            rows.setdefault(name, [name]).append(cell(outcome_of(varied, range(seeds), jobs)))
     return markdown(("what is changed", "1 ms, k_v = 40", "20 µs, k_v = 80"), list(rows.values()), left=range(3))
 
 
-def in_gates(seeds: Sequence[int], jobs: int) -> str:
+def in_gates(seeds: int, jobs: int | None) -> str:
     """Return the controller in gates against its golden model, and against double precision."""
     held = setting(KINDS[0], 80.0, 20e-6, REAL)
     cosine = replace(
@@ -93,7 +154,7 @@ def in_gates(seeds: Sequence[int], jobs: int) -> str:
     rows = []
     for name, one in loops.items():
         with ThreadPoolExecutor(jobs) as pool:
-            found = list(pool.map(functools.partial(check, one), seeds))
+            found = list(pool.map(partial(check, one), range(seeds)))
         gates, double = mean([one.gates for one in found]), mean([one.double for one in found])
         ticks, wrong = sum(one.ticks for one in found), sum(one.mismatches for one in found)
         errors = (f"{gates.rms:.4g}", f"{double.rms:.4g}", f"{gates.sound:.4g}", f"{double.sound:.4g}")
@@ -102,35 +163,35 @@ def in_gates(seeds: Sequence[int], jobs: int) -> str:
     return markdown(heads, rows)
 
 
-def solutions(seeds: Sequence[int], jobs: int) -> str:
+def solutions(seeds: int, jobs: int | None) -> str:
     """Return the largest deviations of Fig. 14 with shorter ticks, mean of seeds: 1 s to 39 rad/s, from 2 s to 4 s."""
     motion, rows = parse_motion("ramp:0:39rad/s:1s+constant:39rad/s:3s"), []
     for seconds in (1e-3, 1e-4, 20e-6, 1e-6):
         _, tick = TICKS[seconds]
         found = []
         for _, cancel, synchronised in SOLUTIONS:
-            logs = each_seed(solution(tick, motion, cancel, synchronised), seeds, jobs)
-            found.append(sum(deviation(log, 2.0) for log in logs) / len(seeds))
+            logs = each_seed(solution(tick, motion, cancel, synchronised), range(seeds), jobs)
+            found.append(sum(deviation(log, 2.0) for log in logs) / seeds)
         rows.append((SHOWN_TICKS[seconds], *(f"{value:.2f}" for value in found)))
     return markdown(("T_s", "(a)", "(b)", "(c)"), rows)
 
 
-def slow_shafts(seeds: Sequence[int], jobs: int) -> str:
+def slow_shafts(seeds: int, jobs: int | None) -> str:
     """Return a shaft that rests, or turns slowly, under the load: real disc, ticks of 20 µs, usable gains."""
     rows = []
     tracking = KINDS[-1]
-    ways = ((KINDS[0], 95.1), (KINDS[2], 95.1), (tracking, 113.1), (replace(tracking, filtered=True), 113.1))
+    ways = ((KINDS[0], 95.1), (KINDS[2], 95.1), (tracking, 113.1), (tracking._replace(filtered=True), 113.1))
     for speed, motion in SLOW.items():
         row = [speed]
         for kind, kv in ways:
             task = replace(TASK, motion=parse_motion(motion))
-            row.append(cell(outcome_of(replace(setting(kind, kv, 20e-6, REAL), task=task), seeds, jobs)))
+            row.append(cell(outcome_of(replace(setting(kind, kv, 20e-6, REAL), task=task), range(seeds), jobs)))
         rows.append(row)
     heads = ("speed", *(kind.name for kind, _ in ways[:-1]), "tracking, with a filter")
     return markdown(heads, rows, left=range(len(heads)))
 
 
-def accelerations(seeds: Sequence[int], jobs: int) -> str:
+def accelerations(seeds: int, jobs: int | None) -> str:
     """Return tracking, real disc, ticks of 20 µs: the disturbance from the velocity, and from the measured
     acceleration.
     """
@@ -139,13 +200,14 @@ def accelerations(seeds: Sequence[int], jobs: int) -> str:
     for kv, times in ((40.0, 2), (80.0, 2), (113.1, 2), (113.1, 1), (160.0, 1)):
         base = setting(KINDS[-1], kv, 20e-6, REAL)
         for name, way in ways.items():
-            gains = replace(base.gains, way=way, observer=times * kv)
-            found = outcome_of(replace(base, gains=gains), seeds, jobs)
+            changed = replace(base.gains, way=way, observer=times * kv)
+            found = outcome_of(replace(base, gains=changed), range(seeds), jobs)
             rows.append((f"{kv:g}", f"{times * kv:g}", name, cell(found)))
     return markdown(("k_v", "G", "observer", "errors, dip, current"), rows, left=(2, 3))
 
 
-TABLES = {
+BLOCKS = {
+    "gains": gains,
     "weights": weights,
     "assumptions": assumptions,
     "solutions": solutions,
@@ -154,31 +216,6 @@ TABLES = {
     "gates": in_gates,
 }
 
-
-def main() -> None:
-    """Print the tables, and put them into the page if asked."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=6, metavar="N", help="seeds of what is random (%(default)s)")
-    parser.add_argument("--jobs", type=int, metavar="N", help="threads (one for each core)")
-    parser.add_argument("--only", choices=(*TABLES, "gains"), help="one of the tables")
-    parser.add_argument("--plot", type=Path, metavar="FILE", help="figure of the usable gains")
-    parser.add_argument("-o", "--output", type=Path, metavar="PAGE", help="page whose tables are replaced")
-    given = parser.parse_args()
-    for name in (*TABLES, "gains"):
-        if given.only not in (None, name):
-            continue
-        if name == "gains":
-            table, found = usable_gains(range(given.seeds), given.jobs)
-            if given.plot is not None:
-                save_usable_gains(given.plot, found)
-        else:
-            table = TABLES[name](range(given.seeds), given.jobs)
-        sys.stdout.write(f"{table}\n")
-        if given.output is not None:
-            write_block(given.output, name, table)
-        if name == "gains" and given.plot is not None:
-            stamp(given.plot)
-
-
 if __name__ == "__main__":
-    main()
+    measure(PAGE, BLOCKS, seeds=6, jobs=os.cpu_count())
+    stamp(PICTURE)

@@ -1,40 +1,36 @@
 """Measures the errors of methods over speed and tick, and points per second of a sweep: docs/measured/sweep.md."""
 
-import argparse
 import math
 import os
 import time
 from collections.abc import Callable, Iterable
-from pathlib import Path
 
-from pages import markdown, write_block
+from pages import MEASURED, ROOT, markdown, measure
 
 from tachometry.cli.commands.sweep import sweep
 from tachometry.cli.options.points import points_of
 from tachometry.cli.options.settings import of_file
 from tachometry.cli.options.sweep import by_name, point_options
-from tachometry.cli.reports.terminal import print_table
 from tachometry.sim.studies.sweeping import cluster
 from tachometry.sim.studies.sweeping.sweep import Point, run_point
 
-FILE = Path(__file__).parents[1] / "docs" / "guides" / "sweep.toml"
+FILE = ROOT / "docs" / "guides" / "sweep.toml"
 METHODS = ("s", "m:average=8", "mt")
 # Counts per tick.
 BANDS = {"below 0.3": (0, 0.3), "0.3 to 0.7": (0.3, 0.7), "0.7 to 1.2": (0.7, 1.2), "above 1.2": (1.2, math.inf)}
 COLUMNS = ["where", "points", "start", "points/s", "points/s of processor time"]
 
 
-def all_points() -> dict[str, Point]:
-    """Return those of the file."""
+def all_points(methods: str = "") -> dict[str, Point]:
+    """Return the points of the file, of its methods unless others are named."""
     settings = of_file(FILE, by_name(sweep) | point_options())
-    return points_of(settings, settings.fixed["methods"], 0.05, None).points
+    return points_of(settings, methods or settings.fixed["methods"], 0.05, None).points
 
 
 def errors() -> dict[float, dict[str, float]]:
     """Return relative errors of the methods at each number of counts per tick."""
     places: dict[float, dict[str, float]] = {}
-    settings = of_file(FILE, by_name(sweep) | point_options())
-    for point in points_of(settings, ",".join(METHODS), 0.05, None).points.values():
+    for point in all_points(",".join(METHODS)).values():
         row = run_point(point)
         counts = row["speed"] * row["tick_s"] * row["ppr"] * row["decoding"] / math.tau
         places.setdefault(round(counts, 9), {})[row["method"]] = row["relative_error"]
@@ -57,7 +53,7 @@ def bands(places: dict[float, dict[str, float]]) -> str:
     return markdown(["counts per tick", "points", *METHODS, "s worse than m"], rows)
 
 
-def measure(where: str, run: Callable[[], Iterable[object]]) -> list[str]:
+def timed(where: str, run: Callable[[], Iterable[object]]) -> list[str]:
     """Return the row of the table; the first thing that `run` gives is that it has begun, all others are points."""
     before, begun = _processor(), time.monotonic()
     arriving = iter(run())
@@ -86,24 +82,14 @@ def table(jobs: Iterable[int]) -> list[list[str]]:
             yield None
             yield from cluster.rows(client, points)
 
-    rows = [measure("this process", plain)]
-    return rows + [measure(f"`--jobs {n}`", lambda n=n: processes(n)) for n in jobs]  # type: ignore[misc]
+    rows = [timed("this process", plain)]
+    return rows + [timed(f"`--jobs {n}`", lambda n=n: processes(n)) for n in jobs]  # type: ignore[misc]
 
 
-def main() -> None:
-    """Measure, print, and replace the tables of the page if asked."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("-o", "--output", type=Path, help="page whose tables are replaced")
-    output = parser.parse_args().output
-    by_speed = bands(errors())
-    print(by_speed)
-    rows = table(sorted({1, os.cpu_count() or 1}))
-    print_table(COLUMNS, rows)
-    print()
-    if output is not None:
-        write_block(output, "errors", by_speed)
-        write_block(output, "speeds", markdown(COLUMNS, rows))
-
+BLOCKS = {
+    "errors": lambda: bands(errors()),
+    "speeds": lambda: markdown(COLUMNS, table(sorted({1, os.cpu_count() or 1}))),
+}
 
 if __name__ == "__main__":
-    main()
+    measure(MEASURED / "sweep.md", BLOCKS)

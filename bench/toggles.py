@@ -2,25 +2,22 @@
 
 The shaft turns at a constant speed, and the changes of all flip-flops are counted in every clock (Amaranth's
 simulator), from the third tick on. Clock tree and wires are not counted.
-
-    python bench/toggles.py --speed 100rad/s --ticks 60
 """
 
-import argparse
 import math
 from collections import Counter
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from amaranth import Cat, Fragment, Module, Signal
 from amaranth.sim import Simulator
 from cores import CONFIGURATIONS
-from pages import markdown, write_block
+from pages import MEASURED, markdown, measure
 
 from tachometry.hdl import Tachometer
-from tachometry.spec import Speed, TachometerSpec
+from tachometry.spec import TachometerSpec
 
+CORES, RAD_PER_S, TICKS = ("reference", "table"), 100, 60
 LEVELS = ((0, 0), (1, 0), (1, 1), (0, 1))
 
 
@@ -73,27 +70,15 @@ def changes(spec: TachometerSpec, rad_per_s: float, ticks: int) -> Counter[str]:
     return counted
 
 
-def main() -> None:
-    """Print a table: a row for each box, a column for each core."""
-    names = [configuration.name for configuration in CONFIGURATIONS]
-    parser = argparse.ArgumentParser(description="Flip-flop changes per tick, box by box.")
-    parser.add_argument("--only", nargs="+", choices=names, default=["reference", "table"], metavar="NAME")
-    parser.add_argument("--speed", type=Speed.parse, default=Speed.parse("100rad/s"), help="of the shaft (100rad/s)")
-    parser.add_argument("--ticks", type=int, default=60, help="in which they are counted (%(default)s)")
-    parser.add_argument("-o", "--output", type=Path, metavar="PAGE", help="page whose table is replaced")
-    options = parser.parse_args()
-    if options.ticks < 1:
-        parser.error(f"--ticks must be at least 1, not {options.ticks}")
-    chosen = [configuration for configuration in CONFIGURATIONS if configuration.name in options.only]
-    columns = [changes(one.spec, options.speed.rad_per_s, options.ticks) for one in chosen]  # type: ignore[arg-type]
+def table() -> str:
+    """Return a row for each box, and a column for each core."""
+    chosen = [one for one in CONFIGURATIONS if one.name in CORES]
+    columns = [changes(one.spec, RAD_PER_S, TICKS) for one in chosen]  # type: ignore[arg-type]
     boxes = sorted({box for column in columns for box in column}, key=lambda box: -max(c[box] for c in columns))
-    rows = [[box, *(f"{column[box] / options.ticks:.1f}" for column in columns)] for box in boxes]
-    rows.append(["total", *(f"{column.total() / options.ticks:.1f}" for column in columns)])
-    table = markdown(["box", *(one.name for one in chosen)], rows, [0])
-    print(table)
-    if options.output is not None:
-        write_block(options.output, "toggles", table)
+    rows = [[box, *(f"{column[box] / TICKS:.1f}" for column in columns)] for box in boxes]
+    rows.append(["total", *(f"{column.total() / TICKS:.1f}" for column in columns)])
+    return markdown(["box", *(one.name for one in chosen)], rows)
 
 
 if __name__ == "__main__":
-    main()
+    measure(MEASURED / "toggles.md", {"toggles": table})

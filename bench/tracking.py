@@ -1,25 +1,23 @@
 """Measures the errors of the tracking method when an update appears, for docs/measured/track.md."""
 
-import argparse
 import math
 import sys
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import product
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from motions import OTHERS, REAL, SITUATIONS, Situation
 from numpy.typing import NDArray
-from pages import markdown, write_block
+from pages import MEASURED, ROOT, markdown, measure
 from situations import Cell, core
 
 from tachometry.sim import golden
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.spec import TachometerSpec, TrackTachometer
 
-sys.path.append(str(Path(__file__).parents[1] / "tests"))
+sys.path.append(str(ROOT / "tests"))
 from support.tracking import in_float
 
 TICKS = ("100us", "20us")
@@ -135,7 +133,7 @@ def alarm_cases(runs: int) -> Iterator[tuple[str, str, float, int, Callable[[int
     yield "start at 50 rad/s", "real, 0.25 off centre", BURST, STARTS, start
 
 
-def alarms(runs: int) -> str:
+def alarms(seeds: int, runs: int) -> str:
     """Return the table of false alarms."""
     rows = []
     for motion, encoder, limit, n, run in alarm_cases(runs):
@@ -146,21 +144,13 @@ def alarms(runs: int) -> str:
     return markdown(heads, rows, left=range(2))
 
 
-def main() -> None:
-    """Print the table, and put it into the page if asked."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=20, metavar="N", help="seeds of what is random (%(default)s)")
-    parser.add_argument("-o", "--output", type=Path, metavar="PAGE", help="page whose table is replaced")
-    parser.add_argument("--alarms", type=int, metavar="N", help="count false alarms in N runs of each motion instead")
-    given = parser.parse_args()
-    ticks = [f"{tick[:-2]} µs" for tick in TICKS]
-    heads = ["situation", *(head for tick in ticks for head in (f"ticks of {tick}", "in float", "within quality (%)"))]
-    rows = [] if given.alarms else [row(situation, given.seeds) for situation in (*SITUATIONS, *OTHERS, GENTLE)]
-    table = alarms(given.alarms) if given.alarms else markdown(heads, rows)
-    sys.stdout.write(table)
-    if given.output is not None:
-        write_block(given.output, "alarms" if given.alarms else "errors", table)
+def table(seeds: int, runs: int) -> str:
+    """Return the table of errors in all situations."""
+    heads = ["situation"]
+    for tick in TICKS:
+        heads += [f"ticks of {tick[:-2]} µs", "in float", "within quality (%)"]
+    return markdown(heads, [row(situation, seeds) for situation in (*SITUATIONS, *OTHERS, GENTLE)])
 
 
 if __name__ == "__main__":
-    main()
+    measure(MEASURED / "track.md", {"errors": table, "alarms": alarms}, usual=["errors"], seeds=20, runs=100)

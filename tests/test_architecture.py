@@ -209,7 +209,8 @@ def test_files_can_be_read_on_a_few_screens(layer: str) -> None:
 
 
 def test_docstrings_begin_with_a_sentence() -> None:
-    for file in (file for room in (*LAYERS, "bench", "examples", "package", "tests") for file in (ROOT / room).rglob("*.py")):
+    rooms = (*LAYERS, "bench", "examples", "package", "tests")
+    for file in (file for room in rooms for file in (ROOT / room).rglob("*.py")):
         for node in nodes(file):
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
                 words = (ast.get_docstring(node) or "").split()

@@ -4,9 +4,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from gate_check import Checked
+from loops import KINDS, TICKS, Checked
 from support.script import load
-from usable_gain import KINDS, TICKS
 
 from tachometry.sim.studies.loops.control import Outcome
 
@@ -22,7 +21,7 @@ def test_a_row_and_a_mark_for_every_gain_that_is_usable(tmp_path: Path, monkeypa
         return None if at(20.0).gains.way.name == "CONVENTIONAL" else (80.0, FINE)
 
     monkeypatch.setattr(bench, "usable", usable)
-    table, found = bench.usable_gains(range(6), 1)
+    table, found = bench.usable_gains(6, 1)
     rows = table.splitlines()[2:]
     n_track = sum(seconds >= 20e-6 for seconds in TICKS)
     fine = "80: 0.123, 0.2, 0.4, 0.3"
@@ -30,14 +29,14 @@ def test_a_row_and_a_mark_for_every_gain_that_is_usable(tmp_path: Path, monkeypa
     assert f"| real disc | S, synchronised | {' | '.join([fine] * len(TICKS))} |" in rows
     assert f"| ideal disc | S, conventional | {' | '.join('-' * len(TICKS))} |" in rows
     assert len(found) == 2 * (2 * len(TICKS) + n_track)
-    for name in ("one.png", "two.png"):
-        bench.save_usable_gains(tmp_path / name, found)
-    assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()
+    monkeypatch.setattr(bench, "PICTURE", tmp_path / "control.png")
+    assert bench.gains(6, 1) == table
+    assert bench.PICTURE.read_bytes().startswith(b"\x89PNG")
 
 
 def test_mismatches_of_all_seeds_are_added(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench, "check", lambda one, seed: Checked(1000, seed, FINE, FINE))
-    rows = bench.in_gates(range(6), 1).splitlines()[2:]
+    rows = bench.in_gates(6, 1).splitlines()[2:]
     assert len(rows) == 4
     for line in rows:
         assert line.split(" | ")[1:] == ["6000", "15", "0.1234", "0.1234", "0.3", "0.3 |"]

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import click
 import pytest
+from loops import GAINS, KINDS, REAL, is_usable, setting, variants
 from support import command, docs
 from support.nightly import nightly, only
-from usable_gain import GAINS, KINDS, REAL, is_usable, setting, variants
 
 from tachometry.cli.commands.loop import loop
 from tachometry.cli.options.closed_loop import loop_options
@@ -73,7 +73,7 @@ def test_rows_of_what_synchronising_does(place: int) -> None:
 
 
 @nightly  # twelve loops; the rows below are of the same simulation
-def test_rows_of_usable_gains() -> None:
+def test_rows_of_loopss() -> None:
     """Ticks of 1 ms, S: the gain of the table is usable, and the next one is not."""
     gain, *rest = numbers(cells("real disc", "S, synchronised")[0])
     above = GAINS[GAINS.index(gain) + 1]

@@ -6,9 +6,8 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from gate_check import check
+from loops import KINDS, MOTOR, REAL, check, setting
 from support.nightly import nightly
-from usable_gain import KINDS, MOTOR, REAL, setting
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from usable_gain import KINDS, MOTOR, REAL, core, setting
+from loops import KINDS, MOTOR, REAL, core, setting
 
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
@@ -161,7 +161,7 @@ def test_weights_of_eq_22(way: Observer) -> None:
 
 def test_with_an_update_in_every_tick_both_observers_are_the_same() -> None:
     """Method M has one."""
-    kind = replace(KINDS[0], method="m")
+    kind = KINDS[0]._replace(method="m")
     one = setting(kind, 30.0, 1e-3, REAL, decoding=1)
     simulation = simulation_of(one.spec)
     ways = (Observer.SYNCHRONISED, Observer.CONVENTIONAL)

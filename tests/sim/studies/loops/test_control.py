@@ -5,11 +5,11 @@ import threading
 from dataclasses import replace
 from typing import Any
 
+import loops
 import numpy as np
 import pytest
-import usable_gain
+from loops import GAINS, IDEAL, KINDS, MOTOR, REAL, core, is_usable, setting, usable, variants
 from support.nightly import nightly
-from usable_gain import GAINS, IDEAL, KINDS, MOTOR, REAL, core, is_usable, setting, usable, variants
 
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.engines.loop import Log, LoopSimulation, Observer
@@ -144,7 +144,7 @@ def test_the_greatest_gain_that_is_usable(limit: float, last: float | None, monk
         asked.append((kv, len(seeds)))
         return fine if kv < (limit * 1.2 if len(seeds) == 2 else limit) else replace(fine, sound=1.1)
 
-    monkeypatch.setattr(usable_gain, "outcome_of", outcome)
+    monkeypatch.setattr(loops, "outcome_of", outcome)
     found = usable(lambda kv: kv, range(6))  # type: ignore[arg-type,return-value]
     assert found == (None if last is None else (last, fine))
     assert len(asked) < 8

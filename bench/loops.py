@@ -1,13 +1,19 @@
-"""How far the gain of a velocity loop can be raised: what the tick, the method and the disc are worth in control."""
+"""Velocity loops that are measured: their settings, their greatest usable gain, and a run in gates."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
+from typing import NamedTuple
 
+import numpy as np
+
+from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines.loop import Gains, Motor, Observer
-from tachometry.sim.studies.loops.control import Load, Outcome, Setting, Task, outcome_of
+from tachometry.sim.golden.command_generator import Command
+from tachometry.sim.golden.control import run_loop
+from tachometry.sim.studies.loops.control import Load, Outcome, Setting, Task, in_gates, outcome_of, simulation_of
 from tachometry.spec import TachometerSpec, of_texts
 from tachometry.spec.methods.track import in_loop
 
@@ -18,6 +24,7 @@ DEVIATION = 0.5  # rad/s
 
 IDEAL = VirtualEncoder(500)
 REAL = VirtualEncoder(500, jitter=0.05, nonuniformity=0.1, phase_error_deg=10)
+HALF = VirtualEncoder(500, jitter=0.025, nonuniformity=0.05, phase_error_deg=5)
 MOTOR = Motor(coulomb=0.005)
 TASK = Task(
     motion=parse_motion("ramp:0:39rad/s:300ms+constant:39rad/s:900ms"),
@@ -26,32 +33,24 @@ TASK = Task(
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Kind:
-    """Says how the loop is closed."""
+class Kind(NamedTuple):
+    """How the loop is closed."""
 
     name: str
     method: str
     way: Observer
-    filtered: bool = True  # whether there is a low-pass filter of the velocity
-    options: tuple[tuple[str, str], ...] = ()  # of the method
+    options: Mapping[str, str] = {}  # of the method
     shortest: float = 0.0  # s: the shortest tick of the core; with shorter control ticks it keeps this one
+    filtered: bool = True  # whether there is a low-pass filter of the velocity
 
 
-_SILENT = (("bound-decay", "no"),)  # updates without a count are no measurements, and would have eq. (22)'s weight
+_SILENT = {"bound-decay": "no"}  # updates without a count are no measurements, and would have eq. (22)'s weight
 KINDS = (
-    Kind(name="S, synchronised", method="s", way=Observer.SYNCHRONISED),
-    Kind(name="S, conventional", method="s", way=Observer.CONVENTIONAL),
-    Kind(name="M/T, synchronised", method="mt", way=Observer.SYNCHRONISED, options=_SILENT, shortest=20e-6),
-    Kind(name="M/T, conventional", method="mt", way=Observer.CONVENTIONAL, options=_SILENT, shortest=20e-6),
-    Kind(
-        name="tracking",
-        method="track",
-        way=Observer.SYNCHRONISED,
-        filtered=False,
-        options=(("max-speed", "100rad/s"),),
-        shortest=20e-6,
-    ),
+    Kind("S, synchronised", "s", Observer.SYNCHRONISED),
+    Kind("S, conventional", "s", Observer.CONVENTIONAL),
+    Kind("M/T, synchronised", "mt", Observer.SYNCHRONISED, _SILENT, 20e-6),
+    Kind("M/T, conventional", "mt", Observer.CONVENTIONAL, _SILENT, 20e-6),
+    Kind("tracking", "track", Observer.SYNCHRONISED, {"max-speed": "100rad/s"}, 20e-6, filtered=False),
 )
 # Control ticks in seconds, with the clock, and the tick of a core in words.
 TICKS = {
@@ -71,20 +70,13 @@ def core(kind: Kind, seconds: float, decoding: int = 4, kv: float = GAINS[0]) ->
     texts = {"ppr": "500", "clock": clock, "tick": tick, "max-time": "10ms", "decoding": str(decoding)}
     if tick == "20ns":
         texts["frac-bits"] = "24"
-    return in_loop(of_texts(kind.method, texts | dict(kind.options)), Fraction(kv))
-
-
-def gains_of(kind: Kind, kv: float, seconds: float) -> Gains:
-    """Return gains as in the paper's Fig. 15: k_p = (k_v/2)², G = 2·k_v."""
-    filter_rate = 2 * kv if kind.filtered else float("inf")
-    return Gains(
-        position=(kv / 2) ** 2, velocity=kv, observer=2 * kv, filter=filter_rate, seconds=seconds, way=kind.way
-    )
+    return in_loop(of_texts(kind.method, {**texts, **kind.options}), Fraction(kv))
 
 
 def setting(kind: Kind, kv: float, seconds: float, encoder: VirtualEncoder, decoding: int = 4) -> Setting:
-    """Return the loop with a gain: 39 rad/s, and 0.2 Nm for 0.2 s."""
-    spec, gains = core(kind, seconds, decoding, kv), gains_of(kind, kv, seconds)
+    """Return the loop with a gain: 39 rad/s, and 0.2 Nm for 0.2 s; as in Fig. 15, k_p = (k_v/2)² and G = 2·k_v."""
+    spec, low = core(kind, seconds, decoding, kv), 2 * kv if kind.filtered else float("inf")
+    gains = Gains(position=(kv / 2) ** 2, velocity=kv, observer=2 * kv, filter=low, seconds=seconds, way=kind.way)
     return Setting(spec=spec, gains=gains, task=TASK, motor=MOTOR, encoder=encoder, begin=0.5)
 
 
@@ -124,7 +116,7 @@ def variants(base: Setting) -> Iterator[tuple[str, Setting]]:
     yield "viscous friction of 0.5 mNm/(rad/s)", replace(base, motor=replace(motor, viscous=5e-4))
     yield "no torque noise", replace(base, task=replace(base.task, noise=0.0))
     yield "ideal disc", replace(base, encoder=IDEAL)
-    yield "half the errors of the disc", replace(base, encoder=_halved(base.encoder))
+    yield "half the errors of the disc", replace(base, encoder=HALF)
     yield "a delay of half a tick", replace(base, gains=replace(gains, delay=gains.seconds / 2))
     yield "a delay of a tick", replace(base, gains=replace(gains, delay=gains.seconds))
     yield "driver of 1 ms", replace(base, motor=replace(motor, driver_seconds=1e-3))
@@ -133,10 +125,29 @@ def variants(base: Setting) -> Iterator[tuple[str, Setting]]:
     yield "acceleration of the command fed forward", replace(base, gains=replace(gains, feed_forward=True))
 
 
-def _halved(encoder: VirtualEncoder) -> VirtualEncoder:
-    return replace(
-        encoder,
-        jitter=encoder.jitter / 2,
-        nonuniformity=encoder.nonuniformity / 2,
-        phase_error_deg=encoder.phase_error_deg / 2,
-    )
+class Checked(NamedTuple):
+    """A run in gates."""
+
+    ticks: int  # control ticks
+    mismatches: int  # clocks, currents, filtered velocities and disturbances that differ from the golden model's
+    # gates and double: of this run, and of one with a controller in double precision
+    gates: Outcome
+    double: Outcome
+
+
+def check(setting: Setting, seed: int) -> Checked:
+    """Run a setting in gates and in double precision."""
+    both = in_gates(setting)
+    assert both.gates is not None
+    log, through = both.through(simulation_of(both.gates), seed)
+    n_ticks = len(range(both.gates.latency.first_tick, through.trace.n_clocks, both.gates.period))
+    commands = [Command(*row) for row in through.commands[:n_ticks].tolist()]
+    expected = run_loop(both.gates, through.trace, commands, golden.tables).tables["current_valid"]
+    columns = (expected.clock, expected.current, expected.filtered_velocity, expected.disturbance)
+    wanted = np.stack(columns, axis=1)
+    if wanted.shape != through.currents.shape:
+        wrong = abs(len(wanted) - len(through.currents)) * len(columns)
+    else:
+        wrong = int(np.count_nonzero(wanted != through.currents))
+    double = setting.outcome(setting.run(simulation_of(setting.spec), seed))
+    return Checked(n_ticks, wrong, both.outcome(log), double)
