@@ -28,23 +28,7 @@ CORE = {"clock": "48MHz", "tick": "20us", "max-time": "10ms", "max-speed": "400r
 OF_METHOD = {"track": {"max-time": "100ms"}}  # so that a slow reversal is no rest, which it would forget all at
 
 _EVERY = 5  # ticks between the reads of float models, which take most of the time
-
-_SMALL = 0.01  # rad/s
-_ABOUT = """RMS errors in rad/s. The first columns are cores with one setting for all rows. Each of the others is
-*tuned*: the setting with the least mean error of all that are tried, for every row anew. So at constant speed they show
-what a filter gives that may be as slow as it likes. The least error of a row is bold."""
-_SEEDS = """Mean ± standard deviation with seeds {first} to {last}, which were not looked at before, and one number
-where nothing is random."""
-_OTHERS = """Nothing in the tracking method was tuned with these motions and encoders. All discs here are *real*."""
-_ENCODERS = """An encoder with 500 lines, where the options do not say `--ppr`, decoding 4. A *real* one has a jitter
-of 5 %, a nonuniformity of 0.1 and a phase error of 10°. A *bad* one has twice that."""
-_ABOUT_SINGLE = """A drive has one setting for all that it does. These are the situations of the first table, each rival
-with the setting that has the least geometric mean of the errors of all rows. For this mean, an error below {small:g}
-rad/s counts as {small:g} rad/s."""
-
-READ = """A value is read once a tick, at the clock in which the velocity of that tick is valid (`tick_to_velocity`
-clocks after the tick); float models are read with the first core, and `--read-delay TIME` moves all reads. The error is
-this value minus the speed of the shaft at that instant."""
+_SMALL = 0.01  # rad/s; what is less counts as that in the choice of one setting for all
 
 FIRST_SEED = 1001
 _WON = 0.99  # of another error, and it is less; what is nearer is a matter of seeds
@@ -111,10 +95,6 @@ def errors(situation: Situation, seed: int, names: Iterable[str]) -> Errors:
     return found
 
 
-def _errors(task: tuple[Situation, int, list[str]]) -> Errors:
-    return errors(*task)
-
-
 def measured(
     situations: Iterable[Situation], n_seeds: int, jobs: int, columns: Iterable[str] = (*OURS, *RIVALS)
 ) -> Table:
@@ -134,10 +114,10 @@ def measured(
         for seed in range(FIRST_SEED, FIRST_SEED + (n_seeds if situation.random else 1))
     ]
     if jobs == 1:
-        results = list(map(_errors, tasks))
+        results = [errors(*task) for task in tasks]
     else:
         with ProcessPoolExecutor(jobs) as pool:
-            results = list(pool.map(_errors, tasks))
+            results = list(pool.map(errors, *zip(*tasks, strict=True)))
     found: dict[str, dict[str, list[float]]] = {}
     for (situation, _, _), result in zip(tasks, results, strict=True):
         of_situation = found.setdefault(situation.name, {})
@@ -213,16 +193,6 @@ def model_table() -> str:
     return markdown(heads, body, left=range(len(heads)))
 
 
-def of_cores() -> str:
-    """Return what the cores have, as an item of a list."""
-    longest = {method: given["max-time"][:-2] for method, given in OF_METHOD.items()}
-    others = "".join(f" ({time} ms with `{method}`)" for method, time in longest.items())
-    return (
-        f"- The cores have a clock of {CORE['clock'][:-3]} MHz, ticks of {CORE['tick'][:-2]} µs, and a maximum time of "
-        f"{CORE['max-time'][:-2]} ms{others}."
-    )
-
-
 def wins(cells: Cells) -> dict[str, float]:
     """By situation the error of the first column over that of the best tuned one, as shown, where that is less."""
     shown = {name: [float(f"{cell.mean:.3g}") for cell in row] for name, row in cells.items()}
@@ -232,56 +202,33 @@ def wins(cells: Cells) -> dict[str, float]:
 
 def verdict(cells: Cells) -> str:
     """Return the claim, and a table of the situations in which a tuned rival is better than tracking."""
-    better = wins(cells)
-    text = f"""In {len(cells) - len(better)} of {len(cells)} situations no rival tuned for the row is better than
-tracking, which has no settings. In {len(better)} situations a rival is better; tracking is worse by this factor:"""
-    body = []
+    better, body = wins(cells), []
     for name, over in better.items():
         errors = [float(f"{cell.mean:.3g}") for cell in cells[name][len(OURS) :]]
         body.append([name, f"{over:.{0 if over >= 100 else 2}f}", RIVALS[errors.index(min(errors))]])
-    return f"{_filled(text)}\n\n{markdown(['situation', 'factor', 'best rival'], body, left=(0, 2))}"
+    text = (
+        f"In {len(cells) - len(better)} of {len(cells)} situations no rival tuned for the row is better than tracking,"
+    )
+    text += f" which has no settings. In {len(better)} situations a rival is better; tracking is worse by this factor:"
+    return f"{textwrap.fill(text, 120)}\n\n{markdown(['situation', 'factor', 'best rival'], body, left=(0, 2))}"
 
 
-def _tables(table: Table) -> str:
-    ours = [f"`{name}`" for name in OURS]
-    return f"""{error_table([*ours, *RIVALS], best(table, (*OURS, *RIVALS)))}
-The situations as options of `tachometry compare`, and the best settings, which `--methods` takes behind the name and a
-colon. With `--tune` the command finds them for one seed:
-
-{setting_table(best(table, RIVALS))}"""
-
-
-def part(n_seeds: int, jobs: int) -> tuple[str, str]:
-    """Return the verdict, and this part of the page."""
-    everything = measured((*SITUATIONS, *OTHERS), n_seeds, jobs)
+def parts(n_seeds: int, jobs: int) -> dict[str, object]:
+    """Return the holes of the page that the tables of situations fill."""
+    everything, columns = measured((*SITUATIONS, *OTHERS), n_seeds, jobs), (*OURS, *RIVALS)
     table, others = ({one.name: everything[one.name] for one in some} for some in (SITUATIONS, OTHERS))
     singles = [single(table, rival) for rival in RIVALS]
     in_all = {situation: [by_name[name] for name in (*OURS, *singles)] for situation, by_name in table.items()}
-    seeds = _SEEDS.format(first=FIRST_SEED, last=FIRST_SEED + n_seeds - 1)
-    return (
-        verdict(best(everything, (*OURS, *RIVALS))),
-        f"""## All situations
 
-{_filled(_ABOUT)}
+    def tables(some: Table) -> dict[str, str]:
+        heads = [*(f"`{name}`" for name in OURS), *RIVALS]
+        return {"errors": error_table(heads, best(some, columns)), "settings": setting_table(best(some, RIVALS))}
 
-- {_filled(seeds, "  ")}
-- {_filled(READ, "  ")} Float models are read at every fifth tick of `track`.
-{of_cores()}
-- {_filled(_ENCODERS, "  ")}
-
-{_tables(table)}
-## Other situations
-
-{_filled(_OTHERS)}
-
-{_tables(others)}
-## One setting for all situations
-
-{_filled(_ABOUT_SINGLE.format(small=_SMALL))}
-
-{error_table([*(f"`{name}`" for name in (*OURS, *singles))], in_all)}""",
-    )
-
-
-def _filled(text: str, indent: str = "") -> str:
-    return textwrap.fill(" ".join(text.split()), 120, initial_indent=indent, subsequent_indent=indent).lstrip()
+    return {
+        "all": tables(table),
+        "others": tables(others),
+        "verdict": verdict(best(everything, columns)),
+        "in_all": error_table([f"`{name}`" for name in (*OURS, *singles)], in_all),
+        "first": FIRST_SEED,
+        "last": FIRST_SEED + n_seeds - 1,
+    }
