@@ -101,10 +101,8 @@ mutate: $(VENV)/.test icarus ## how many wrong cores the tests notice, written t
 	PYTHONPATH=tests $(BIN)/python -m proofs.mutation -o docs/measured/mutation.md
 
 bench: $(VENV)/.test ## speed of the golden models, of the engines and of sweeps, written to docs/measured/bench.md and sweep.md
-	$(BIN)/python bench/golden.py -o docs/measured/bench.md
-	$(BIN)/python bench/engines.py -o docs/measured/bench.md
+	$(BIN)/python bench/engines.py
 	$(BIN)/python bench/sweep.py
-	$(BIN)/python bench/monitor.py -o docs/guides/monitor.svg
 
 verify: $(VENV)/.test ## every method on every engine against the golden models, a billion clocks, written to docs/measured/verify.md
 	$(BIN)/python bench/verify.py
@@ -128,7 +126,6 @@ bitstreams: $(VENV)/.boards icarus ## bitstreams of three boards in build, their
 
 docs: $(VENV)/.test chromium ## pages of options, ports and registers, in docs/reference, and the pictures of the guides
 	$(BIN)/python bench/reference_pages.py
-	$(BIN)/python bench/explore.py -o docs/guides/explore.png
 	$(BIN)/python bench/pictures.py
 
 readme: $(VENV)/.size ## the numbers and the picture of README.md, from the comparison that it prints; 5 minutes

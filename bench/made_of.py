@@ -15,9 +15,9 @@ from amaranth.hdl._ir import PortDirection, build_netlist
 from amaranth.lib import wiring
 from cores import CONFIGURATIONS as CONFIGURATIONS
 from health import EXAMPLES, told
-from monitor import CORE as MONITORED
 from motions import OTHERS, SITUATIONS
-from pages import ROOT, block
+from pages import MEASURED, block
+from pictures import CORE as MONITORED
 from situations import RIVALS, core, errors
 from tracking import errors as tracking_errors
 from tracking import rms
@@ -28,7 +28,6 @@ from tachometry.hdl import core_of
 from tachometry.spec import METHODS, of_texts
 from tachometry.spec.registers.demo import DemoMap
 
-MEASURED = ROOT / "docs" / "measured"
 SEED = 1  # no page has it
 
 
