@@ -1,20 +1,21 @@
 """Draws imperfections of an encoder and measures what the core makes of them, for docs/measured/encoder.md.
 
 The lines are drawn and the golden model run at constant speed; everything is exact, so that the files are the same on
-every machine. `python bench/encoder.py` writes encoder.svg and the table of encoder.md in docs/measured anew.
+every machine.
 """
 
 import math
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
+from motions import REAL, values_of
 from numpy.typing import NDArray
-from pages import markdown, write, write_block
+from pages import MEASURED, markdown, measure, write
 
 from tachometry.sim import golden
-from tachometry.sim.encoder.imperfections import Bounce
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
 from tachometry.sim.golden.front_end import decode
@@ -23,7 +24,7 @@ from tachometry.sim.signals.tables import HeldVelocity, held_velocity, velocity_
 from tachometry.spec import Encoder, STachometer, Timing, TrackTachometer
 from tachometry.spec.core.compare import Compare
 
-DOCS = Path(__file__).resolve().parent.parent / "docs" / "measured"
+PAGE, PICTURE = MEASURED / "encoder.md", MEASURED / "encoder.svg"
 
 FloatArray = NDArray[np.float64]
 
@@ -37,10 +38,7 @@ SHOWN = slice(600, 616)  # ticks
 TIMING = {"clock": "48MHz", "tick": "100us", "max_time": "100ms"}
 PULSES = ("3:7:0:1us", "3:7:0:1us:fine")
 PULSE_MOTIONS = ("constant:10rad/s:500ms", "constant:100rad/s:500ms", "ramp:50rad/s:150rad/s:500ms")
-DISCS: dict[str, dict[str, Any]] = {
-    "ideal": {},
-    "real": {"jitter": 0.05, "nonuniformity": 0.1, "phase_error_deg": 10},
-}
+DISCS: Mapping[str, Mapping[str, str]] = {"ideal": {}, "real": REAL}
 
 # The picture: periods of an encoder with two in a turn, a seed that shows one lost pulse and one illegal, and pixels.
 PULSES_PER_REV, PERIODS, SEED = 2, 4, 17
@@ -48,33 +46,20 @@ LEFT, WIDTH, TOP, ROW, LANE, GAP, COUNT = 190, 560, 32, 108, 12, 5, 2
 GREY, BLACK, BLUE, RED = "#bbb", "#222", "#2a78c8", "#b3261e"
 
 
-@dataclass(frozen=True)
-class Example:
-    """An imperfection as the table has it, and in a magnitude that can be seen."""
-
-    option: str  # what the command line calls it
-    # parameters of the encoder for the table and for the picture; without the latter it is not drawn
-    measured: dict[str, Any] = field(default_factory=dict)
-    drawn: dict[str, Any] = field(default_factory=dict)
-    # decoding and filter_clocks: of the core
-    decoding: int = 4
-    filter_clocks: int = 0
-
-
-BOUNCE = {"bounce": Bounce(3, 8e-6)}
-EXAMPLES = (
-    Example("none"),
-    Example("--jitter 0.05", {"jitter": 0.05}, {"jitter": 0.15}),
-    Example("--nonuniformity 0.1", {"nonuniformity": 0.1}, {"nonuniformity": 0.35}),
-    Example("--phase-error 30", {"phase_error_deg": 30}, {"phase_error_deg": 30}),
-    Example("--phase-error 30 --decoding 1", {"phase_error_deg": 30}, decoding=1),
-    Example("--duty-error 30", {"duty_error_deg": 30}, {"duty_error_deg": 30}),
-    Example("--duty-error 30 --decoding 1", {"duty_error_deg": 30}, decoding=1),
-    Example("--bounce 3:8us", BOUNCE, {"bounce": Bounce(3, 0.06)}),
-    Example("--bounce 3:8us --filter 9", BOUNCE, filter_clocks=9),
-    Example("--lost 0.01", {"lost": 0.01}, {"lost": 0.2}),
-    Example("--illegal 0.01", {"illegal": 0.01}, {"illegal": 0.15}),
-)
+# Imperfections as the table has them, and the magnitudes in which they are drawn, if they are.
+EXAMPLES = {
+    "none": "",
+    "--jitter 0.05": "0.15",
+    "--nonuniformity 0.1": "0.35",
+    "--phase-error 30": "30",
+    "--phase-error 30 --decoding 1": "",
+    "--duty-error 30": "30",
+    "--duty-error 30 --decoding 1": "",
+    "--bounce 3:8us": "3:60ms",
+    "--bounce 3:8us --filter 9": "",
+    "--lost 0.01": "0.2",
+    "--illegal 0.01": "0.15",
+}
 
 
 def turn(counts_per_tick: float, encoder: VirtualEncoder, spec: STachometer) -> tuple[Encoding, Run]:
@@ -94,17 +79,19 @@ def velocity_errors(spec: STachometer, encoding: Encoding, run: Run) -> str:
     return f"{error.rms * percent:.1f} % ({error.mean * percent:+.1f} %)"
 
 
-def measure(example: Example) -> list[str]:
+def row(example: str) -> list[str]:
     """Return a row of the table."""
-    ppr = CORE.encoder.pulses_per_rev
-    spec = replace(CORE, encoder=Encoder(ppr, example.decoding), filter_clocks=example.filter_clocks)
-    encoder = VirtualEncoder(ppr, start_angle_rad=math.pi / (4 * ppr), seed=SEED, **example.measured)
+    ppr, words = CORE.encoder.pulses_per_rev, example.replace("--", "").split()[example == "none" :]
+    faults = dict(zip(words[::2], words[1::2], strict=True))
+    decoding, filter_clocks = int(faults.pop("decoding", "4")), int(faults.pop("filter", "0"))
+    spec = replace(CORE, encoder=Encoder(ppr, decoding), filter_clocks=filter_clocks)
+    encoder = VirtualEncoder(ppr, start_angle_rad=math.pi / (4 * ppr), **values_of(faults, SEED))
     fast, slow = (turn(counts, encoder, spec) for counts in (FAST, SLOW))
     encoding, run = fast
     sampled = (run.ticks.clock[-1] - spec.latency.tick - spec.latency.pin_to_count) / spec.timing.clock_hz
-    true = int(encoding.true_position(sampled, example.decoding))
+    true = int(encoding.true_position(sampled, decoding))
     return [
-        f"`{example.option}`" if example.measured else example.option,
+        f"`{example}`" if faults else example,
         f"{run.ticks.position[-1] - true} of {true}",
         str(len(run.errors)),
         str(int(run.ticks.get("swallowed_edges")[-1])),
@@ -115,23 +102,19 @@ def measure(example: Example) -> list[str]:
 
 
 def table() -> str:
-    """Return markdown."""
-    head = [
-        "encoder and core",
-        "position off (counts)",
-        "`decode_error`",
-        "`swallowed_edges`",
+    """Return the table of imperfections."""
+    heads = ["encoder and core", "position off (counts)", "`decode_error`", "`swallowed_edges`"]
+    heads += [
         f"m_e at {FAST} counts per tick",
         f"velocity error, RMS (mean), at {FAST} counts per tick",
-        f"and at {SLOW}",
     ]
-    return markdown(head, list(map(measure, EXAMPLES)))
+    return markdown([*heads, f"and at {SLOW}"], list(map(row, EXAMPLES)))
 
 
-def pulses(motion: str, disc: dict[str, Any], fine: bool) -> str:
+def pulses(motion: str, disc: Mapping[str, str], fine: bool) -> str:
     """Return how far pulses of the compare output are from their places, in counts: the mean, and RMS about it."""
     spec = TrackTachometer(encoder=Encoder(500), timing=Timing.parse(**TIMING), compare=Compare.parse("", PULSES[fine]))
-    encoder = VirtualEncoder(500, start_angle_rad=math.pi / 2000, seed=SEED, **disc)  # amid position 0
+    encoder = VirtualEncoder(500, start_angle_rad=math.pi / 2000, **values_of(disc, SEED))  # amid position 0
     moved = parse_motion(motion)
     found = golden.run(spec, encoder.record(moved).recording.place(spec.timing.clock_hz)).tables["compare_valid"]
     seconds = found.clock / spec.timing.clock_hz
@@ -142,14 +125,12 @@ def pulses(motion: str, disc: dict[str, Any], fine: bool) -> str:
 
 
 def pulse_table() -> str:
-    """Return markdown."""
-    head = ["disc", "motion", "on counts", "on `position_fine`"]
+    """Return the table of pulses."""
     rows = [
         [name, f"`{motion}`", *(pulses(motion, disc, fine) for fine in (False, True))]
-        for name, disc in DISCS.items()
-        for motion in PULSE_MOTIONS
+        for (name, disc), motion in product(DISCS.items(), PULSE_MOTIONS)
     ]
-    return markdown(head, rows)
+    return markdown(["disc", "motion", "on counts", "on `position_fine`"], rows)
 
 
 def staircase(time: FloatArray, value: NDArray[Any], end: float, bottom: float, height: float, colour: str) -> str:
@@ -165,17 +146,18 @@ def text(x: float, y: float, words: str, anchor: str = "start") -> str:
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{BLACK}">{words}</text>\n'
 
 
-def draw(name: str, drawn: dict[str, Any], top: float) -> str:
+def draw(name: str, magnitude: str, top: float) -> str:
     """Return lines of an encoder over those of an ideal one, and the positions that a decoder makes of both."""
-    encoder = VirtualEncoder(PULSES_PER_REV, start_angle_rad=math.pi / (4 * PULSES_PER_REV), seed=SEED, index=True)
+    start = math.pi / (4 * PULSES_PER_REV)
     motion = parse_motion(f"constant:1rev/s:{PERIODS / PULSES_PER_REV}s")
-    svg = text(8, top + 2 * LANE, name)
+    svg = text(8, top + 2 * LANE, f"--{name}")
     bottoms = [top + (number + 1) * LANE + number * GAP for number in range(3)]
     floor = bottoms[-1] + GAP + 4 * PERIODS * COUNT
     for label, bottom in zip((*"ABZ", "position"), (*bottoms, floor - 2 * PERIODS * COUNT), strict=True):
         svg += text(LEFT - 8, bottom - 2, label, anchor="end")
-    for colours, changes in (((GREY, GREY), {}), ((BLACK, BLUE), drawn)):
-        recording = replace(encoder, **changes).record(motion).recording
+    for colours, faults in (((GREY, GREY), {}), ((BLACK, BLUE), {name: magnitude})):
+        encoder = VirtualEncoder(PULSES_PER_REV, start_angle_rad=start, index=True, **values_of(faults, SEED))
+        recording = encoder.record(motion).recording
         assert recording.z is not None
         for bottom, line in zip(bottoms, (recording.a, recording.b, recording.z), strict=True):
             svg += staircase(recording.time, line, motion.duration, bottom, LANE, colours[0])
@@ -189,23 +171,22 @@ def draw(name: str, drawn: dict[str, Any], top: float) -> str:
 
 
 def picture() -> str:
-    """Return SVG."""
-    shown = [example for example in EXAMPLES if example.drawn]
-    size = f"{LEFT + WIDTH + 20} {TOP + len(shown) * ROW}"
-    svg = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" font-family="DejaVu Sans, Arial, sans-serif"'
-    svg += f' font-size="11">\n<rect width="{LEFT + WIDTH + 20}" height="{TOP + len(shown) * ROW}" fill="white"/>\n'
+    """Return the picture as SVG."""
+    shown = [(example.split()[0].removeprefix("--"), drawn) for example, drawn in EXAMPLES.items() if drawn]
+    width, height = LEFT + WIDTH + 20, TOP + len(shown) * ROW
+    svg = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="DejaVu Sans, Arial, '
+    svg += f'sans-serif" font-size="11">\n<rect width="{width}" height="{height}" fill="white"/>\n'
     svg += text(LEFT, 16, "grey: ideal encoder; black: lines; blue: position that is decoded; red: decode_error")
-    for number, example in enumerate(shown):
-        svg += draw(example.option.split()[0], example.drawn, TOP + number * ROW)
-    return svg + "</svg>\n"
+    return svg + "".join(draw(*one, TOP + number * ROW) for number, one in enumerate(shown)) + "</svg>\n"
 
 
-def main() -> None:
-    """Write both."""
-    write(DOCS / "encoder.svg", picture())
-    write_block(DOCS / "encoder.md", "imperfections", table())
-    write_block(DOCS / "encoder.md", "pulses", pulse_table())
+def imperfections() -> str:
+    """Return the table of imperfections, and draw them."""
+    write(PICTURE, picture())
+    return table()
 
+
+BLOCKS = {"imperfections": imperfections, "pulses": pulse_table}
 
 if __name__ == "__main__":
-    main()
+    measure(PAGE, BLOCKS)

@@ -13,17 +13,16 @@ Exit codes: 0, 2 if an input is wrong or a tool fails.
 
 import argparse
 import json
-import os
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
+from pages import count
 from size import Table, heading, text_of
 
 from tachometry.sim.studies.size import SEEDS, TARGETS, call, measure_verilog, synthesis, versions, wrapper
@@ -75,51 +74,47 @@ def ports_of(verilog: str, top: str, prepare: str) -> list[Port]:
     return ports
 
 
+def source(text: str) -> Path:
+    """Return the path of a file that is there, for argparse."""
+    if not Path(text).is_file():
+        raise argparse.ArgumentTypeError(f"must be there, not {text!r}")
+    return Path(text)
+
+
+def setting(text: str) -> str:
+    """Return a parameter and its value as Yosys takes them, for argparse."""
+    if "=" not in text:
+        raise argparse.ArgumentTypeError(f"must be NAME=VALUE, not {text!r}")
+    return " -set {} {}".format(*text.split("=", 1))
+
+
 def arguments(words: Sequence[str] | None) -> argparse.Namespace:
     """Return the options of the command."""
     parser = argparse.ArgumentParser(description="Measure any Verilog or VHDL as `make size` measures the cores.")
-    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="all sources, .v, .vhd or .vhdl")
-    parser.add_argument("--top", required=True, metavar="NAME", help="the module or entity")
-    parser.add_argument("--clock", default="clk", metavar="NAME", help="its clock (%(default)s)")
-    parser.add_argument("--set", nargs="+", default=[], metavar="NAME=VALUE", help="parameters of the module")
-    parser.add_argument(
-        "--targets", nargs="+", choices=DEVICES, default=tuple(TARGETS), help="FPGAs (all but ECP5-85F)"
-    )
-    parser.add_argument("--seeds", type=int, default=len(SEEDS), metavar="N", help="routings, see docs (%(default)s)")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count(), metavar="N", help="targets at a time (%(default)s)")
-    options = parser.parse_args(words)
-    for name in ("seeds", "jobs"):
-        if getattr(options, name) < 1:
-            parser.error(f"--{name} must be at least 1, not {getattr(options, name)}")
-    for file in options.files:
-        if not file.is_file():
-            parser.error(f"FILE must be there, not {str(file)!r}")
-    for one in options.set:
-        if "=" not in one:
-            parser.error(f"--set must be NAME=VALUE, not {one!r}")
-    return options
+    add = parser.add_argument
+    add("files", nargs="+", type=source, metavar="FILE", help="all sources, .v, .vhd or .vhdl")
+    add("--top", required=True, metavar="NAME", help="the module or entity")
+    add("--clock", default="clk", metavar="NAME", help="its clock (%(default)s)")
+    add("--set", nargs="+", default=[], type=setting, metavar="NAME=VALUE", help="parameters of the module")
+    add("--targets", nargs="+", choices=DEVICES, default=tuple(TARGETS), help="FPGAs (all but ECP5-85F)")
+    add("--seeds", type=count, default=len(SEEDS), metavar="N", help="routings (%(default)s)")
+    return parser.parse_args(words)
 
 
 def run(options: argparse.Namespace) -> None:
     """Measure and print."""
-    tools = versions()
-    verilog = verilog_of(options.files, options.top)
-    settings = "".join(f" -set {name} {value}" for name, value in (one.split("=", 1) for one in options.set))
-    prepare = f"chparam{settings} {options.top}; " if settings else ""
+    tools, verilog = versions(), verilog_of(options.files, options.top)
+    prepare = f"chparam{''.join(options.set)} {options.top}; " if options.set else ""
     ports = ports_of(verilog, options.top, prepare)
     if options.clock not in [port.name for port in ports if port.direction == "input"]:
         inputs = ", ".join(port.name for port in ports if port.direction == "input" and port.width == 1)
         raise RuntimeError(f"--clock must be one of {inputs}, not {options.clock!r}")
     between, seeds = wrapper(ports, options.top, options.clock), range(1, options.seeds + 1)
-    with ThreadPoolExecutor(options.jobs) as pool:
-        found = pool.map(
-            lambda name: measure_verilog(verilog, options.top, between, DEVICES[name], tools, seeds, prepare),
-            options.targets,
-        )
-        for name, one in zip(options.targets, found, strict=True):
-            figures = [*DEVICES[name].cells, "Fmax"]
-            row = [options.top, *(text_of(figure, one) for figure in figures), one.limit]
-            print(Table(name, ["core", *map(heading, figures), "what limits Fmax"], [row]).markdown())
+    for name in options.targets:
+        one = measure_verilog(verilog, options.top, between, DEVICES[name], tools, seeds, prepare)
+        figures = [*DEVICES[name].cells, "Fmax"]
+        row = [options.top, *(text_of(figure, one) for figure in figures), one.limit]
+        print(Table(name, ["core", *map(heading, figures), "what limits Fmax"], [row]).markdown())
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -50,7 +50,7 @@ def test_size_is_that_of_the_core(row: str) -> None:
 
 def test_every_page_and_picture_has_its_hashes() -> None:
     pictures = [one for folder in ("docs", "docs/guides") for one in (pages.ROOT / folder).glob("*.[ps][nv]g")]
-    measured = [one for one in made_of.MEASURED.rglob("*.*") if one != pages.STAMPS]
+    measured = [one for one in pages.MEASURED.rglob("*.*") if one != pages.STAMPS]
     files = {one.relative_to(pages.ROOT).as_posix() for one in (*pictures, *measured)}
     assert files | {"README.md"} == made_of.MADE_OF.keys() | OTHERS
     assert STAMPS.keys() == {f"{file} {part}".strip() for file in made_of.MADE_OF for part in parts(file)}

@@ -87,9 +87,9 @@ def test_what_cannot_be_measured_is_told_in_a_line(
     assert peers.main([str(tmp_path / "chosen.vhd"), "--top", "chosen"]) == 2
     assert capsys.readouterr().err == "GHDL is needed for VHDL: apt-get install ghdl\n"
     for words, told in (
-        (["none.v", "--top", "x"], "FILE must be there, not 'none.v'"),
-        ([counter, "--top", "x", "--set", "W"], "--set must be NAME=VALUE, not 'W'"),
-        ([counter, "--top", "x", "--seeds", "0"], "--seeds must be at least 1, not 0"),
+        (["none.v", "--top", "x"], "FILE: must be there, not 'none.v'"),
+        ([counter, "--top", "x", "--set", "W"], "--set: must be NAME=VALUE, not 'W'"),
+        ([counter, "--top", "x", "--seeds", "0"], "--seeds: must be at least 1, not 0"),
     ):
         with pytest.raises(SystemExit) as stop:
             peers.main(words)
