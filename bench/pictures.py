@@ -13,8 +13,8 @@ from rich.console import Console
 from rich.terminal_theme import MONOKAI
 
 from tachometry.boards.monitor.columns import columns
+from tachometry.boards.monitor.emulator_settings import emulator_settings
 from tachometry.boards.monitor.session import Session
-from tachometry.boards.monitor.settings import emulator_settings
 from tachometry.boards.monitor.watch import State
 from tachometry.cli.reports.monitor import view
 from tachometry.sim.engines.board import BoardSimulation

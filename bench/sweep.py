@@ -9,8 +9,8 @@ from pages import MEASURED, ROOT, markdown, measure
 
 from tachometry.cli.commands.sweep import sweep
 from tachometry.cli.options.points import points_of
-from tachometry.cli.options.settings import of_file
 from tachometry.cli.options.sweep import by_name, point_options
+from tachometry.cli.options.sweep_settings import of_file
 from tachometry.sim.studies.sweeping import cluster
 from tachometry.sim.studies.sweeping.sweep import Point, run_point
 

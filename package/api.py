@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.cli.files import Outputs
-from tachometry.cli.options.guesses import meant
+from tachometry.cli.options.option_aliases import meant
 from tachometry.hdl.export import export
 from tachometry.sim.captures.read import read_capture, with_last_tick
 from tachometry.sim.encoder.motion import parse_motion

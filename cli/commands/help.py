@@ -2,8 +2,8 @@
 
 import click
 
-from tachometry.cli.options.guesses import meant
 from tachometry.cli.options.option import LONG, GroupedCommand
+from tachometry.cli.options.option_aliases import meant
 
 
 @click.command(

@@ -8,12 +8,12 @@ from typing import Any
 import click
 
 from tachometry.cli.files import Outputs
-from tachometry.cli.options.closed_loop import loop_options
+from tachometry.cli.options.loop_study import loop_options
 from tachometry.cli.options.motion import FORMS
 from tachometry.cli.options.option import option, output
 from tachometry.cli.options.points import loops_of
-from tachometry.cli.options.settings import Settings
 from tachometry.cli.options.sweep import JOBS, SCHEDULER, VaryingCommand, check_machines
+from tachometry.cli.options.sweep_settings import Settings
 from tachometry.cli.reports.closed_loop import log_table, loop_table, print_loops
 from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim import build

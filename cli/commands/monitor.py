@@ -16,11 +16,11 @@ import click
 
 from tachometry.boards.fpga.boards import BOARDS
 from tachometry.boards.monitor.columns import columns
+from tachometry.boards.monitor.emulator_settings import emulator_settings
 from tachometry.boards.monitor.recorder import Recorder
 from tachometry.boards.monitor.selftest import selftest as run_selftest
 from tachometry.boards.monitor.selftest import steps
 from tachometry.boards.monitor.session import Session, connected
-from tachometry.boards.monitor.settings import emulator_settings
 from tachometry.boards.monitor.watch import State, watch
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.core import OPTIONAL_CORE_OPTIONS, CoreTexts

@@ -11,8 +11,8 @@ from tachometry.cli.files import Outputs
 from tachometry.cli.options.motion import FORMS, delay, read_delay
 from tachometry.cli.options.option import FilePath, option, output
 from tachometry.cli.options.points import points_of
-from tachometry.cli.options.settings import Settings
 from tachometry.cli.options.sweep import JOBS, SCHEDULER, VaryingCommand, check_machines, point_options
+from tachometry.cli.options.sweep_settings import Settings
 from tachometry.cli.reports.sweep import COLUMNS, print_sweep
 from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim.engines.pick import pick

@@ -30,7 +30,7 @@ from tachometry.cli.options.help import needed
 from tachometry.cli.options.methods import Methods, named_methods
 from tachometry.cli.options.motion import OPTIONAL_MOTION_OPTIONS
 from tachometry.cli.options.option import GroupedCommand, Option, options_named
-from tachometry.cli.options.settings import arguments
+from tachometry.cli.options.sweep_settings import arguments
 from tachometry.cli.reports.compare import shown_scores, shown_time
 from tachometry.cli.reports.core import typed_unit
 from tachometry.sim.encoder.motion import parse_motion

@@ -11,9 +11,9 @@ from typing import Any, Self
 
 from tachometry.boards.fpga.boards import BOARDS
 from tachometry.boards.monitor.columns import columns
+from tachometry.boards.monitor.emulator_settings import Fields, emulator_settings, limits
 from tachometry.boards.monitor.serial_port import SerialPort
 from tachometry.boards.monitor.session import Session
-from tachometry.boards.monitor.settings import Fields, emulator_settings, limits
 from tachometry.boards.monitor.watch import State, watch
 from tachometry.cli.commands import Refused, refusals
 from tachometry.cli.explore.answers import Answer, Texts, check, of_one_axis

@@ -15,8 +15,8 @@ import click
 from click.core import ParameterSource
 from click.shell_completion import CompletionItem
 
-from tachometry.cli.options.guesses import meant
 from tachometry.cli.options.help import line, needed
+from tachometry.cli.options.option_aliases import meant
 from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.spec import METHODS, ParameterError, common_options, own_options
 from tachometry.spec.language import option as declaration

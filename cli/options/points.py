@@ -8,12 +8,12 @@ from itertools import product
 
 import click
 
-from tachometry.cli.options.closed_loop import LOOP, loop_click_options, loop_options
 from tachometry.cli.options.core import core_click_options
+from tachometry.cli.options.loop_study import LOOP, loop_click_options, loop_options
 from tachometry.cli.options.methods import listed_methods, shown_name
 from tachometry.cli.options.option import message_of
-from tachometry.cli.options.settings import Settings, Text, arguments
 from tachometry.cli.options.sweep import ENCODER, by_name, point_options
+from tachometry.cli.options.sweep_settings import Settings, Text, arguments
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.studies.sweeping.grid import Grid, Item, Loops, Points

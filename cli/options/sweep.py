@@ -9,7 +9,7 @@ import click
 from tachometry.cli.options.core import core_click_options
 from tachometry.cli.options.motion import ENCODER_OPTIONS
 from tachometry.cli.options.option import SHORT, GroupedCommand, option, options_named
-from tachometry.cli.options.settings import arguments, of_command_line, of_file
+from tachometry.cli.options.sweep_settings import arguments, of_command_line, of_file
 
 # Gives what the options of the encoder make.
 ENCODER = click.command("sweep")(ENCODER_OPTIONS(lambda encoder, motion: (encoder, motion)))

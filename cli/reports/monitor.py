@@ -13,7 +13,7 @@ from rich.text import Text
 
 from tachometry.boards.monitor.selftest import Result
 from tachometry.boards.monitor.watch import HISTORY, Display, State
-from tachometry.cli.reports.streams import printable
+from tachometry.cli.reports.standard_streams import printable
 from tachometry.spec.core.health import FAULT_TEXTS, Fault
 from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.language.port import MISSED, WIDE

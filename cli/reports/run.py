@@ -10,7 +10,7 @@ from rich.text import Text
 
 from tachometry.cli.reports.capture import axis_warnings, capture_rows, channels, index_distance
 from tachometry.cli.reports.core import choice
-from tachometry.cli.reports.streams import INTERRUPTED, printable
+from tachometry.cli.reports.standard_streams import INTERRUPTED, printable
 from tachometry.cli.reports.terminal import print_rows, stdout_console
 from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.simulation import Axis, Simulation

@@ -24,7 +24,7 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-from tachometry.cli.reports.streams import printable
+from tachometry.cli.reports.standard_streams import printable
 
 _PATIENCE = 2.0  # seconds of work without a bar
 LINE_SECONDS = 10.0  # of work between two lines in a pipe

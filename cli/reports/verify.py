@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from rich.text import Text
 
-from tachometry.cli.reports.streams import INTERRUPTED
+from tachometry.cli.reports.standard_streams import INTERRUPTED
 from tachometry.cli.reports.terminal import print_table, stdout_console
 from tachometry.sim.studies.verify import Verification
 

@@ -14,7 +14,7 @@ from support.nightly import only_rows
 
 from tachometry.cli.commands import Refused, refusals
 from tachometry.cli.files import writable_caches
-from tachometry.cli.reports.streams import printable
+from tachometry.cli.reports.standard_streams import printable
 from tachometry.cli.reports.terminal import print_rows, print_table
 from tachometry.sim.studies import plan as study
 

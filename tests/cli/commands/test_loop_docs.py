@@ -12,10 +12,10 @@ from support import command, docs
 from support.nightly import nightly, only
 
 from tachometry.cli.commands.loop import loop
-from tachometry.cli.options.closed_loop import loop_options
+from tachometry.cli.options.loop_study import loop_options
 from tachometry.cli.options.points import loops_of
-from tachometry.cli.options.settings import of_command_line
 from tachometry.cli.options.sweep import by_name
+from tachometry.cli.options.sweep_settings import of_command_line
 from tachometry.sim.engines.loop import Observer
 from tachometry.sim.studies.loops.control import Outcome, outcome_of, simulation_of
 

@@ -7,8 +7,8 @@ import click
 from support import docs
 
 from tachometry.cli.commands.sweep import sweep
-from tachometry.cli.options.settings import of_command_line, of_file
 from tachometry.cli.options.sweep import by_name, point_options
+from tachometry.cli.options.sweep_settings import of_command_line, of_file
 
 DOCS = docs.DOCS / "guides"
 PAGE = (DOCS / "sweep.md").read_text()

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tachometry.boards.monitor.settings import emulator_settings
+from tachometry.boards.monitor.emulator_settings import emulator_settings
 from tachometry.spec import of_texts
 from tachometry.spec.registers.emulator import fastest, rad_per_s, rate_of
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from tachometry.cli.commands.sweep import sweep
-from tachometry.cli.options.closed_loop import loop_options
-from tachometry.cli.options.settings import Settings, arguments, of_command_line, of_file
+from tachometry.cli.options.loop_study import loop_options
 from tachometry.cli.options.sweep import by_name, point_options
+from tachometry.cli.options.sweep_settings import Settings, arguments, of_command_line, of_file
 
 OPTIONS = by_name(sweep) | point_options()
 
