@@ -99,24 +99,14 @@ def _record(encoder: VirtualEncoder, motion: str, spec: TachometerSpec) -> Encod
     return replace(encoding, recording=replace(encoding.recording, source=log.source))
 
 
-def _read_encoder(**given: Any) -> dict[str, Any]:
+def _read_record(*, motion: str | None, **given: Any) -> dict[str, Any]:
     values = take_values(EncoderOptions, given)
 
-    def encoder(spec: TachometerSpec) -> VirtualEncoder:
+    def record(spec: TachometerSpec, axis: int = 0, axes: int | None = None) -> Encoding:
         from tachometry.sim.encoder.virtual import VirtualEncoder
 
-        return VirtualEncoder.of_core(spec, **values)
-
-    return dict(encoder=encoder, **given)
-
-
-def _read_record(*, motion: str | None, **given: Any) -> dict[str, Any]:
-    others = _read_encoder(**given)
-    encoder = others.pop("encoder")
-
-    def record(spec: TachometerSpec, axis: int = 0, axes: int | None = None) -> Encoding:
         assert motion is not None
-        own: VirtualEncoder = encoder(spec)
+        own = VirtualEncoder.of_core(spec, **values)
         if axes is None:
             return _record(own, motion, spec)
         each = motion.split(",")
@@ -126,8 +116,8 @@ def _read_record(*, motion: str | None, **given: Any) -> dict[str, Any]:
 
     if motion is None:
         refuse_without("--motion", _OPTIONS)
-        return dict(record=None, tables=[], **others)
-    return dict(record=record, tables=tables_of(motion), **others)
+        return dict(record=None, tables=[], **given)
+    return dict(record=record, tables=tables_of(motion), **given)
 
 
 MOTION_OPTIONS = Group([_motion(required=True), *_OPTIONS], _read_record)
@@ -139,9 +129,6 @@ reads.
 
 OPTIONAL_MOTION_OPTIONS = Group([_motion(required=False), *_OPTIONS], _read_record)
 """As `MOTION_OPTIONS`, but without a motion `record` is None."""
-
-ENCODER_OPTIONS = Group(MOTION_OPTIONS.options, _read_encoder)
-"""As `MOTION_OPTIONS`, but handed over as `motion`, a text, and `encoder`, a function of a spec."""
 
 DISC_OPTIONS = [
     _motion(required=True),

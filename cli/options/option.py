@@ -266,6 +266,8 @@ def plain_options(group: str, helps: Mapping[str, str]) -> list[Callable[[Any], 
 
 def declared(group: str, about: declaration.Option) -> Callable[[Command], Command]:
     """Decorate a command with an option that a class declares; its value is a text, a flag's yes or no, or None."""
+    if about.flag and about.default is False:
+        return option(group, f"--{about.name}", is_flag=True, help=about.help)
     if about.flag:
         return option(group, f"--{about.name}/--no-{about.name}", default=None, help=about.help + default_of(about))
     return option(group, f"--{about.name}", help=about.help + default_of(about), **kind_of(about))

@@ -5,29 +5,32 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
 from itertools import product
+from typing import Any
 
 import click
 
 from tachometry.cli.options.core import core_click_options
-from tachometry.cli.options.loop_study import LOOP, loop_click_options, loop_options
+from tachometry.cli.options.loop_study import loop_options, read_loop
 from tachometry.cli.options.methods import listed_methods, shown_name
 from tachometry.cli.options.option import message_of
-from tachometry.cli.options.sweep import ENCODER, by_name, point_options
-from tachometry.cli.options.sweep_settings import Settings, Text, arguments
+from tachometry.cli.options.sweep import point_options
+from tachometry.cli.options.sweep_settings import Settings, Text
 from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.studies.sweeping.grid import Grid, Item, Loops, Points
 from tachometry.sim.studies.sweeping.loops import LoopPoint, seeds_from
 from tachometry.sim.studies.sweeping.sweep import COLUMNS, Point
-from tachometry.spec import AUTO, METHODS, TachometerSpec, common_options, methods_with, of_texts
+from tachometry.spec import AUTO, METHODS, ParameterError, TachometerSpec, common_options, methods_with, of_texts
+from tachometry.spec.language.option import options_of, read_options
 from tachometry.spec.language.units import FREQUENCY, SPEED, TIME, read_nearest
 
-Words = tuple[str, ...]
 Listed = tuple[str, str | None, Mapping[str, str]]  # name, method, and its options
 
 _MOST, _MOST_LOOPS = 1_000_000, 100_000
 _PLACE = re.compile(r"\{([^{}]*)\}")
 _UNITS = SPEED | TIME | FREQUENCY
+_FAULTS = tuple(about.name for about in options_of(EncoderOptions))
 
 
 def points_of(settings: Settings, methods: str, earliest: float, engine: str | None, read_delay: float = 0.0) -> Points:
@@ -103,33 +106,29 @@ class _Maker:
 
     def __init__(self, run: tuple[float, str | None, float]) -> None:
         self._run = run
-        self._spec, self._encoder, self._motion = cache(_spec), cache(_parsed_encoder), cache(parse_motion)
+        self._spec, self._values, self._motion = cache(_spec), cache(_encoder_values), cache(parse_motion)
 
     def point(self, name: str, method: str, given: Mapping[str, str], texts: Mapping[str, Text]) -> Point:
         """Return the point of a method, with texts of some of its options and of names in the motion."""
         core = {key: texts[key] for key in core_click_options() if key in texts} | dict(given)
         spec = self._spec(method, tuple(core.items()))
-        encoder, motion = self._encoder(_words(texts, ENCODER))
+        faults = {key: text for key in _FAULTS if (text := texts.get(key)) is not None}
+        encoder = VirtualEncoder.of_core(spec, **self._values(tuple(faults.items())))
+        if (motion := texts.get("motion")) is None:
+            raise ParameterError("motion", "must be given")
         places = {key: texts[key] or "" for key in _PLACE.findall(motion)}
         values = {key: read_nearest(f"{{{key}}}", text, _UNITS, "rad/s") for key, text in places.items()}
         motion = _PLACE.sub(lambda place: places[place[1]], motion)
         moved = self._motion(motion)
-        return Point(shown_name(name, spec), spec, encoder(spec), moved, motion, values, *self._run)
-
-
-def _words(texts: Mapping[str, Text], command: click.Command) -> Words:
-    options = by_name(command)
-    return tuple(arguments({name: text for name, text in texts.items() if name in options}, options))
+        return Point(shown_name(name, spec), spec, encoder, moved, motion, values, *self._run)
 
 
 def _spec(method: str, texts: tuple[tuple[str, Text], ...]) -> TachometerSpec:
     return of_texts(method, dict(texts))
 
 
-def _parsed_encoder(words: Words) -> tuple[Callable[[TachometerSpec], VirtualEncoder], str]:
-    with ENCODER.make_context("sweep", list(words)) as context:
-        encoder_and_motion: tuple[Callable[[TachometerSpec], VirtualEncoder], str] = ENCODER.invoke(context)
-        return encoder_and_motion
+def _encoder_values(texts: tuple[tuple[str, str], ...]) -> dict[str, Any]:
+    return read_options(EncoderOptions, dict(texts))
 
 
 def loops_of(settings: Settings, methods: str, n_seeds: int) -> Loops:
@@ -150,9 +149,7 @@ def loops_of(settings: Settings, methods: str, n_seeds: int) -> Loops:
 
 def _loop(n_seeds: int, name: str, method: str, given: Mapping[str, str], texts: Mapping[str, Text]) -> LoopPoint:
     core = {key: texts[key] for key in core_click_options() if key in texts} | dict(given)
-    of_loop = {key: text for key, text in texts.items() if key in loop_click_options()}
-    with LOOP.make_context("loop", arguments(of_loop, loop_click_options())) as context:
-        make, motion, seed = LOOP.invoke(context)
+    make, motion, seed = read_loop({key: text for key, text in texts.items() if text is not None})
     setting = make(of_texts(method, core, make))
     return LoopPoint(shown_name(name, setting.spec), setting, motion, seeds_from(seed, n_seeds))
 

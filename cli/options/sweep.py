@@ -1,19 +1,15 @@
 """Options that a sweep can vary: those of cores, of methods and of the encoder; and commands whose options may vary."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
 from tachometry.cli.options.core import core_click_options
-from tachometry.cli.options.motion import ENCODER_OPTIONS
-from tachometry.cli.options.option import SHORT, GroupedCommand, option, options_named
+from tachometry.cli.options.motion import MOTION_OPTIONS
+from tachometry.cli.options.option import SHORT, GroupedCommand, all_of, option, options_named
 from tachometry.cli.options.sweep_settings import arguments, of_command_line, of_file
-
-# Gives what the options of the encoder make.
-ENCODER = click.command("sweep")(ENCODER_OPTIONS(lambda encoder, motion: (encoder, motion)))
-
 
 SCHEDULER = option(
     "Machines",
@@ -40,9 +36,14 @@ def by_name(command: click.Command) -> dict[str, click.Option]:
     return {option.opts[0].lstrip("-"): option for option in options}
 
 
+def made_by_name(options: Sequence[Callable[[Any], Any]]) -> dict[str, click.Option]:
+    """Return the options that decorators of a command make, by their names."""
+    return by_name(click.command()(all_of(options, lambda: None)))
+
+
 def point_options() -> dict[str, click.Option]:
     """Return all options that a sweep can vary, by their names."""
-    return core_click_options() | by_name(ENCODER)
+    return core_click_options() | made_by_name(MOTION_OPTIONS.options)
 
 
 class VaryingCommand(GroupedCommand):
