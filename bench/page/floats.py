@@ -1,6 +1,7 @@
 """Stands in for what the equations of `sim.theory` need of NumPy, in a browser, where there is none.
 
 An array has one dimension and is a list. With another of its length, or with a number, it acts element by element.
+Functions and members mean what those of NumPy mean; they are explained where they are not as general.
 """
 
 import builtins
@@ -28,19 +29,15 @@ class ndarray(list[Any]):
         return ndarray(found) if isinstance(key, slice) else found
 
     def astype(self, kind: Callable[[Any], Any]) -> "ndarray":
-        """Return it with elements of this kind."""
         return ndarray(map(kind, self))
 
     def tolist(self) -> list[Any]:
-        """Return a plain list."""
         return list(self)
 
     def all(self) -> bool:
-        """Tell whether all are true."""
         return builtins.all(self)
 
     def any(self) -> bool:
-        """Tell whether one is true."""
         return builtins.any(self)
 
 
@@ -73,23 +70,7 @@ def _operator(function: Callable[..., Any], *, reflected: bool = False) -> Calla
     return (lambda self, other: act(other, self)) if reflected else lambda self, *other: act(self, *other)
 
 
-for _name in (
-    "add",
-    "sub",
-    "mul",
-    "truediv",
-    "floordiv",
-    "mod",
-    "pow",
-    "and",
-    "or",
-    "gt",
-    "ge",
-    "lt",
-    "le",
-    "eq",
-    "ne",
-):
+for _name in "add sub mul truediv floordiv mod pow and or gt ge lt le eq ne".split():
     _function = _quotient if _name == "truediv" else getattr(operator, f"__{_name}__")
     setattr(ndarray, f"__{_name}__", _operator(_function))
     setattr(ndarray, f"__r{_name}__", _operator(_function, reflected=True))
@@ -112,73 +93,59 @@ def asarray(values: Any, dtype: Callable[[Any], Any] | None = None) -> Any:
 
 
 def all(values: Any) -> bool:
-    """Tell whether all are true."""
     return asarray(values).all() if isinstance(values, list) else bool(values)
 
 
 def any(values: Any) -> bool:
-    """Tell whether one is true."""
     return asarray(values).any() if isinstance(values, list) else bool(values)
 
 
 def full(length: int, value: Any) -> ndarray:
-    """Return an array of one value."""
     return ndarray([value] * length)
 
 
 def zeros(length: Any, dtype: Callable[[int], Any] = float) -> ndarray:
-    """Return an array of zeros of a length, or a shape of one dimension."""
     return full(length[0] if isinstance(length, tuple) else length, dtype(0))
 
 
 def ones_like(values: ndarray) -> ndarray:
-    """Return as many ones."""
     return full(len(values), 1.0)
 
 
 def choose(which: ndarray, values: list[ndarray]) -> ndarray:
-    """Return of each place the value of the array that is named there."""
     return ndarray(values[number][place] for place, number in enumerate(which))
 
 
 def atleast_1d(values: Any) -> ndarray:
-    """Return an array, of one element for a number."""
     return values if isinstance(values, ndarray) else ndarray([values])
 
 
 def concatenate(arrays: Iterable[list[Any]]) -> ndarray:
-    """Return the elements of all arrays."""
     return ndarray(value for array in arrays for value in array)
 
 
 def unique(values: list[Any]) -> ndarray:
-    """Return what there is, in order, and each once."""
     return ndarray(sorted(set(values)))
 
 
 def argmax(values: list[Any]) -> int:
-    """Return where the greatest one is."""
     return values.index(max(values))
 
 
 def nanmin(values: list[float]) -> float:
-    """Return the least of the numbers."""
     return min(value for value in values if not math.isnan(value))
 
 
 def nanmax(values: list[float]) -> float:
-    """Return the greatest of the numbers."""
     return max(value for value in values if not math.isnan(value))
 
 
 def geomspace(first: float, last: float, number: int) -> ndarray:
-    """Return numbers with the same ratio of one to the next."""
     inside = (first * (last / first) ** (place / (number - 1)) for place in range(1, number - 1))
     return ndarray([first, *inside, last])
 
 
 def errstate(**_: str) -> contextlib.AbstractContextManager[None]:
-    """Return a context in which nothing changes."""
     return contextlib.nullcontext()
 
 
@@ -198,22 +165,6 @@ def _refuse(missing: _Missing, *_: object) -> None:
     raise ValueError(f"needs {missing.__name__}, which a browser does not have: type the command instead")
 
 
-for _name in (
-    "iter",
-    "len",
-    "bool",
-    "getitem",
-    "add",
-    "radd",
-    "sub",
-    "rsub",
-    "mul",
-    "rmul",
-    "lt",
-    "le",
-    "gt",
-    "ge",
-    "eq",
-):
+for _name in "iter len bool getitem add radd sub rsub mul rmul lt le gt ge eq".split():
     setattr(_Missing, f"__{_name}__", _refuse)
 __getattr__ = _Missing("numpy", (), {}).__getattr__
