@@ -15,9 +15,9 @@ from pages import markdown
 
 from tachometry.cli.options.methods import listed_methods
 from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES, settings, steps_curve
 from tachometry.sim.studies.comparing.compare import Curve, Judge, core_curve
 from tachometry.sim.studies.comparing.comparison import steps_beside
-from tachometry.sim.studies.comparing.rivals import BASELINES, settings, steps_curve
 from tachometry.sim.studies.comparing.tune import TUNED, core_settings, error_of
 from tachometry.spec import TachometerSpec, of_texts
 

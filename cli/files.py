@@ -9,7 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from tachometry.sim.signals.scratch import Claim, held_back, locked, scratch, stale
+from tachometry.sim.signals.temporary import Claim, held_back, locked, scratch, stale
 
 # What the system says of a disk that takes no more.
 DISK = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO))

@@ -9,7 +9,7 @@ from types import FrameType
 from typing import NoReturn
 
 from tachometry.cli.reports.standard_streams import INTERNAL, INTERRUPTED, UNREAD, prepare_streams, printable, silence
-from tachometry.sim.signals.scratch import STOPS
+from tachometry.sim.signals.temporary import STOPS
 
 _LONGEST = 2000  # characters of a message, which may quote what is in a file
 

@@ -18,7 +18,7 @@ from pathlib import Path
 import platformdirs
 
 from tachometry.sim.signals.progress import at_work
-from tachometry.sim.signals.scratch import run_tool, scratch
+from tachometry.sim.signals.temporary import run_tool, scratch
 from tachometry.spec.language.tools import complaint
 
 _FLAGS = ("-std=c++17", "-O2", "-w", "-fPIC", "-fvisibility=hidden", "-pthread")

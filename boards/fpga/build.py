@@ -13,7 +13,7 @@ from tachometry.boards.fpga.flow import NETLIST, REPORT, ROUTE_LOG, SYNTHESIS, F
 from tachometry.boards.fpga.timing import TimingError, check_hold, slowest_clock
 from tachometry.boards.fpga.tools import EXTRA, ToolError, find, run, versions
 from tachometry.hdl.export.verilog import bundled_yosys
-from tachometry.sim.signals.scratch import scratch
+from tachometry.sim.signals.temporary import scratch
 
 if TYPE_CHECKING:
     from amaranth.lib import wiring

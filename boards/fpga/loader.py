@@ -6,7 +6,7 @@ from typing import Any
 
 from tachometry.boards.fpga.board import Board
 from tachometry.boards.fpga.tools import ToolError, find
-from tachometry.sim.signals.scratch import run_tool
+from tachometry.sim.signals.temporary import run_tool
 from tachometry.spec.language.files import MOST_JSON, read_text
 from tachometry.spec.language.tools import complaint
 

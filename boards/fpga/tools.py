@@ -7,7 +7,7 @@ import sysconfig
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from tachometry.sim.signals.scratch import run_tool
+from tachometry.sim.signals.temporary import run_tool
 from tachometry.spec.language.tools import complaint
 
 EXTRA = "pip install 'tachometry[boards]'"

@@ -14,7 +14,7 @@ from click.shell_completion import shell_complete
 from tachometry.cli.files import DISK, writable_caches
 from tachometry.cli.options.option import message_of
 from tachometry.sim.signals.progress import show_work
-from tachometry.sim.signals.scratch import PREFIX
+from tachometry.sim.signals.temporary import PREFIX
 
 COMMANDS = {
     "plan": "Show what a core can measure: resolution and time over speed.",

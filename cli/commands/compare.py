@@ -20,8 +20,8 @@ from tachometry.hdl.export import export
 from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.signals.files import write_csv
 from tachometry.sim.signals.recording import Recording
+from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES
 from tachometry.sim.studies.comparing.comparison import Comparison, Source, comparison
-from tachometry.sim.studies.comparing.rivals import BASELINES
 from tachometry.sim.studies.size import CORE, SEEDS, TARGETS, Measurement, measure_core, versions
 from tachometry.spec import TachometerSpec
 from tachometry.spec.language.units import parse_time

@@ -27,7 +27,7 @@ from tachometry.cli.options.core import OPTIONAL_CORE_OPTIONS, CoreTexts
 from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
 from tachometry.cli.options.target import SIMULATED, Target, target_of
 from tachometry.cli.reports.monitor import SelftestReport, display
-from tachometry.sim.signals.scratch import STOPS
+from tachometry.sim.signals.temporary import STOPS
 from tachometry.spec.language.units import parse_time, plural
 from tachometry.spec.registers.demo import PERIOD_WIDTH, DemoMap
 

@@ -38,9 +38,9 @@ from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.signals.progress import no_bar
 from tachometry.sim.signals.recording import Recording
-from tachometry.sim.signals.scratch import scratch
+from tachometry.sim.signals.temporary import scratch
+from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES
 from tachometry.sim.studies.comparing.comparison import Source, comparison
-from tachometry.sim.studies.comparing.rivals import BASELINES
 from tachometry.sim.studies.estimate import FAMILIES
 from tachometry.sim.studies.plan import Plan, Plans, cells_of, default_range
 from tachometry.sim.studies.size import CORE, SEEDS, TARGETS, measure_core, versions

@@ -23,7 +23,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import HANDLED_SIGNALS
 
 from tachometry.cli.explore import POLICY
-from tachometry.sim.signals.scratch import STOPS, end_tools
+from tachometry.sim.signals.temporary import STOPS, end_tools
 
 HOST = "127.0.0.1"
 MOST_BYTES = 16 << 20  # that are asked with: a capture, in base64

@@ -71,7 +71,7 @@ def _read(
     lines = dict(a=a, b=b, c=c, z=z, tick_in=tick_in, threshold=threshold, samplerate=samplerate)
 
     def read(capture: Path, spec: CoreSpec, axis: int = 0) -> Recording:
-        from tachometry.sim.captures.cells import parse_threshold
+        from tachometry.sim.captures.cell_parsers import parse_threshold
         from tachometry.sim.captures.count_log import read_count_log
         from tachometry.sim.captures.file import SAME, CaptureError, OptionError, is_stream
         from tachometry.sim.captures.header import TextOptions

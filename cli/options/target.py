@@ -49,7 +49,7 @@ class Target:
         if not self.is_simulated:
             yield self.port
             return
-        from tachometry.boards.simulated.simulated_board import SimulatedBoard
+        from tachometry.boards.simulated.board import SimulatedBoard
         from tachometry.sim.engines.board import BoardSimulation
 
         simulation = BoardSimulation(self.registers, self.bus)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.captures.cells import numbers
+from tachometry.sim.captures.cell_parsers import numbers
 from tachometry.sim.captures.file import CaptureError, Channel, OptionError, check_edges, kind_of, reading
 from tachometry.sim.captures.header import PLAIN, Header, TextOptions, check_seconds, read_header
 from tachometry.sim.captures.rows import COUNTERS, Lines, Times, blocks, opened, refuse

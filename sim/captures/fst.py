@@ -15,7 +15,7 @@ from typing import Any
 from tachometry.sim.captures.file import NONE, CaptureError, Channel, OptionError, check_regular, reading
 from tachometry.sim.captures.waveform import Changes, Names, Variable
 from tachometry.sim.signals.recording import Recording
-from tachometry.sim.signals.scratch import run_tool
+from tachometry.sim.signals.temporary import run_tool
 
 _HEADER = struct.Struct(">BQQQ")  # type of the first block, its length, time of the beginning and of the end
 _PLAIN, _PACKED = 0, 254  # types of it

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.captures.cells import NUMBER, Threshold, origin_of
+from tachometry.sim.captures.cell_parsers import NUMBER, Threshold, origin_of
 from tachometry.sim.captures.file import CaptureError, Channel, OptionError
 from tachometry.sim.captures.sigrok import agreed_samplerate, divide, parse_samplerate
-from tachometry.sim.captures.sniff import VOLTS, Table, bare, is_comment, names_times, sniff, trimmed
+from tachometry.sim.captures.text_layout import VOLTS, Table, bare, is_comment, names_times, sniff, trimmed
 from tachometry.sim.captures.time_unit import TimeUnit, parted, rank, unit_named
 from tachometry.spec.language.units import TIME
 

@@ -11,10 +11,10 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.captures import cells
+from tachometry.sim.captures import cell_parsers
 from tachometry.sim.captures.file import CaptureError, opened_bytes
 from tachometry.sim.captures.header import Header
-from tachometry.sim.captures.sniff import is_comment
+from tachometry.sim.captures.text_layout import is_comment
 from tachometry.spec.language.units import plural
 
 LONGEST = 1 << 16  # characters of a line, and of all that is above the rows
@@ -129,7 +129,7 @@ class Times:
         if header.time is None:
             return np.arange(self._rows - n, self._rows, dtype=np.float64)
         texts = columns[header.time]
-        time = cells.numbers(texts) if header.origin is None else cells.nanoseconds(texts, header.origin)
+        time = cell_parsers.numbers(texts) if header.origin is None else cell_parsers.nanoseconds(texts, header.origin)
         what = "a number" if header.origin is None else "a date and a time as in the rows before"
         refuse(path, line, np.isnan(time), f"{header.names[header.time]} must be {what}", texts)
         latest = _LATEST if header.samplerate_hz is None else _LAST_SAMPLE

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.captures import cells
+from tachometry.sim.captures import cell_parsers
 from tachometry.sim.captures.file import (
     NONE,
     CaptureError,
@@ -78,7 +78,7 @@ class _Pins:
     def __init__(self, path: Path, header: Header, options: TextOptions, lines: Sequence[Line]) -> None:
         self._path, self._header, self._threshold = path, header, options.threshold
         self._lines = [(header.column(number), bit) for number, bit in lines]
-        self._last = np.full(len(lines), cells.HELD, np.int8)
+        self._last = np.full(len(lines), cell_parsers.HELD, np.int8)
         self._gaps = 0
 
     def of(self, line: Sequence[int], columns: Sequence[Sequence[str]]) -> NDArray[np.int8]:
@@ -87,15 +87,15 @@ class _Pins:
         for (column, bit), last in zip(self._lines, self._last, strict=True):
             texts, name = columns[column], self._header.names[column]
             if bit is not None:
-                level, rule = cells.bits(texts, bit), f"{name} must be a whole number"
+                level, rule = cell_parsers.bits(texts, bit), f"{name} must be a whole number"
             elif self._threshold is not None:
-                level = cells.compared(texts, self._threshold, self._header.volts(column))
+                level = cell_parsers.compared(texts, self._threshold, self._header.volts(column))
                 rule = f"{name} must be a number"
             else:
-                level, rule = cells.levels(texts), f"level of {name} must be 0 or 1"
-            refuse(self._path, line, level == cells.BAD, rule, texts, self._hint(name, bit))
+                level, rule = cell_parsers.levels(texts), f"level of {name} must be 0 or 1"
+            refuse(self._path, line, level == cell_parsers.BAD, rule, texts, self._hint(name, bit))
             self._gaps += texts.count("X") + texts.count("x")
-            every.append(cells.held(level, int(last)))
+            every.append(cell_parsers.held(level, int(last)))
         level = np.stack(every)
         self._last = level[:, -1]
         return level
@@ -104,7 +104,7 @@ class _Pins:
         """Return a function of a bad cell that says what to type."""
 
         def hint(cell: str) -> str:
-            if bit is not None or self._threshold is not None or not cells.NUMBER.fullmatch(cell):
+            if bit is not None or self._threshold is not None or not cell_parsers.NUMBER.fullmatch(cell):
                 return ""
             if cell.isdigit() and int(cell) > 3:
                 return f" (of a counter, --count {shlex.quote(name)} takes its counts)"
@@ -142,7 +142,7 @@ class _Changes:
 
     def add(self, time: NDArray[np.float64], levels: NDArray[np.int8]) -> None:
         """Add a block of rows."""
-        known = (levels != cells.HELD).all(axis=0)
+        known = (levels != cell_parsers.HELD).all(axis=0)
         self._unknown += int(np.count_nonzero(~known))
         if not known.any():
             return

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.index_state import in_state, passed_by
-from tachometry.sim.golden.ordered import places
+from tachometry.sim.golden.sorted_lookup import places
 from tachometry.sim.golden.tooth_wheel import Teeth, filled
 from tachometry.sim.signals.recording import PinTrace, merged, packed
 from tachometry.sim.signals.run import Table

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.front_end import Steps
-from tachometry.sim.golden.ordered import places
+from tachometry.sim.golden.sorted_lookup import places
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from tachometry.sim.build import cached, digest
-from tachometry.sim.signals.scratch import run_tool
+from tachometry.sim.signals.temporary import run_tool
 from tachometry.spec import Port
 from tachometry.spec.control import AnySpec
 

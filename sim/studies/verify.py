@@ -23,7 +23,7 @@ from tachometry.sim.engines.pick import pick
 from tachometry.sim.signals.axes import Trace
 from tachometry.sim.signals.progress import Bar
 from tachometry.sim.signals.run import Mismatch, Run
-from tachometry.sim.signals.scratch import held_back
+from tachometry.sim.signals.temporary import held_back
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.sim.studies.pairs import AXES, WHEELS, configurations, core_of
 from tachometry.spec import CoreSpec

@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from tachometry.sim.signals.scratch import run_tool, scratch
+from tachometry.sim.signals.temporary import run_tool, scratch
 from tachometry.sim.testbench.vectors import cocotb_bench
 from tachometry.spec import of_manifest
 from tachometry.spec.control import AnySpec

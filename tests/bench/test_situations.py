@@ -10,9 +10,9 @@ from motions import OTHERS, SITUATIONS, Situation
 from support.command import run
 from support.nightly import only
 
+from tachometry.sim.studies.comparing.baseline_catalogue import steps_curve
 from tachometry.sim.studies.comparing.compare import Judge
 from tachometry.sim.studies.comparing.comparison import steps_beside
-from tachometry.sim.studies.comparing.rivals import steps_curve
 from tachometry.sim.studies.comparing.tune import error_of
 from tachometry.spec import of_texts
 

@@ -23,7 +23,7 @@ from support.nightly import nightly
 from tachometry.cli.commands import COMMANDS as NAMES
 from tachometry.cli.commands import load
 from tachometry.cli.main import main
-from tachometry.sim.signals.scratch import STOPS
+from tachometry.sim.signals.temporary import STOPS
 from tachometry.sim.studies import verify as study
 from tachometry.sim.studies.pairs import configurations
 

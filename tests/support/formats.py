@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from tachometry.sim.captures.cells import Threshold
+from tachometry.sim.captures.cell_parsers import Threshold
 from tachometry.sim.captures.header import PLAIN, TextOptions
 from tachometry.sim.captures.time_unit import TimeUnit
 

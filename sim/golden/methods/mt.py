@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.methods.timed import Counts, Ints, Measurements, enclosure, updates, with_silences
-from tachometry.sim.golden.ordered import chain, next_place, not_before
+from tachometry.sim.golden.sorted_lookup import chain, next_place, not_before
 from tachometry.sim.signals.run import Table
 from tachometry.spec import MTTachometer
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.methods.timed import Counts, Measurements, enclosure, updates, with_silences
-from tachometry.sim.golden.ordered import chain, next_place, not_before
+from tachometry.sim.golden.sorted_lookup import chain, next_place, not_before
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TTachometer
 

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.front_end import Steps
-from tachometry.sim.golden.ordered import chain, next_place, places, spans
 from tachometry.sim.golden.quotient import round_quotient
+from tachometry.sim.golden.sorted_lookup import chain, next_place, places, spans
 from tachometry.sim.signals.run import Table
 from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.methods.timed import TimedTachometer

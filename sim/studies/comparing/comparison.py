@@ -11,6 +11,7 @@ from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.progress import Bar
 from tachometry.sim.signals.recording import PinTrace, Recording
+from tachometry.sim.studies.comparing.baseline_catalogue import baseline_model, settings, steps_curve
 from tachometry.sim.studies.comparing.baselines import Steps
 from tachometry.sim.studies.comparing.compare import (
     Curve,
@@ -23,7 +24,6 @@ from tachometry.sim.studies.comparing.compare import (
     read_times,
     score,
 )
-from tachometry.sim.studies.comparing.rivals import baseline_model, settings, steps_curve
 from tachometry.sim.studies.comparing.tune import (
     SETTLED_S,
     TUNED,

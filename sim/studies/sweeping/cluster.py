@@ -13,7 +13,7 @@ from contextlib import ExitStack, contextmanager
 from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any
 
-from tachometry.sim.signals.scratch import scratch
+from tachometry.sim.signals.temporary import scratch
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.units import plural
 

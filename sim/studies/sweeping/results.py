@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 from filelock import FileLock, Timeout
 
 from tachometry.sim.signals.files import replacing
-from tachometry.sim.signals.scratch import held_back
+from tachometry.sim.signals.temporary import held_back
 from tachometry.sim.studies.sweeping.sweep import COLUMNS, Row, code_digest
 from tachometry.spec.language.option import ParameterError
 

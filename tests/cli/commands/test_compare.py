@@ -11,7 +11,7 @@ from support.nightly import nightly
 
 from tachometry.cli.commands import compare as command
 from tachometry.sim.studies import size as synthesis
-from tachometry.sim.studies.comparing.rivals import BASELINES
+from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES
 from tachometry.spec import METHODS, TachometerSpec
 
 CORE = "--ppr 100 --clock 1MHz --tick 1ms --max-time 20ms".split()

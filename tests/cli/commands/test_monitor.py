@@ -25,7 +25,7 @@ from tachometry.boards.monitor.columns import columns
 from tachometry.boards.monitor.serial_port import SerialPort
 from tachometry.boards.monitor.session import Frame
 from tachometry.boards.monitor.watch import State
-from tachometry.boards.simulated.simulated_board import SimulatedBoard
+from tachometry.boards.simulated.board import SimulatedBoard
 from tachometry.cli.reports.monitor import LiveView, view
 from tachometry.spec import METHODS
 

@@ -18,7 +18,7 @@ from support.pipes import read
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.golden.methods import m as golden_m
 from tachometry.sim.golden.quotient import round_quotient
-from tachometry.sim.signals.scratch import run_tool
+from tachometry.sim.signals.temporary import run_tool
 from tachometry.sim.studies import verify as study
 from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.sim.studies.verify import motions

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from support.demo import BOARD, CLOCK_HZ, TEXTS, ToldBoard, demo_map, manifest_of
 
-from tachometry.boards.simulated.simulated_board import SimulatedBoard
+from tachometry.boards.simulated.board import SimulatedBoard
 from tachometry.cli.commands import Refused
 from tachometry.cli.explore import live as module
 from tachometry.cli.explore.live import Live

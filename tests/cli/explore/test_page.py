@@ -26,8 +26,8 @@ from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies import size
+from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES
 from tachometry.sim.studies.comparing.compare import core_curve
-from tachometry.sim.studies.comparing.rivals import BASELINES
 from tachometry.sim.studies.plan import plan_at
 from tachometry.spec import METHODS, of_texts
 from tachometry.spec.language.units import short_time

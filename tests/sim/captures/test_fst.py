@@ -12,7 +12,7 @@ from support.captures import assert_same
 from tachometry.sim.captures import fst
 from tachometry.sim.captures.file import CaptureError
 from tachometry.sim.captures.read import read_capture
-from tachometry.sim.signals.scratch import run_tool
+from tachometry.sim.signals.temporary import run_tool
 
 BENCH = """\
 `timescale 1 ns / 1 ps

@@ -14,7 +14,7 @@ from reference.tsuji import Update
 from tachometry.sim.golden import model
 from tachometry.sim.golden.front_end import Steps, count
 from tachometry.sim.golden.methods.timed import Counts
-from tachometry.sim.golden.ordered import chain
+from tachometry.sim.golden.sorted_lookup import chain
 from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, MTTachometer, Speed, TachometerSpec, Timing, TTachometer
 

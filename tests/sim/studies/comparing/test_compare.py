@@ -11,10 +11,10 @@ from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.plots.compare import save_comparison
 from tachometry.sim.signals.progress import no_bar
 from tachometry.sim.studies.comparing import baselines
+from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES, steps_curve
 from tachometry.sim.studies.comparing.baselines import Steps
 from tachometry.sim.studies.comparing.compare import Curve, Judge, begun, core_curve, score
 from tachometry.sim.studies.comparing.comparison import Source, comparison, steps_beside
-from tachometry.sim.studies.comparing.rivals import BASELINES, steps_curve
 from tachometry.spec import METHODS, Encoder, Timing, of_texts
 
 

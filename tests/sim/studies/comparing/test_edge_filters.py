@@ -9,9 +9,9 @@ from support.lines import record
 
 from tachometry.sim import build
 from tachometry.sim.encoder.motion import FloatArray
+from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES
 from tachometry.sim.studies.comparing.baselines import Steps
 from tachometry.sim.studies.comparing.edge_filters import edge_kalman
-from tachometry.sim.studies.comparing.rivals import BASELINES
 
 CPR = 400
 COUNT = 2 * math.pi / CPR

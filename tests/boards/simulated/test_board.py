@@ -10,7 +10,7 @@ from support.nightly import only
 
 from tachometry.boards.host.demo import DemoBoard
 from tachometry.boards.monitor.serial_port import SerialPort, Unplugged
-from tachometry.boards.simulated.simulated_board import SimulatedBoard
+from tachometry.boards.simulated.board import SimulatedBoard
 
 BAUD = 1_000_000
 

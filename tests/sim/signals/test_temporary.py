@@ -17,7 +17,7 @@ import pytest
 from tachometry.cli.commands import Refused, refusals
 from tachometry.sim.signals import files
 from tachometry.sim.signals.files import replacing, rows_of, write_csv
-from tachometry.sim.signals.scratch import STOPS, end_tools, held_back, run_tool, scratch
+from tachometry.sim.signals.temporary import STOPS, end_tools, held_back, run_tool, scratch
 
 
 class Stopped(Exception):
@@ -85,7 +85,7 @@ def test_a_folder_that_another_run_takes_for_one_that_was_left_is_made_anew(
             os.rmdir(made[0])
         return made[-1]
 
-    monkeypatch.setattr("tachometry.sim.signals.scratch.tempfile", SimpleNamespace(mkdtemp=make))
+    monkeypatch.setattr("tachometry.sim.signals.temporary.tempfile", SimpleNamespace(mkdtemp=make))
     with scratch(tmp_path) as folder:
         assert [folder] == list(tmp_path.iterdir())
 

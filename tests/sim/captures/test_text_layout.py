@@ -2,7 +2,7 @@
 
 import pytest
 
-from tachometry.sim.captures.sniff import sniff
+from tachometry.sim.captures.text_layout import sniff
 
 A, B = "0.5,0,1", "1.5,1,1"
 SCOPE = "Model,MSO44\nHorizontal Units,s\nLabel,,\nTIME,CH1,CH2"

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from support.lines import record
 
+from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES, baseline_model, settings, steps_curve
 from tachometry.sim.studies.comparing.baselines import Steps, low_pass, mixed_method, tracking_loop
 from tachometry.sim.studies.comparing.estimators import kalman
-from tachometry.sim.studies.comparing.rivals import BASELINES, baseline_model, settings, steps_curve
 
 RECORDING = record("ramp:0:100rad/s:60ms", pulses_per_rev=100).recording
 STEPS = Steps.of_recording(RECORDING, 400)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tachometry.sim.captures import cells
-from tachometry.sim.captures.cells import BAD, HELD, Threshold, parse_threshold
+from tachometry.sim.captures import cell_parsers
+from tachometry.sim.captures.cell_parsers import BAD, HELD, Threshold, parse_threshold
 from tachometry.spec.language.option import ParameterError
 
 
@@ -21,8 +21,8 @@ from tachometry.spec.language.option import ParameterError
     ],
 )
 def test_levels(cell: str, level: int) -> None:
-    assert cells.levels(["0", cell, "1"]).tolist() == [0, level, 1]
-    assert cells.is_value(cell) == (level != BAD or cell in ("2", "-1", "0.5", "00", "01"))
+    assert cell_parsers.levels(["0", cell, "1"]).tolist() == [0, level, 1]
+    assert cell_parsers.is_value(cell) == (level != BAD or cell in ("2", "-1", "0.5", "00", "01"))
 
 
 @pytest.mark.parametrize(
@@ -31,7 +31,7 @@ def test_levels(cell: str, level: int) -> None:
     + [(cell, (BAD, BAD)) for cell in ("", "-1", "1.0", "true", "9999999999", "0x1")],
 )
 def test_bits(cell: str, bits: tuple[int, int]) -> None:
-    assert tuple(int(cells.bits([cell], bit)[0]) for bit in (0, 1)) == bits
+    assert tuple(int(cell_parsers.bits([cell], bit)[0]) for bit in (0, 1)) == bits
 
 
 @pytest.mark.parametrize(
@@ -49,9 +49,9 @@ def test_bits(cell: str, bits: tuple[int, int]) -> None:
 def test_voltages(text: str, threshold: Threshold, levels: list[int]) -> None:
     assert parse_threshold("threshold", text) == pytest.approx(threshold)
     column = ["0", "1.3", "1.45", "1.5", "1.65", "1.3999", "1.7", "X", "high", "1.2"]
-    read = cells.compared(column, threshold, 1.0)
-    assert cells.held(read, HELD).tolist() == levels
-    assert (cells.compared([f"{1000 * float(cell)}" for cell in column[:7]], threshold, 1e-3) == read[:7]).all()
+    read = cell_parsers.compared(column, threshold, 1.0)
+    assert cell_parsers.held(read, HELD).tolist() == levels
+    assert (cell_parsers.compared([f"{1000 * float(cell)}" for cell in column[:7]], threshold, 1e-3) == read[:7]).all()
 
 
 @pytest.mark.parametrize("text", ["", "high", "1.5V:", "1.5V:-1mV", "1.5A", "nan", "1:2:3"])
@@ -62,8 +62,8 @@ def test_what_is_no_threshold(text: str) -> None:
 
 def test_what_is_held() -> None:
     row = np.array([HELD, 0, HELD, HELD, 1, HELD], np.int8)
-    assert cells.held(row, HELD).tolist() == [HELD, 0, 0, 0, 1, 1]
-    assert cells.held(row, 1).tolist() == [1, 0, 0, 0, 1, 1]
+    assert cell_parsers.held(row, HELD).tolist() == [HELD, 0, 0, 0, 1, 1]
+    assert cell_parsers.held(row, 1).tolist() == [1, 0, 0, 0, 1, 1]
 
 
 @pytest.mark.parametrize(
@@ -80,14 +80,14 @@ def test_what_is_held() -> None:
     ],
 )
 def test_dates(cell: str, nanoseconds: int | None) -> None:
-    origin = cells.origin_of("2025-06-01T00:00:00")
+    origin = cell_parsers.origin_of("2025-06-01T00:00:00")
     assert origin == 1_748_736_000_000_000_000
-    read = cells.nanoseconds([cell], origin)
+    read = cell_parsers.nanoseconds([cell], origin)
     assert np.isnan(read[0]) if nanoseconds is None else read.tolist() == [nanoseconds]
-    assert (cells.origin_of(cell) is None) == (nanoseconds is None)
+    assert (cell_parsers.origin_of(cell) is None) == (nanoseconds is None)
 
 
 def test_the_zone_must_not_change() -> None:
     same, other = ["2025-06-01T00:00:00+02:00"] * 2, ["2025-06-01T00:00:00+02:00", "2025-06-01T00:00:00+01:00"]
-    assert not np.isnan(cells.nanoseconds(same, 0)).any()
-    assert np.isnan(cells.nanoseconds(other, 0)).all()
+    assert not np.isnan(cell_parsers.nanoseconds(same, 0)).any()
+    assert np.isnan(cell_parsers.nanoseconds(other, 0)).all()

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.methods.timed import rounded
-from tachometry.sim.golden.ordered import next_place, not_before, places, spans
 from tachometry.sim.golden.quotient import round_quotient
+from tachometry.sim.golden.sorted_lookup import next_place, not_before, places, spans
 from tachometry.spec import Encoder, Timing, TTachometer
 
 NONE = np.empty(0, dtype=np.int64)

@@ -4,7 +4,7 @@ import csv
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from tachometry.sim.captures.cells import NUMBER, is_value
+from tachometry.sim.captures.cell_parsers import NUMBER, is_value
 from tachometry.sim.captures.file import Channel
 from tachometry.sim.captures.time_unit import parted, rank, unit_named
 
