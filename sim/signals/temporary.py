@@ -1,5 +1,6 @@
 """Temporary folders and tools end with the process that has them, whatever ends it."""
 
+import math
 import os
 import shutil
 import signal
@@ -151,7 +152,7 @@ def run_tool(
     OSError
         If it cannot be run.
     subprocess.TimeoutExpired
-        If it takes longer than `seconds`, by default four hours.
+        If it takes more than `seconds` of the processor, or four hours; without Linux, if it takes `seconds`.
     """
     ours = {} if folder is None else dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(folder))
     started: list[subprocess.Popen[str]] = []
@@ -171,8 +172,10 @@ def run_tool(
                 )
             )
         _running.update(started)
-        _limit_memory(started[0].pid, memory)
-        out, err = started[0].communicate(text, _LONGEST if seconds is None else seconds)
+        _limit(started[0].pid, memory, seconds)
+        out, err = started[0].communicate(text, seconds if seconds and sys.platform != "linux" else _LONGEST)
+        if sys.platform == "linux" and started[0].returncode == -signal.SIGXCPU:
+            raise subprocess.TimeoutExpired(command, seconds or _LONGEST)
     except BaseException:
         with held_back():
             for process in started:
@@ -183,13 +186,15 @@ def run_tool(
     return subprocess.CompletedProcess(command, started[0].returncode, out, err)
 
 
-def _limit_memory(pid: int, memory: int | None) -> None:
+def _limit(pid: int, memory: int | None, seconds: float | None) -> None:
     if sys.platform == "linux":
-        wanted = memory or os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-        with suppress(OSError):  # it has ended
-            _, hard = resource.prlimit(pid, resource.RLIMIT_DATA)
-            most = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
-            resource.prlimit(pid, resource.RLIMIT_DATA, (most, most))
+        most = memory or os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+        limits = {resource.RLIMIT_DATA: most, resource.RLIMIT_CPU: math.ceil(seconds or _LONGEST)}
+        for limit, wanted in limits.items():
+            with suppress(OSError):  # it has ended
+                _, hard = resource.prlimit(pid, limit)
+                soft = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+                resource.prlimit(pid, limit, (soft, hard if limit == resource.RLIMIT_CPU else soft))
 
 
 def end_tools() -> None:

