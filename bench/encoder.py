@@ -64,7 +64,7 @@ EXAMPLES = {
 
 def turn(counts_per_tick: float, encoder: VirtualEncoder, spec: STachometer) -> tuple[Encoding, Run]:
     """Return an encoder at constant speed on a core's golden model."""
-    speed = counts_per_tick / (4 * encoder.pulses_per_rev * float(spec.times.seconds(spec.timing.tick_cycles)))
+    speed = counts_per_tick / (4 * encoder.pulses_per_rev * float(spec.tick.seconds(spec.timing.tick_cycles)))
     encoding = encoder.record(parse_motion(f"constant:{speed!r}rev/s:{DURATION_S}s"))
     return encoding, golden.run(spec, encoding.recording.place(spec.timing.clock_hz))
 

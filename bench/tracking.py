@@ -51,7 +51,7 @@ def errors(spec: TachometerSpec, situation: Situation, seed: int, beside: bool =
     updates = golden.run(spec, trace).updates
     seconds = updates.clock / spec.timing.clock_hz
     judged = (seconds > situation.start_s) & (seconds <= truth.recording.duration)
-    right, lsb = truth.true_speed(seconds[judged]), spec.scale.rad_per_s_per_lsb
+    right, lsb = truth.true_speed(seconds[judged]), spec.velocity.rad_per_s_per_lsb
     model = in_float(spec, trace, updates.clock)[judged] - right if beside else None
     return Errors(updates.velocity[judged] * lsb - right, updates.quality[judged] * lsb, model)
 
@@ -104,7 +104,7 @@ def steady(
     clock = np.maximum.accumulate(np.round(place * spec.timing.tick_cycles / rate).astype(np.int64))
     level = quadrature(np.arange(n))
     trace = PinTrace(np.append(0, clock), level & np.uint8(1), level >> np.uint8(1), int(clock[-1]) + 10)
-    velocity = golden.run(spec, trace).updates.velocity[first:] * spec.scale.rad_per_s_per_lsb
+    velocity = golden.run(spec, trace).updates.velocity[first:] * spec.velocity.rad_per_s_per_lsb
     right = rate / spec.timing.tick_cycles * spec.timing.clock_hz * 2 * math.pi / spec.encoder.counts_per_rev
     return np.abs(velocity / right - 1)
 

@@ -190,13 +190,13 @@ class _Crowded(ParameterError):
 def _check_machines(core: AxesSpec) -> None:
     """Refuse tracking of many axes with a ParameterError where the turns of a tick take more than two machines."""
     if (machines := core.plan.machines) > _MOST_MACHINES:
-        other = f"--tick {core.words.tick_of(_MOST_MACHINES)}"
+        other = f"--tick {core.tick_of(_MOST_MACHINES)}"
         raise _Crowded("tick_cycles", f"must be longer: try {other}", f"needs {machines} machines or {other}")
 
 
 def _check_division(spec: TachometerSpec) -> None:
     """Refuse M/T with a ParameterError where a division takes longer than a tick."""
-    if isinstance(spec, MTTachometer) and not spec.times.has_room(clocks := spec.form.division_clocks):
+    if isinstance(spec, MTTachometer) and (clocks := spec.form.division_clocks) > spec.tick.room:
         raise ParameterError("tick_cycles", f"must be at least {clocks}", f"needs a tick of {clocks} clocks")
 
 

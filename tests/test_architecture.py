@@ -3,6 +3,7 @@
 import ast
 import re
 import sys
+from collections.abc import Collection
 from functools import cache
 from pathlib import Path
 
@@ -170,6 +171,26 @@ def test_there_is_no_circle(layer: str) -> None:
         assert free, left
         for room in free:
             del left[room]
+
+
+def test_no_files_import_each_other() -> None:
+    """Files can be put in an order in which each imports only those before it, also for types."""
+    every = [file for layer in LAYERS for file in (ROOT / layer).rglob("*.py")]
+    paths = {file: file.relative_to(ROOT).with_suffix("").as_posix().removesuffix("/__init__") for file in every}
+    modules = {f"tachometry.{path.replace('/', '.')}": file for file, path in paths.items()}
+    left = {name: _of_files(file, modules.keys()) - {name} for name, file in modules.items()}
+    while left:
+        free = [name for name, needs in left.items() if not needs & left.keys()]
+        assert free, sorted(left)
+        for name in free:
+            del left[name]
+
+
+def _of_files(file: Path, modules: Collection[str]) -> set[str]:
+    """Return the modules that a file imports, or from which it imports names."""
+    froms = [node for node in nodes(file) if isinstance(node, ast.ImportFrom) and node.module]
+    full = {(node.module or "", f"{node.module}.{alias.name}") for node in froms for alias in node.names}
+    return {name if name in modules else module for module, name in full}
 
 
 @pytest.mark.parametrize("room", [*(room for room in ALLOWED if room.startswith("spec")), "boards/host"])

@@ -29,7 +29,7 @@ class Column:
 def columns(registers: DemoMap) -> list[Column]:
     """Return every captured port but the time; what is in LSB of the velocity is in the unit of shown speeds."""
     spec = registers.spec
-    lsb = spec.scale.rad_per_s_per_lsb
+    lsb = spec.velocity.rad_per_s_per_lsb
     (speeds,) = (port.unit for port in registers.ports if port.name == "velocity")
 
     def of(port: Port) -> Column:
@@ -45,7 +45,7 @@ def columns(registers: DemoMap) -> list[Column]:
         return Column(name, port.unit, int, lambda now: now[name])
 
     def bound(name: str) -> Callable[[Snapshot], Value]:
-        absent = BOUNDS[name] * spec.bound.shown_absent
+        absent = BOUNDS[name] * spec.velocity.shown_absent
 
         def value(now: Snapshot) -> Value:
             there = now["bounds_valid"] and now[name] != absent

@@ -111,10 +111,10 @@ def _range(spec: TachometerSpec, text: str | None) -> tuple[float, float, str]:
             f"--speeds must be LO:HI, both greater than 0, in rad/s, rev/s or rpm such as 10:3000rpm, not {text!r}"
         ) from error
     counts = last.ceil_counts(spec.encoder.counts_per_rev, spec.timing.tick_seconds)
-    if counts > spec.widths.max_count or last.rad_per_s > spec.scale.greatest_speed * (1 + 1e-12):
-        greatest = spec.scale.greatest_speed / SpeedUnit(last.unit).rad_per_s
+    if counts > spec.tick.max_count or last.rad_per_s > spec.velocity.greatest_speed * (1 + 1e-12):
+        greatest = spec.velocity.greatest_speed / SpeedUnit(last.unit).rad_per_s
         raise ValueError(
-            f"--speeds must be at most {spec.scale.greatest_speed / spec.scale.unit_velocity:.6g} counts per tick "
+            f"--speeds must be at most {spec.velocity.greatest_speed / spec.scale.unit_velocity:.6g} counts per tick "
             f"({greatest:.6g}{last.unit}), "
             f"the most that this core measures, not {text!r}"
         )

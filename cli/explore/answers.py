@@ -175,8 +175,8 @@ def curves(options: Texts) -> Answer:
         return [max((value for value in each if value is not None), default=None) for each in near]
 
     def shown(name: str, spec: TachometerSpec, plan: Plan) -> Answer:
-        error = plan.resolution + plan.disc + spec.scale.rounding_lsb * spec.scale.rad_per_s_per_lsb
-        late = float(spec.times.seconds(spec.latency.tick_to_velocity) + spec.times.filter_lag)
+        error = plan.resolution + plan.disc + spec.velocity.rounding_lsb * spec.velocity.rad_per_s_per_lsb
+        late = float(spec.tick.seconds(spec.latency.tick_to_velocity) + spec.times.filter_lag)
         delay = late + plan.measurement_time / 2 * (not spec.words.on_ramps)
         errors, delays = greatest(unit.of(error)), greatest(delay)
         known = [(one, late) for one, late in zip(errors, delays, strict=True) if one is not None and late is not None]

@@ -85,7 +85,7 @@ def _read(
             time,
             None if time_unit is None else parse_time_unit("time_unit", time_unit),
             None if threshold is None else parse_threshold("threshold", threshold),
-            slowest_s=float(alone.times.seconds(alone.times.longest)),
+            slowest_s=float(alone.tick.seconds(alone.times.longest)),
         )
         if axes and is_stream(capture):
             raise CaptureError(f"{capture} must be a regular file with --axes: it is read anew for each axis")

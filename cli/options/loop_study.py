@@ -148,7 +148,7 @@ def _setting(
     if task.load is not None and not begin + 0.002 <= task.load.begin < duration:
         raise ValueError(f"--load must begin 2ms or more after --from, and within --motion, not {loop.load}")
     encoder = VirtualEncoder(spec.encoder.pulses_per_rev, **faults)
-    if loop.measured_acceleration and "acceleration" not in spec.scale.entries:
+    if loop.measured_acceleration and "acceleration" not in spec.method_entries:
         raise ParameterError("measured_acceleration", f"must not be given with method {spec.method}, which has none")
     law = Law(tachometer=spec, **read_options(Law, texts, vars(spec.timing)))
     motor = engine.Motor(
@@ -176,7 +176,7 @@ def _gains(law: Law, loop: Loop) -> Gains:
     late = 0 if delay is None else whole_clocks("delay", delay, spec.timing.clock_hz)
     if not 0 <= late <= law.period:
         raise ParameterError(
-            "delay", f"must be at most a control tick, {format_time(spec.times.seconds(law.period))}, not {delay}"
+            "delay", f"must be at most a control tick, {format_time(spec.tick.seconds(law.period))}, not {delay}"
         )
     way = Observer.SYNCHRONISED if law.synchronised else Observer.CONVENTIONAL
     return Gains(
@@ -184,9 +184,9 @@ def _gains(law: Law, loop: Loop) -> Gains:
         velocity=float(law.velocity_gain),
         observer=float(law.observer),
         filter=math.inf if law.filter is None else float(law.filter),
-        seconds=float(spec.times.seconds(law.period)),
+        seconds=float(spec.tick.seconds(law.period)),
         way=Observer.ACCELERATION if loop.measured_acceleration else way,
-        delay=float(spec.times.seconds(late)),
+        delay=float(spec.tick.seconds(late)),
         on_filtered=not loop.unfiltered,
         feed_forward=loop.feed_forward,
         inertia=float(law.inertia),

@@ -83,7 +83,7 @@ def _record(encoder: VirtualEncoder, motion: str, spec: TachometerSpec) -> Encod
         return encoder.record(parse_motion(motion))
     if len(parts := rest.rsplit(":", 2)) != 3 or not all(parts) or ("+" in rest and not Path(parts[0]).exists()):
         raise ParameterError("motion", f"must be counts:FILE:TIME:COUNT alone, not {motion!r}")
-    text = TextOptions(parts[1], slowest_s=float(spec.times.seconds(spec.times.longest)))
+    text = TextOptions(parts[1], slowest_s=float(spec.tick.seconds(spec.times.longest)))
     try:
         log = read_count_log(Path(parts[0]), parts[2], text)
     except OptionError as error:

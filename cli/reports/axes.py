@@ -10,10 +10,10 @@ from tachometry.spec.registers.manifest import manifest
 def axes_rows(spec: AxesSpec) -> list[tuple[str, str]]:
     """Return the configuration of a core of many axes."""
     alone, axis = spec.tachometer, spec.axis
-    greatest = axis.widths.max_velocity * alone.scale.unit_velocity
+    greatest = axis.velocity.max * alone.scale.unit_velocity
     latencies = manifest(spec)["latency_cycles"]
     own = {
-        "greatest speed": f"{speed_text(alone, greatest)} ({plural(axis.widths.max_velocity, 'count')} per tick)",
+        "greatest speed": f"{speed_text(alone, greatest)} ({plural(axis.velocity.max, 'count')} per tick)",
         "full scale": full_scale_text(alone, axis),
         "widths": ", ".join(f"{port.name} {port.width}" for port in axis.ports.outputs if port.width > 1),
         **_reciprocal(spec),
@@ -26,7 +26,7 @@ def axes_rows(spec: AxesSpec) -> list[tuple[str, str]]:
         f"{plural(spec.turn_cycles, 'clock')} of a tick{on}"
     )
     rows = [(name, own.get(name, value)) for name, value in configuration(alone) if name != "note"]
-    late = f"{short_time(spec.times.seconds(spec.latency.tick))} from the end of a tick to the last axis' velocity"
+    late = f"{short_time(spec.tick.seconds(spec.latency.tick))} from the end of a tick to the last axis' velocity"
     rows += measured(alone, Plans.of(alone, greatest), late)
     return [rows[0], ("axes", turns), *rows[1:], *(("note", note) for note in spec.words.notes)]
 

@@ -25,7 +25,7 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
     """Return rows of the table: a name and its value."""
     encoder, timing = spec.encoder, spec.timing
     counts = f"{encoder.pulses_per_rev} pulses per revolution x{encoder.decoding}: {encoder.counts_per_rev} counts"
-    fastest = spec.scale.greatest_speed
+    fastest = spec.velocity.greatest_speed
     per_tick = fastest / spec.scale.unit_velocity
     greatest = f"{speed_text(spec, fastest)} ({per_tick:.6g} count{'s' * (per_tick != 1)} per tick)"
     latencies = manifest(spec)["latency_cycles"]
@@ -41,13 +41,13 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
         ("full scale", full_scale_text(spec, spec)),
         (
             "one LSB of velocity",
-            f"2^{-spec.widths.frac_bits} {spec.unit} = {speed_text(spec, spec.scale.rad_per_s_per_lsb)}; "
-            f"rounding adds up to {spec.scale.rounding_lsb} of it",
+            f"2^{-spec.velocity.frac_bits} {spec.unit} = {speed_text(spec, spec.velocity.rad_per_s_per_lsb)}; "
+            f"rounding adds up to {spec.velocity.rounding_lsb} of it",
         ),
         ("widths", ", ".join(f"{port.name} {port.width}" for port in spec.ports.outputs if port.width > 1)),
         *([] if memory is None else [("reciprocal", memory_text(*memory))]),
         *([("reciprocal", spec.words.division)] if spec.words.division else []),
-        *((name, f"{plural(n, 'clock')} ({short_time(spec.times.seconds(n))})") for name, n in latencies.items()),
+        *((name, f"{plural(n, 'clock')} ({short_time(spec.tick.seconds(n))})") for name, n in latencies.items()),
         ("standstill", _standstill(spec)),
         *(("note", note) for note in spec.words.notes),
     ]
@@ -60,14 +60,14 @@ def choice(spec: TachometerSpec) -> list[tuple[str, str]]:
 
 def full_scale_text(spec: TachometerSpec, axis: TachometerSpec) -> str:
     """Return the greatest velocity of a core, or of an axis of it, in its unit, and as a speed if that is none."""
-    full_scale = axis.scale.full_scale
-    value = f"{full_scale * 2.0**-spec.widths.frac_bits:.9g} {spec.unit}"
+    full_scale = axis.velocity.full_scale
+    value = f"{full_scale * 2.0**-spec.velocity.frac_bits:.9g} {spec.unit}"
     if spec.unit == NATIVE:
-        value += f" = {speed_text(spec, full_scale * spec.scale.rad_per_s_per_lsb)}"
+        value += f" = {speed_text(spec, full_scale * spec.velocity.rad_per_s_per_lsb)}"
     value += ", either way"
-    if axis.scale.narrow:
-        counted = speed_text(spec, axis.widths.max_velocity * spec.scale.unit_velocity)
-        value += f"; that is what {spec.widths.velocity} bits hold, counted is up to {counted}"
+    if axis.velocity.narrow:
+        counted = speed_text(spec, axis.velocity.max * spec.scale.unit_velocity)
+        value += f"; that is what {spec.velocity.width} bits hold, counted is up to {counted}"
         value += "; --max-speed makes an LSB with which it fits" * (spec.max_speed is None)
     return value
 
@@ -81,7 +81,7 @@ def measured(spec: TachometerSpec, plans: Plans, late: str = "") -> list[tuple[s
         return []
     low, high = plans.range
     below = "; below, a count may take longer than the maximum time" * (low > plans.low)
-    rounding = spec.scale.rounding_lsb * spec.scale.rad_per_s_per_lsb
+    rounding = spec.velocity.rounding_lsb * spec.velocity.rad_per_s_per_lsb
     ideal = float(worst.resolution[0]) + rounding
     error = speed_text(spec, ideal + float(worst.disc[0]), 3)
     at, time = speed_text(spec, float(worst.speed[0]), 4), short_time(float(worst.measurement_time[0]))
@@ -100,7 +100,7 @@ _REAL = (
 
 
 def _delay(spec: TachometerSpec, plans: Plans, late: str) -> str:
-    late = late or f"{short_time(spec.times.seconds(spec.latency.tick_to_velocity))} from tick to velocity"
+    late = late or f"{short_time(spec.tick.seconds(spec.latency.tick_to_velocity))} from tick to velocity"
     if lag := spec.times.filter_lag:
         late += f" and {short_time(lag)} by the low-pass filter"
     if spec.words.on_ramps:

@@ -24,7 +24,7 @@ def loop_rows(spec: LoopSpec, bus: Bus | None = None) -> list[tuple[str, str]]:
             f"at most {float(form.current_limit * spec.units.amperes):.6g} A, in 2^{-spec.units.current_frac_bits} A",
         ),
         ("control period", f"{short_time(period)} ({plural(spec.period, 'clock')})"),
-        ("command to current", f"{plural(late, 'clock')} ({short_time(spec.tachometer.times.seconds(late))})"),
+        ("command to current", f"{plural(late, 'clock')} ({short_time(spec.tachometer.tick.seconds(late))})"),
         (
             "multiplier",
             f"{spec.multiplier}: words of {form.word_width} bits by coefficients of {form.factor_bits}, "

@@ -34,7 +34,7 @@ def print_plan(core: CoreSpec, plans: Plans, unit: str, bus: Bus | None, size: E
             _number(m_s, ".4g"),
             _duration(t_m),
             _number(q_v / per_unit, ".4g"),
-            _number(100 * (q_v + spec.scale.rounding_lsb * spec.scale.rad_per_s_per_lsb) / speed, ".3g"),
+            _number(100 * (q_v + spec.velocity.rounding_lsb * spec.velocity.rad_per_s_per_lsb) / speed, ".3g"),
             "maximum time (forced)" if forced else spec.facts.update_by,
         )
         rows.append(cells)

@@ -30,7 +30,7 @@ def print_simulation(simulation: Simulation, kept: Sequence[Path] = ()) -> int:
     """
     lockstep, spec, axes = simulation.lockstep, simulation.spec, simulation.axes
     run = lockstep.actual
-    time, n_ticks = format_time(spec.times.seconds(run.n_clocks)), len(run.ticks) // len(axes)
+    time, n_ticks = format_time(spec.tick.seconds(run.n_clocks)), len(run.ticks) // len(axes)
     simulated = ("simulated", f"{run.n_clocks} clocks ({time}), {n_ticks} ticks")
     rows, warnings = _summary(spec, axes, ("mismatches", str(lockstep.n_mismatches)))
     print_rows([*choice(spec.tachometer), ("engine", simulation.engine), simulated, *rows])
@@ -137,7 +137,7 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         rows.append(("index", f"{len(run.index.clock)} times{last}{index_distance(axis)}{told}"))
     if spec.front_end.wheel is not None:
         synced = np.flatnonzero(run.ticks.synced)
-        when = format_time(spec.times.seconds(int(run.ticks.clock[synced[0]]))) if len(synced) else ""
+        when = format_time(spec.tick.seconds(int(run.ticks.clock[synced[0]]))) if len(synced) else ""
         lost = "" if run.ticks.synced[-1] or not when else ", and lost"
         rows.append(("gap of the wheel", f"found within {when}{lost}" if when else "not found"))
     if spec.front_end.index_once:
@@ -162,7 +162,7 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         rows.append(("stream", f"records are not shown here: {shown}"))
     if spec.over_speed is not None:
         tripped = np.flatnonzero(run.ticks.over_speed)
-        when = format_time(spec.times.seconds(int(run.ticks.clock[tripped[0]]))) if len(tripped) else ""
+        when = format_time(spec.tick.seconds(int(run.ticks.clock[tripped[0]]))) if len(tripped) else ""
         rows.append(("over speed", f"tripped within {when}" if when else f"never beyond {spec.over_speed}"))
     if spec.external_tick:
         rows.append(("tick errors", f"{len(run.tick_errors)} (external tick too early or missing)"))

@@ -43,7 +43,7 @@ class _Estimates:
 def _estimates(spec: RairanTachometer, run: Run) -> _Estimates:
     """Return n1 of the counts at the ports, n2 and n3 of it, in the regime that was updated last."""
     updates = run.updates
-    unit = 2.0**spec.widths.frac_bits
+    unit = 2.0**spec.velocity.frac_bits
     # n3 tells the regime: 2/3 and less is low, 4/3 and more is high.
     n3 = updates.velocity / unit
     shown = n3 > 0

@@ -41,7 +41,7 @@ def _measured(lab: Lab, spec: TachometerSpec, seconds: float = 3.0) -> _Measured
         encoding = lab.turn(spec, f"constant:{float(speed)!r}rad/s:{seconds}s", start_angle_rad=0.001)
         updates = lab.golden(spec, encoding).updates
         settled = updates.clock > 0.1 * spec.timing.clock_hz
-        error = np.abs(updates.velocity[settled] * spec.scale.rad_per_s_per_lsb - speed)
+        error = np.abs(updates.velocity[settled] * spec.velocity.rad_per_s_per_lsb - speed)
         unit = spec.times.interval_unit / spec.timing.clock_hz
         rows.append((speed, float(np.mean(updates.interval[settled])) * unit, float(np.max(error))))
     return _Measured(*np.array(rows).T)

@@ -87,13 +87,13 @@ def fig05(lab: Lab) -> Result:
 
 
 def _held(run: Run, spec: TachometerSpec, instants: FloatArray) -> FloatArray:
-    velocity = run.updates.velocity.astype(np.float64) * spec.scale.rad_per_s_per_lsb
+    velocity = run.updates.velocity.astype(np.float64) * spec.velocity.rad_per_s_per_lsb
     return velocity[np.searchsorted(run.updates.clock / spec.timing.clock_hz, instants, side="right") - 1]
 
 
 def _steps(label: str, run: Run, spec: TachometerSpec) -> Curve:
     return Curve(
-        label, run.updates.clock / spec.timing.clock_hz, run.updates.velocity * spec.scale.rad_per_s_per_lsb, "held"
+        label, run.updates.clock / spec.timing.clock_hz, run.updates.velocity * spec.velocity.rad_per_s_per_lsb, "held"
     )
 
 
@@ -245,7 +245,7 @@ def _deviation(run: Run, spec: TachometerSpec, encoding: Encoding) -> tuple[floa
     begin = end - updates.interval[chosen] * spec.timing.tick_cycles
     motion = encoding.motion
     mean = (motion.angle(end / clock_hz) - motion.angle(begin / clock_hz)) / (end - begin) * clock_hz
-    error = np.abs(updates.velocity[chosen] * spec.scale.rad_per_s_per_lsb - mean)
+    error = np.abs(updates.velocity[chosen] * spec.velocity.rad_per_s_per_lsb - mean)
     within = error <= tsuji_eq18_resolution(updates.interval[chosen], COUNTS, TICK)
     distance = np.abs(mean / UNIT - np.floor(mean / UNIT + 0.5))
     near, middle = distance < 1 / 8, distance > 3 / 8

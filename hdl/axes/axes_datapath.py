@@ -59,18 +59,18 @@ class AxesDatapath(wiring.Component):
         )
         self.quotient = Quotient(
             axis.form.looked_up,
-            quotients={"velocity": (axis.widths.native, 0, 0)},
+            quotients={"velocity": (axis.velocity.native, 0, 0)},
             numerator_width=axis.form.numerator_width,
             tag=data.StructLayout({"forced": 1}),
             serial=True,
         )
-        output = axis.scale.output
+        output = axis.velocity.output
         self.velocity_output = None if output is None else PipelinedVelocityOutput(output, update_layout(axis))
         super().__init__(
             {
                 "complete": In(1),  # `count` is handed over; the turns begin with the clock after that of axis 0
                 "slot": In(range(spec.slots)),  # that the count belongs to
-                "count": In(signed(axis.times.longest_tick.bit_length() + 1)),
+                "count": In(signed(axis.tick.longest.bit_length() + 1)),
                 **only_if(axis.front_end.index_resets, handed_position=In(signed(axis.position_width))),  # else a sum
                 "tick": Out(1),  # one clock for every axis in every tick
                 "axis": Out(len(self.turns.axis)),  # valid with `tick`, as are the next four
@@ -79,7 +79,7 @@ class AxesDatapath(wiring.Component):
                 "overflow": Out(1),
                 "stalled": Out(1),
                 "velocity_valid": Out(1),  # only together with `tick`: all below are new
-                "velocity": Out(signed(axis.widths.velocity)),
+                "velocity": Out(signed(axis.velocity.width)),
                 "interval": Out(axis.widths.interval),
                 "forced": Out(1),
                 **only_if(output is not None, velocity_overflow=Out(1)),
@@ -127,8 +127,8 @@ class AxesDatapath(wiring.Component):
         overflow = Signal()
         count = turn.handed.count
         m_e = count
-        if axis.widths.max_count < axis.times.longest_tick:
-            m_e, overflow = saturate(m, count, axis.widths.max_count)
+        if axis.tick.max_count < axis.tick.longest:
+            m_e, overflow = saturate(m, count, axis.tick.max_count)
         position = turn.handed.handed_position if turn.resets else turn.before.position + count
         with m.If(turns.step[READ]):
             m.d.sync += [

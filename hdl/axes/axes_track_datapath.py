@@ -48,9 +48,9 @@ class AxesTrackDatapath(wiring.Component):
         self.machines = [TrackTurns(spec, number) for number in range(spec.plan.machines)]
         layout = update_layout(axis)
         self.velocity_output: PipelinedVelocityOutput | None = None
-        if axis.scale.output is not None:
-            self.velocity_output = PipelinedVelocityOutput(axis.scale.output, layout)
-            layout = shown_layout(layout, axis.scale.output)
+        if axis.velocity.output is not None:
+            self.velocity_output = PipelinedVelocityOutput(axis.velocity.output, layout)
+            layout = shown_layout(layout, axis.velocity.output)
         self._update = layout
         super().__init__(
             {
@@ -132,8 +132,8 @@ class AxesTrackDatapath(wiring.Component):
         if axis.front_end.index_resets:
             (position,) = delay(m, known.position)
         pulses, overflow = moved, C(0)
-        if axis.widths.max_count < axis.form.longest_tick:
-            pulses, overflow = saturate(m, moved, axis.widths.max_count)
+        if axis.tick.max_count < axis.form.longest_tick:
+            pulses, overflow = saturate(m, moved, axis.tick.max_count)
         m.d.sync += [
             after.position.eq(position),
             after.elapsed.eq(Mux(before.counted, 1, before.elapsed + (before.elapsed != most))),

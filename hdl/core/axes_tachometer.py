@@ -33,8 +33,8 @@ class AxesTachometer(wiring.Component):
     def __init__(self, spec: AxesSpec) -> None:
         self._spec = spec
         super().__init__(members(spec.ports))
-        times = spec.axis.times
-        external = (times.min_tick_cycles, times.longest_tick) if spec.axis.external_tick else None
+        longest = spec.axis.tick.longest
+        external = (spec.axis.times.min_tick_cycles, longest) if spec.axis.external_tick else None
         self.rounds = Rounds(spec.slots, spec.rounds, WARM_UP, external)
         self.axis_filter: AxisFilter | None = None
         if spec.axis.filter_clocks:
@@ -48,7 +48,7 @@ class AxesTachometer(wiring.Component):
             self.axis_counters = AxisTickCounts(slots=spec.slots, form=spec.axis.form, **decoded)
             self.datapath = AxesTrackDatapath(spec)
         else:
-            self.axis_counters = AxisCounters(slots=spec.slots, rounds=times.longest_tick, **decoded)
+            self.axis_counters = AxisCounters(slots=spec.slots, rounds=longest, **decoded)
             self.datapath = AxesDatapath(spec)
         self.axis_index: AxisIndex | None = None
         if spec.axis.index:

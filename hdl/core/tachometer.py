@@ -63,7 +63,7 @@ class Tachometer(wiring.Component):
         self.conditioner = InputConditioner(spec.filter_clocks, (*front.lines, *front.probes), front.complemented)
         self.decoder = decoder_of(spec.encoder, front.wheel)
         self.pulse_counter = PulseCounter(
-            max(spec.times.longest_tick, spec.widths.max_pulse_count),
+            max(spec.tick.longest, spec.widths.max_pulse_count),
             spec.widths.max_pulse_count,
             stretched=spec.facts.own_ticks,
             staged=spec.latency.tick - spec.latency.registers_steps > 2,
@@ -109,35 +109,35 @@ class Tachometer(wiring.Component):
         if isinstance(self.datapath, OwnTicks):
             self.sampling_clock = self.datapath
         elif spec.external_tick:
-            self.sampling_clock = ExternalTick(spec.times.min_tick_cycles, spec.times.longest_tick, spec.latency.tick)
+            self.sampling_clock = ExternalTick(spec.times.min_tick_cycles, spec.tick.longest, spec.latency.tick)
         else:
             self.sampling_clock = SamplingClock(spec.timing.tick_cycles)
         layout = update_layout(spec)
         self.low_pass = (
-            None if spec.lowpass is None else LowPass(spec.scale.low_pass, layout, clears=spec.facts.last_at_rest)
+            None if spec.lowpass is None else LowPass(spec.velocity.low_pass, layout, clears=spec.facts.last_at_rest)
         )
         self.standstill: Standstill | None = None
         if not isinstance(self.datapath, OwnStandstill) and spec.facts.stalls_with == TICK:
             self.standstill = Standstill(spec.timing.max_ticks, spec.widths.count, max_shift=spec.times.max_tick_shift)
         self.update_age = UpdateAge(spec.timing.max_ticks, spec.widths.stamp) if spec.age else None
         self.velocity_output: SerialVelocityOutput | PipelinedVelocityOutput | None = None
-        if spec.scale.output is not None:
+        if spec.velocity.output is not None:
             box = SerialVelocityOutput if spec.latency.output_serial else PipelinedVelocityOutput
-            self.velocity_output = box(spec.scale.output, layout)
+            self.velocity_output = box(spec.velocity.output, layout)
 
         self.compare_output: CompareOutput | None = None
         if spec.compare is not None:
             clocks = spec.compare.clocks(spec.timing.clock_hz)
             if isinstance(spec, TrackTachometer) and spec.compare.fine:
-                given = spec.scale.carrying, spec.widths.native
+                given = spec.carrying, spec.velocity.native
                 self.compare_output = FineCompareOutput(spec.compare, clocks, spec.position_width, *given)
             else:
                 aims = spec.compare.both and spec.front_end.moves_position
                 self.compare_output = CompareOutput(spec.compare, clocks, spec.position_width, aims=aims)
         self.stream: RecordStream | None = None
         if spec.stream is not None:
-            self.stream = RecordStream(parts_of(spec), len(flags_of(spec)) - 1, size_of(spec), spec.stream.packet)
-        self.trip = None if spec.over_speed is None else OverSpeed(spec.scale.over_speed, spec.widths.velocity)
+            self.stream = RecordStream(parts_of(spec), len(flags_of(spec.ports)) - 1, size_of(spec), spec.stream.packet)
+        self.trip = None if spec.over_speed is None else OverSpeed(spec.over_speed_lsb, spec.velocity.width)
 
     @property
     def spec(self) -> TachometerSpec:
@@ -393,7 +393,7 @@ class Tachometer(wiring.Component):
         event: Value = self.tick if when == "tick" else self.velocity_valid
         if when == "edge":
             (event,) = delay(m, self.decoder.step[0], clocks=self._spec.latency.tick)
-        flags = flags_of(self._spec)[1:]
+        flags = flags_of(self._spec.ports)[1:]
         m.d.comb += [box.event.eq(event), box.flags.eq(Cat(getattr(self, name) for name in flags))]
         follow(m, box, self, (READY, *(part.name for part in parts_of(self._spec)[2:])))
         follow(m, self, box, ("overruns", *(port.name for port in self._spec.ports.streamed)))

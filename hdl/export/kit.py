@@ -114,7 +114,7 @@ def _bench(spec: AnySpec) -> dict[str, object]:
         "ends": {} if encoder.kind.cycle else low,
         "places": 6 if encoder.sensor == "hall" else 4,
         "velocity": "velocity",
-        "lsb": 2.0**-tacho.widths.frac_bits,
+        "lsb": 2.0**-tacho.velocity.frac_bits,
         "compared": "generate --testbench cocotb",
         "expected": expected,
         # Forward, as it counts; a line alone does not tell.

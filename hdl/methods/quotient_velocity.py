@@ -14,7 +14,7 @@ from tachometry.spec.methods.timed import TimedTachometer
 
 
 def _bound_divider(spec: TimedTachometer) -> Divider:
-    scale_bits = spec.widths.native_frac_bits - spec.bound.error_bits
+    scale_bits = spec.velocity.native_frac_bits - spec.bound.error_bits
     return Divider(
         divisor_width=(spec.form.max_interval + 1).bit_length(),
         integer_bits=spec.form.quotient_bits - scale_bits,
@@ -35,7 +35,7 @@ class QuotientVelocity(wiring.Component):
 
     def __init__(self, spec: TimedTachometer) -> None:
         self._spec = spec
-        f = spec.widths.native_frac_bits
+        f = spec.velocity.native_frac_bits
         # Distances are divided in half counts.
         self.divider = Divider(
             divisor_width=spec.widths.interval,
@@ -184,7 +184,7 @@ class QuotientVelocity(wiring.Component):
         divider = self.divider
         negative = Signal(reset_less=True)
         most = Signal(reset_less=True)
-        limit = self._spec.widths.max_count << self._spec.widths.native_frac_bits
+        limit = self._spec.tick.max_count << self._spec.velocity.native_frac_bits
         m.d.sync += most.eq(Mux(negative, divider.next_digit_of(-limit), divider.next_digit_of(limit)))
         sign = Mux(self.decays, self.negative_before, self.distance[-1])
         with m.If(divider.start):
@@ -222,7 +222,7 @@ class QuotientVelocity(wiring.Component):
             ]
             with m.If(self.divider.start):
                 m.d.sync += none.eq(counted & end[-1] & (self.divisor == 1))
-            limit = -self._spec.bound.absent
+            limit = -self._spec.velocity.absent_bound
             lower = Mux(none, limit, box.quotient)
             with m.If(update):
                 m.d.sync += new[name].eq(-lower if upper else lower)

@@ -103,7 +103,7 @@ class RairanMethod(wiring.Component):
     def _bounds(self, m: Module, new: data.View, *, shown: Value, backward: Signal) -> None:
         """Look up both bounds; backwards, they are negated and exchanged."""
         spec, counters = self._spec, self.counters
-        width = spec.bound.width - 1
+        width = spec.velocity.bound_width - 1
         low = ~counters.high & counters.unsynced
         n, above = counters.n, (counters.n - low)[: len(counters.n)]
         if spec.adaptive:
@@ -142,7 +142,7 @@ class RairanMethod(wiring.Component):
     def _velocity(self, n: Signal, high: Signal, backward: Signal, entry: Value, shift: Value | int) -> Value:
         """Return the estimate with its sign: the complement and a carry are −v, so one adder rounds and negates."""
         spec = self._spec
-        f = spec.widths.native_frac_bits
+        f = spec.velocity.native_frac_bits
         whole = (n + 1 if spec.estimate == "n1" else n) & high.replicate(len(n) + 1)
         carry: Value = Const(0)
         if spec.estimate != "n3":
@@ -159,8 +159,8 @@ class RairanMethod(wiring.Component):
             magnitude = Cat(part, whole)
         else:
             magnitude = Mux(high, whole << f, entry)
-        padded = Cat(magnitude, Const(0, spec.widths.native))[: spec.widths.native]
-        return (padded ^ backward.replicate(spec.widths.native)) + (carry ^ backward)
+        padded = Cat(magnitude, Const(0, spec.velocity.native))[: spec.velocity.native]
+        return (padded ^ backward.replicate(spec.velocity.native)) + (carry ^ backward)
 
     def _without_tie(self, n: Signal, backward: Signal, entry: Value, shift: Value | int) -> Value:
         """Return half an LSB backwards is rounded to 0."""

@@ -118,7 +118,7 @@ class RairanCounters(wiring.Component):
 
     def _count(self, m: Module, pulse: Signal, opens: Signal) -> None:
         """Count Cep, which includes the count that opens a window, and Cdt since the last count."""
-        c_more, c_dt, most = self.c_more, self.c_dt, self._spec.widths.max_count
+        c_more, c_dt, most = self.c_more, self.c_dt, self._spec.tick.max_count
         # Whether Cdt reaches the maximum time with this end of dt, or has reached it before.
         full_dt = self._at_end(m, self._is(self._spec.form.max_dt))
         m.d.comb += self.longest.eq(self._at_end(m, self._is(lambda k: self._spec.form.max_dt(k) - 1)) | full_dt)

@@ -18,7 +18,7 @@ def update_layout(spec: TachometerSpec) -> data.StructLayout:
     `stamp` is for the age: how many ticks there were when the update was caused, modulo a power of two. `rests` is for
     the low-pass filter: no update will follow before the next count.
     """
-    fields = {"velocity": signed(spec.widths.native), "interval": spec.widths.interval, "forced": 1}
+    fields = {"velocity": signed(spec.velocity.native), "interval": spec.widths.interval, "forced": 1}
     if spec.facts.stalls_with == UPDATE:
         fields["stalled"] = 1
     if spec.widths.stamp:
@@ -26,7 +26,7 @@ def update_layout(spec: TachometerSpec) -> data.StructLayout:
     if spec.facts.last_at_rest and spec.lowpass is not None:
         fields["rests"] = 1
     if spec.bounds:
-        fields |= {name: signed(spec.bound.width) for name in BOUNDS} | {"bounds_valid": 1}
+        fields |= {name: signed(spec.velocity.bound_width) for name in BOUNDS} | {"bounds_valid": 1}
     fields |= {port.name: signed(port.width) if port.signed else port.width for port in spec.method_ports}
     return data.StructLayout(fields)
 

@@ -130,6 +130,6 @@ def with_last_tick(recording: Recording, spec: CoreSpec) -> Recording:
     """
     if spec.tachometer.external_tick or recording.duration > recording.time[-1]:
         return recording
-    clocks = spec.latency.pin_to_count + spec.times.longest_tick + spec.latency.tick + spec.latency.tick_to_velocity
+    clocks = spec.latency.pin_to_count + spec.tick.longest + spec.latency.tick + spec.latency.tick_to_velocity
     # One clock more for the edge, which is seen at the next one, and one for rounding.
     return replace(recording, duration=recording.duration + (clocks + 2) / spec.timing.clock_hz)

@@ -246,10 +246,10 @@ class LoopSimulation:
 
     def _core(self, period: int) -> Any:
         spec, names = self._spec, [port.name for port in self._design.outputs]
-        acceleration = float(spec.scale.entries.get("acceleration", {}).get("rad_per_s2_per_lsb", 0.0))
+        acceleration = float(spec.method_entries.get("acceleration", {}).get("rad_per_s2_per_lsb", 0.0))
         columns = [names.index(name) for name in ("velocity", "velocity_valid", "position")]
         columns.append(names.index("acceleration") if acceleration else -1)
         columns.append(names.index("forced") if spec.facts.awaits_count else -1)
         columns.append(longest_interval(spec, period) * period)
         per_count = 2 * np.pi / spec.encoder.counts_per_rev
-        return _CORE(spec.scale.rad_per_s_per_lsb, acceleration, per_count, *columns, 1 / spec.timing.clock_hz)
+        return _CORE(spec.velocity.rad_per_s_per_lsb, acceleration, per_count, *columns, 1 / spec.timing.clock_hz)

@@ -25,7 +25,7 @@ def run_axes(spec: AxesSpec, trace: AxesTrace, tables: Callable[[TachometerSpec,
         clocks = {
             TICK: spec.shown(axis, ticks.clock - latency),
             UPDATE: spec.shown(axis, updates["cause"] - latency),
-            "decode_error": spec.look(axis, rows["decode_error"].clock) + spec.latency.count,
+            "decode_error": spec.look(axis, rows["decode_error"].clock) + spec.count_latency,
             INDEX: spec.look(axis, rows[INDEX].clock - latency) + spec.latency.index,
             "tick_error": spec.look(0, rows["tick_error"].clock - latency + 2),
         }

@@ -82,7 +82,7 @@ def _carried(
     """Yield the same of places between counts: that of an update, and eight times its velocity per clock for each clock
     in which it catches up, then the velocity once a clock.
     """
-    way = spec.scale.carrying
+    way = spec.carrying
     half = 1 << spec.position_width - 1 + way.fine_bits
     widest = half << way.more_bits
     before = np.searchsorted(_sets(spec, steps), updates.clock - spec.latency.datapath, side="right")

@@ -10,8 +10,8 @@ from tachometry.sim.golden.front_end import count, decoded
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, Table
 from tachometry.spec import TachometerSpec
+from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.form import GAINS, GUARD_BITS, ControlForm, Term
-from tachometry.spec.control.loop import LoopSpec
 from tachometry.spec.control.ports import CONTROL, CURRENT
 from tachometry.spec.language.port import UPDATE
 

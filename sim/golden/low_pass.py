@@ -14,7 +14,7 @@ def filtered(spec: TachometerSpec, ticks: Table, updates: Table) -> Table:
     """
     if spec.lowpass is None:
         return updates
-    form = spec.scale.low_pass
+    form = spec.velocity.low_pass
     latency = form.latency
     tables, low_bits, extra, bits = form.tables, form.low_bits, form.extra_bits, form.factor_bits
     half = 1 << (bits - 1)

@@ -13,7 +13,7 @@ def in_unit(spec: TachometerSpec, updates: Table) -> Table:
 
     Where 64 bits do not hold the products, Python's integers do.
     """
-    output = spec.scale.output
+    output = spec.velocity.output
     if output is None:
         return updates
 
@@ -34,7 +34,7 @@ def trips(spec: TachometerSpec, updates: Table) -> Table:
     """Return the clocks from which updates beyond the limit of the speed are shown."""
     beyond = np.zeros(len(updates), dtype=bool)
     if spec.over_speed is not None:
-        beyond = np.abs(updates.velocity) > spec.scale.over_speed
+        beyond = np.abs(updates.velocity) > spec.over_speed_lsb
     return Table(updates.clock[beyond] + 1, {})
 
 

@@ -17,7 +17,7 @@ def windows(spec: TachometerSpec, trace: PinTrace) -> tuple[NDArray[np.int64], N
     assert trace.tick_in is not None, "an external tick needs its line"
     # A line that is high at first has not risen.
     rises = trace.clock[np.flatnonzero(np.diff(trace.tick_in, prepend=1) == 1)] + TICK_IN_TO_WINDOW_END
-    last, error = external_windows(rises, n_clocks, spec.times.min_tick_cycles, spec.times.longest_tick)
+    last, error = external_windows(rises, n_clocks, spec.times.min_tick_cycles, spec.tick.longest)
     return last, error + spec.latency.tick
 
 

@@ -74,8 +74,8 @@ def records(
     records : structured array, shape (n,)
         With the `dtype` of the manifest. What belongs to updates, the velocity aside, is not defined before the first.
     """
-    entry, clock = stream_entry(spec), _events(spec, steps, tables)
-    assert entry is not None
+    assert spec.stream is not None
+    entry, clock = stream_entry(spec.stream, spec, spec.ports), _events(spec, steps, tables)
     free = _free(trace, clock)
     rows = {name: np.searchsorted(tables[name].clock, clock, side="right") for name in (TICK, UPDATE)}
     held = {
@@ -87,7 +87,7 @@ def records(
     shown = health.with_health(spec, with_trip(spec, shown, tables["over_speed"]), tables["fault"])
     shown = probe.with_probed(spec, shown.having(**compare.shown(spec, dict(tables), clock)), dict(tables))
     found = np.zeros(len(clock), dtype=np.dtype(entry["dtype"]))
-    bits = [shown[name].astype(np.uint32) << np.uint32(place) for place, name in enumerate(flags_of(spec))]
+    bits = [shown[name].astype(np.uint32) << np.uint32(place) for place, name in enumerate(flags_of(spec.ports))]
     position = positions_at(spec, steps, clock - spec.latency.tick, reset=True)
     values = {"time": clock, "flags": sum(bits), "position": position}
     for name in entry["dtype"]["names"]:

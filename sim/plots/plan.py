@@ -58,8 +58,8 @@ def _draw(spec: TachometerSpec, plan: Plan, unit: str) -> Figure:
         for label, mark, style in marks:
             if left <= mark <= right:
                 axes.axvline(mark, color="0.4", linestyle=style, label=label)
-    rounding = 100 * spec.scale.rounding_lsb * spec.scale.rad_per_s_per_lsb / plan.speed
-    resolution.loglog(speed, rounding, color="0.6", linewidth=0.8, label=f"rounding, {spec.scale.rounding_lsb} LSB")
+    rounding = 100 * spec.velocity.rounding_lsb * spec.velocity.rad_per_s_per_lsb / plan.speed
+    resolution.loglog(speed, rounding, color="0.6", linewidth=0.8, label=f"rounding, {spec.velocity.rounding_lsb} LSB")
     resolution.set_ylabel("resolution/speed (%)")
     resolution.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, markerscale=3, ncols=5)
     time.set_ylabel("measurement time (s)")

@@ -60,7 +60,7 @@ def _draw(spec: TachometerSpec, run: Run, true_speed: TrueSpeed | None) -> Figur
 
 def _velocity(axes: Axes, spec: TachometerSpec, run: Run, true_speed: TrueSpeed | None, scale: float) -> None:
     clock_hz, updates, unit = spec.timing.clock_hz, run.updates, spec.scale.shown_unit
-    velocity = unit.of(updates.velocity * spec.scale.rad_per_s_per_lsb)
+    velocity = unit.of(updates.velocity * spec.velocity.rad_per_s_per_lsb)
     clock, velocity = _held_to_end(updates.clock, velocity, run.n_clocks)
     kept = columns(clock, velocity)
     time = clock[kept] / clock_hz * scale

@@ -60,7 +60,7 @@ def held_from(clock: NDArray[np.int64], updates: Table, spec: TachometerSpec) ->
     """Return the velocity that is held in these clocks, from the first update on."""
     latest = np.searchsorted(updates.clock, clock, side="right") - 1
     clock, latest = clock[latest >= 0], latest[latest >= 0]
-    velocity = updates.velocity[latest].astype(np.float64) * spec.scale.rad_per_s_per_lsb
+    velocity = updates.velocity[latest].astype(np.float64) * spec.velocity.rad_per_s_per_lsb
     return HeldVelocity(clock.astype(np.float64) / spec.timing.clock_hz, velocity)
 
 
@@ -109,7 +109,7 @@ def _of_updates(spec: TachometerSpec, run: Run, tick_to_velocity: int) -> dict[s
         "interval": updates.interval.astype(np.int64),  # numbers, also of one bit
         "forced": updates.forced.astype(np.int64),
         "velocity_raw": updates.velocity,
-        f"velocity_{unit.suffix}": unit.of(updates.velocity * spec.scale.rad_per_s_per_lsb),
+        f"velocity_{unit.suffix}": unit.of(updates.velocity * spec.velocity.rad_per_s_per_lsb),
     }
     return columns | {
         name: updates[name].astype(np.int64) for name in updates.columns if name not in (*columns, "velocity")

@@ -188,13 +188,13 @@ def _texts(method: str, row: Texts) -> Texts:
     frac_bits, width = texts.pop("frac-bits", ""), texts.pop("velocity-width", "")
     if frac_bits:
         spec = of_texts(method, texts)
-        fewest, most = spec.widths.frac_bits_range(spec.unit)
+        fewest, most = spec.velocity.frac_bits_range(spec.unit)
         bits = max(fewest, most - _less(frac_bits)) if "-" in frac_bits else min(int(frac_bits), most)
         texts["frac-bits"] = str(bits)
     if width:
         # The greatest speed must fit.
         less = 0 if "max-speed" in texts else _less(width)
-        texts["velocity-width"] = str(max(8, of_texts(method, texts).widths.velocity - less))
+        texts["velocity-width"] = str(max(8, of_texts(method, texts).velocity.width - less))
     return texts
 
 

@@ -82,7 +82,7 @@ def default_range(spec: TachometerSpec) -> tuple[float, float]:
     """
     unit = spec.scale.unit_velocity
     high = _UNITS * unit if spec.max_speed is None else spec.max_speed.rad_per_s
-    high = min(high, spec.scale.greatest_speed)
+    high = min(high, spec.velocity.greatest_speed)
     if spec.filter_clocks and spec.encoder.sensor == "quadrature":  # a level lasts half a period of its line
         high = min(high, unit * spec.timing.tick_cycles * spec.encoder.decoding / 2 / spec.filter_clocks)
     return min(unit / spec.timing.max_ticks, high / 10), high
@@ -223,7 +223,7 @@ def _error(spec: TachometerSpec, worst: Plan | None) -> float | None:
 
 
 def _rounding(spec: TachometerSpec) -> float:
-    return spec.scale.rounding_lsb * spec.scale.rad_per_s_per_lsb
+    return spec.velocity.rounding_lsb * spec.velocity.rad_per_s_per_lsb
 
 
 def cells_of(spec: TachometerSpec) -> int | None:

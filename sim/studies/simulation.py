@@ -118,13 +118,13 @@ def simulate(
     if pulses is not None and isinstance(trace, PinTrace):
         for name, rises in pulses(spec.tachometer).items():
             if len(rises) and not 0 < rises[0] <= rises[-1] < trace.n_clocks:  # in clock 0 it would be high, not rise
-                end = format_time(spec.times.seconds(trace.n_clocks))
+                end = format_time(spec.tick.seconds(trace.n_clocks))
                 raise ParameterError("pulse", f"must have times after 0 and before the end of {source}, at {end}")
             trace = trace.with_pulses(name, rises, spec.tachometer.filter_clocks + 1)
-    fewest = spec.times.longest_tick + spec.latency.tick  # after which there is something to report
+    fewest = spec.tick.longest + spec.latency.tick  # after which there is something to report
     if trace.n_clocks < fewest:
         raise ValueError(
-            f"{source} must last at least {fewest} clocks of --clock ({format_time(spec.times.seconds(fewest))}), "
+            f"{source} must last at least {fewest} clocks of --clock ({format_time(spec.tick.seconds(fewest))}), "
             f"a tick and its latency, not {trace.n_clocks}"
         )
     shown, chosen = window(spec, trace.n_clocks), pick(engine)

@@ -246,5 +246,5 @@ def _add(outcome: Outcome, spec: CoreSpec, engine: Engine, seed: int, trace: Tra
     outcome.n_mismatches += found.n_mismatches
     if found.n_mismatches and outcome.failure is None:
         # A capture holds what comes before its end; the outputs come a little later.
-        end = min(mismatch.clock for mismatch in found.first) + spec.times.longest_tick + spec.latency.tick
+        end = min(mismatch.clock for mismatch in found.first) + spec.tick.longest + spec.latency.tick
         outcome.failure = Failure(seed, found.first, trace.until(min(end, trace.n_clocks)))

@@ -177,7 +177,7 @@ def _usual_form(spec: TachometerSpec, longest: int, *, backward: bool) -> str:
     def speed(counts_per_tick: float) -> str:
         return f"{spec.scale.unit_velocity * (-counts_per_tick if backward else counts_per_tick)}rad/s"
 
-    brisk, fast = min(3.3, most), min(1.5 * spec.widths.max_count, most)
+    brisk, fast = min(3.3, most), min(1.5 * spec.tick.max_count, most)
     return (
         f"ramp:0:{speed(brisk)}:{part}s+constant:{speed(min(1.25, most))}:{part}s+constant:{speed(fast)}:{part / 20}s"
         f"+constant:{speed(-fast)}:{part / 20}s+constant:{speed(-min(1.25, most))}:{part}s"
@@ -193,7 +193,7 @@ def _external_ticks(spec: TachometerSpec, n_clocks: int) -> NDArray[np.int64]:
     k = np.arange(n_clocks // 2 // cycles + 2)
     gap = cycles + (k % 5 - 2) * (cycles // 16)
     gap[7::30] = 2
-    gap[17::30] = 3 * spec.times.longest_tick
+    gap[17::30] = 3 * spec.tick.longest
     return np.cumsum(np.maximum(gap, 2)).astype(np.int64)
 
 

@@ -60,8 +60,8 @@ def control_form(units: Units, ratios: dict[Term, Sequence[Fraction]], *, inputs
         terms |= {term: form.gain(ratios[term][0], _usual(units, term), bits, gain_bits) for term in GAINS}
     law, core = units.law, units.law.tachometer
     return ControlForm(
-        velocity_width=core.widths.velocity,
-        velocity_limit=core.scale.full_scale,
+        velocity_width=core.velocity.width,
+        velocity_limit=core.velocity.full_scale,
         extra_bits=units.extra_bits,
         factor_bits=bits,
         terms=terms,

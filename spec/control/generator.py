@@ -121,7 +121,7 @@ def generator_form(units: Units, command_width: int) -> GeneratorForm:
     greatest = acceleration * (1 << (ACCELERATION_WIDTH - 1)) / change
     fraction = math.floor(math.log2((1 << (WORD - 1)) / greatest))
     fraction = max(POSITION_FRAC_BITS, min(fraction, MOST_FRACTION))
-    fastest = units.rad_per_s * core.scale.full_scale / speed * (1 << fraction)
+    fastest = units.rad_per_s * core.velocity.full_scale / speed * (1 << fraction)
     bits = max(WORD - 1, math.ceil(fastest).bit_length())
     velocity = units.rad_per_s / (1 << units.command_bits)
     return GeneratorForm(

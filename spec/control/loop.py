@@ -1,27 +1,19 @@
-"""A tachometer and the control loop of its shaft as one core."""
-
-from __future__ import annotations
+"""The control loop of a core: its options, formats and times."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, ClassVar
 
 from tachometry.spec.control.coefficients import control_form, ratios_of
 from tachometry.spec.control.form import ControlForm, Term, factor_bits
 from tachometry.spec.control.generator import GeneratorForm, generator_clocks, generator_form
 from tachometry.spec.control.law import Law
-from tachometry.spec.control.ports import loop_ports
 from tachometry.spec.control.units import Units
-from tachometry.spec.core.described import written
-from tachometry.spec.core.follows import Follows
 from tachometry.spec.core.front_end import OF_CONTROLS
-from tachometry.spec.core.scale import Scale
-from tachometry.spec.language.option import ParameterError, check_options, option, options_of
-from tachometry.spec.language.port import Port, Ports
+from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.language.option import ParameterError, check_options, option
 from tachometry.spec.language.units import PI, plural, rounded
-from tachometry.spec.methods.axes import CoreSpec
 
 MAX_EXTRA_BITS = 24
 MAX_FACTOR_BITS = 40
@@ -37,8 +29,15 @@ _UNFILTERED = 3  # to load the velocity, to subtract, to store
 _LIMIT = 2  # to hold the sum within few bits, and within the limit
 
 
-class LoopLatency(Follows["LoopSpec"]):
-    """Counts the clocks of the ticks of a control loop, and of its computation."""
+@dataclass(frozen=True)
+class LoopLatency:
+    """Clocks of the ticks of a control loop, and of its computation."""
+
+    tachometer: TachometerSpec
+    multiplier: str
+    generated: bool  # whether commands come from a generator
+    filtered: bool
+    factor_bits: int  # of a coefficient
 
     @property
     def first_tick(self) -> int:
@@ -46,40 +45,29 @@ class LoopLatency(Follows["LoopSpec"]):
 
         So a period of whole ticks meets each update when it is new.
         """
-        spec = self.spec.tachometer
-        return spec.timing.tick_cycles - 1 + spec.latency.tick + spec.latency.tick_to_velocity + 1
+        latency = self.tachometer.latency
+        return self.tachometer.timing.tick_cycles - 1 + latency.tick + latency.tick_to_velocity + 1
 
     @property
     def product(self) -> int:
         """Clocks from one product to the next."""
-        return self._product(self.spec.form.factor_bits)
-
-    def _product(self, factor_bits: int) -> int:
-        return _STEPS + (factor_bits if self.spec.multiplier == "serial" else _PARALLEL)
+        return _STEPS + (self.factor_bits if self.multiplier == "serial" else _PARALLEL)
 
     @property
     def tick_to_result(self) -> int:
         """Clocks from `control_tick` to `current_valid`."""
-        return self._tick_to_result(self.spec.form.factor_bits)
-
-    def _tick_to_result(self, factor_bits: int) -> int:
-        unfiltered = self.spec.filter is None
-        return (len(Term) - unfiltered) * self._product(factor_bits) + unfiltered * _UNFILTERED + _LIMIT
+        products = len(Term) - (not self.filtered)
+        return products * self.product + (not self.filtered) * _UNFILTERED + _LIMIT
 
     @property
     def least_period(self) -> int:
         """Fewest clocks between two control ticks: the current is added to those before it."""
-        return self.least_period_of(self.spec.form.factor_bits)
-
-    def least_period_of(self, factor_bits: int) -> int:
-        """Return the fewest clocks between two control ticks, for coefficients of so many bits."""
-        generated = generator_clocks(self.spec.multiplier) if self.spec.command == "generator" else 0
-        return max(self._tick_to_result(factor_bits) + 1, generated)
+        return max(self.tick_to_result + 1, generator_clocks(self.multiplier) if self.generated else 0)
 
 
 @dataclass(frozen=True, kw_only=True)
-class LoopSpec(Law):
-    """Describes a tachometer with disturbance observer and controller of position and velocity; see `ControlForm`.
+class Loop(Law):
+    """Options and numbers of a disturbance observer and a controller of position and velocity; see `ControlForm`.
 
     It raises ParameterError if a parameter is out of range, the program is longer than the period, or a format is too
     wide.
@@ -102,10 +90,6 @@ class LoopSpec(Law):
         "Whether gains and current limit are fixed, or inputs; a bus makes them registers that begin with the options.",
         choices=FIXED_OR_INPUTS,
     )
-
-    # Outputs are of one axis.
-    axes: ClassVar[None] = None
-    latency = cached_property(LoopLatency)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -133,7 +117,7 @@ class LoopSpec(Law):
     def _least_in(self, period: int) -> int:
         """Return `latency.least_period` with another period: words are of other widths in it."""
         ratios = ratios_of(replace(self.units, period=period))
-        return self.latency.least_period_of(factor_bits(list(ratios.values())))
+        return replace(self.latency, factor_bits=factor_bits(list(ratios.values()))).least_period
 
     def _check_formats(self) -> None:
         for rate, name in ((self.observer, "observer"), (self.filter, "velocity_filter")):
@@ -159,16 +143,6 @@ class LoopSpec(Law):
                 "max_speed, a lower observer or lower gains help, too",
             )
 
-    @property
-    def method(self) -> str:
-        """Name of the tachometer's method."""
-        return self.tachometer.method
-
-    @property
-    def scale(self) -> Scale[Any]:
-        """Unit and LSB of the velocity."""
-        return self.tachometer.scale
-
     @cached_property
     def units(self) -> Units:
         """Units of its numbers."""
@@ -190,35 +164,7 @@ class LoopSpec(Law):
         return generator_form(self.units, self.form.command_width)
 
     @cached_property
-    def ports(self) -> Ports:
-        """Ports of the exported core, in order: those of the tachometer first."""
-        return Ports((*self.tachometer.ports, *loop_ports(self)))
-
-    @property
-    def held_inputs(self) -> tuple[Port, ...]:
-        """Inputs that are taken in the clock before a control tick: commands, gains and limit, if gains are inputs."""
-        if self.gains == "fixed":
-            return ()
-        return tuple(
-            port for port in loop_ports(self) if port.direction == "input" and port.name not in ("enable", "freeze")
-        )
-
-    @property
-    def options(self) -> dict[str, str]:
-        """Texts of all options that are asked for, by their names."""
-        return {**self.tachometer.options, "loop": "yes", **written(self, self.tachometer)}
-
-    @property
-    def parameters(self) -> dict[str, Any]:
-        """Every option in canonical form, defaults included."""
-        follows = {"velocity_filter": self.filter, "control_period": self.period}
-        own = {
-            about.parameter: about.canonical(follows.get(about.field, getattr(self, about.field)))
-            for about in options_of(LoopSpec)
-        }
-        return {**self.tachometer.parameters, "loop": own}
-
-
-# A core of any kind: all have ports, options, parameters, `axes`, `latency.tick_to_result`, and a `tachometer`,
-# the core of one axis that they are, or that is in them.
-AnySpec = CoreSpec | LoopSpec
+    def latency(self) -> LoopLatency:
+        """Clocks of the ticks of the loop, and of its computation."""
+        generated = self.command == "generator"
+        return LoopLatency(self.tachometer, self.multiplier, generated, self.filter is not None, self.form.factor_bits)

@@ -1,18 +1,14 @@
 """Ports of a control loop."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tachometry.spec.control.coefficients import gain_per_lsb
 from tachometry.spec.control.form import GAINS, POSITION_FRAC_BITS, Term
 from tachometry.spec.control.generator import AMPLITUDE_WIDTH, MODE_WIDTH, RATE_FRAC_BITS, WORD
+from tachometry.spec.control.loop import Loop
 from tachometry.spec.language.port import Port, held, strobe
 from tachometry.spec.language.units import signed_width
-
-if TYPE_CHECKING:
-    from tachometry.spec.control.loop import LoopSpec
 
 CONTROL, CURRENT = "control_tick", "current_valid"
 GAIN_PORTS = {term: f"gain_{term.name.lower()}" for term in GAINS}
@@ -31,10 +27,10 @@ _COMMAND_HELP = {
 _GAIN_UNIT = {Term.POSITION: " 1/s²", Term.VELOCITY: " 1/s"}
 
 
-def loop_ports(spec: LoopSpec) -> Iterator[Port]:
+def loop_ports(spec: Loop) -> Iterator[Port]:
     """Yield ports beside those of the tachometer."""
     form, taken = spec.form, _TAKEN[spec.gains]
-    fine = f"2^{-spec.tachometer.widths.frac_bits - form.extra_bits} {spec.tachometer.unit}"
+    fine = f"2^{-spec.tachometer.velocity.frac_bits - form.extra_bits} {spec.tachometer.unit}"
     amperes = f"2^{-spec.units.current_frac_bits} A"
     yield Port("enable", "input", help="The current is 0 unless this is high in the clock of control_tick.")
     if spec.command == "generator":
@@ -65,17 +61,17 @@ def loop_ports(spec: LoopSpec) -> Iterator[Port]:
     yield Port("drive", "output", help=text + "w bits of current.")
 
 
-def _units(spec: LoopSpec) -> dict[str, tuple[int, str]]:
+def _units(spec: Loop) -> dict[str, tuple[int, str]]:
     """Return bits and unit of the commanded position, velocity and acceleration."""
     form, tachometer = spec.form, spec.tachometer
     return {
         "position": (tachometer.position_width + POSITION_FRAC_BITS, f"2^{-POSITION_FRAC_BITS} counts"),
-        "velocity": (form.command_width, f"2^{-tachometer.widths.frac_bits - form.command_bits} {tachometer.unit}"),
+        "velocity": (form.command_width, f"2^{-tachometer.velocity.frac_bits - form.command_bits} {tachometer.unit}"),
         "acceleration": (form.acceleration_width, f"2^{-spec.units.acceleration_frac_bits} rad/s²"),
     }
 
 
-def _generated(spec: LoopSpec) -> Iterator[Port]:
+def _generated(spec: Loop) -> Iterator[Port]:
     """Yield what the command generator is told, and what it commands."""
     form, taken = spec.generator, _TAKEN[spec.gains]
     text = f"0: a constant velocity; 1: a ramp to it; 2 or 3: a sine, which begins here at rest. {taken}"
@@ -100,7 +96,7 @@ def _generated(spec: LoopSpec) -> Iterator[Port]:
         yield held(CONTROL, f"command_{name}", width, signed=True, unit=unit, help=texts[name])
 
 
-def loop_entries(spec: LoopSpec) -> dict[str, Any]:
+def loop_entries(spec: Loop) -> dict[str, Any]:
     """Return what the manifest says of the loop."""
     form = spec.form
     generator: dict[str, Any] = {}
@@ -132,7 +128,7 @@ def loop_entries(spec: LoopSpec) -> dict[str, Any]:
     }
 
 
-def _gain_entries(spec: LoopSpec) -> dict[str, Any]:
+def _gain_entries(spec: Loop) -> dict[str, Any]:
     """Return what raw values of the gains mean: raw = round(gain/per_lsb), from 0 to most."""
     form = spec.form
     if not form.gain_bits:

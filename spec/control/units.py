@@ -15,7 +15,7 @@ MAX_INTERVAL = 1023  # control ticks: a table has as many entries, and one
 
 def longest_interval(spec: TachometerSpec, period: int) -> int:
     """Return the most control ticks, so many clocks apart, that an update of a core can stand for."""
-    ticks = -(-(spec.timing.max_ticks * spec.times.longest_tick) // period) + 2
+    ticks = -(-(spec.timing.max_ticks * spec.tick.longest) // period) + 2
     return min((1 << ticks.bit_length()) - 1, MAX_INTERVAL)
 
 
@@ -30,7 +30,7 @@ class Units:
     @property
     def seconds(self) -> Fraction:
         """T_c, the time between two control ticks."""
-        return self.law.tachometer.times.seconds(self.period)
+        return self.law.tachometer.tick.seconds(self.period)
 
     @property
     def longest(self) -> int:
@@ -42,7 +42,7 @@ class Units:
         """One LSB of the velocity in rad/s."""
         spec = self.law.tachometer
         counts = spec.encoder.counts_per_rev * spec.timing.tick_seconds * spec.scale.per_count
-        return 2 * PI / (counts * Fraction(2) ** spec.widths.frac_bits)
+        return 2 * PI / (counts * Fraction(2) ** spec.velocity.frac_bits)
 
     @property
     def current_frac_bits(self) -> int:

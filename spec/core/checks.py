@@ -1,11 +1,9 @@
 """Checks of a core: that its numbers are in range, and fit each other."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
+from tachometry.spec.core.core import Core
 from tachometry.spec.core.front_end import OF_CONTROLS
 from tachometry.spec.core.health import COMPLEMENTS
 from tachometry.spec.core.probe import edges_of
@@ -15,14 +13,11 @@ from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.language.option import ParameterError, check_options
 from tachometry.spec.language.units import PI, SpeedUnit, format_time, rounded, signed_width
 
-if TYPE_CHECKING:
-    from tachometry.spec.core.tachometer import TachometerSpec
-
 MAX_MODULUS = 1 << 24
 _LONGEST_FILTER = Fraction(10, 1000)  # s; contacts bounce for 2 ms or so
 
 
-def check(spec: TachometerSpec) -> None:
+def check(spec: Core) -> None:
     """Check what is asked for; ParameterError if a parameter is out of range."""
     check_options(spec)
     _check_ticks(spec)
@@ -48,11 +43,11 @@ def check(spec: TachometerSpec) -> None:
     if spec.compare is not None:
         fastest = Fraction(0)
         if spec.max_speed is not None:
-            fastest = min(spec.max_speed.counts(spec.encoder.counts_per_rev, spec.times.seconds(1)), Fraction(1))
+            fastest = min(spec.max_speed.counts(spec.encoder.counts_per_rev, spec.tick.seconds(1)), Fraction(1))
         spec.compare.check(spec.timing.clock_hz, spec.position_width, fastest, getattr(spec, "fine_bits", None))
-    if spec.over_speed is not None and spec.scale.over_speed >= spec.scale.full_scale:
+    if spec.over_speed is not None and spec.over_speed_lsb >= spec.velocity.full_scale:
         unit = SpeedUnit(spec.over_speed.unit)
-        greatest = f"{unit.of(spec.scale.full_scale * spec.scale.rad_per_s_per_lsb):.6g} {unit.name}"
+        greatest = f"{unit.of(spec.velocity.full_scale * spec.velocity.rad_per_s_per_lsb):.6g} {unit.name}"
         raise ParameterError(
             "over_speed", f"must be less than {greatest}, the greatest velocity, not {spec.over_speed}"
         )
@@ -62,7 +57,7 @@ def check(spec: TachometerSpec) -> None:
         _check_lowpass(spec, spec.lowpass)
 
 
-def _check_index_state(spec: TachometerSpec) -> None:
+def _check_index_state(spec: Core) -> None:
     if spec.index is None or spec.index.at is None:
         return
     kind, state = spec.encoder.kind, spec.front_end.index_state
@@ -81,7 +76,7 @@ def _check_index_state(spec: TachometerSpec) -> None:
         raise ParameterError("index_at", f"must be edge, {states} for {kind.name}, not {spec.index.at}")
 
 
-def _check_place(spec: TachometerSpec) -> None:
+def _check_place(spec: Core) -> None:
     if spec.front_end.wheel is not None and spec.front_end.controls:
         name = OF_CONTROLS[spec.front_end.controls[0]]
         raise ParameterError(name, "must not be given together with --missing-teeth, whose gap is the index")
@@ -99,17 +94,17 @@ def _check_place(spec: TachometerSpec) -> None:
         raise ParameterError("position_modulo", f"must be from 2 to {MAX_MODULUS} counts, not {counts}")
 
 
-def _check_edge_error(spec: TachometerSpec) -> None:
+def _check_edge_error(spec: Core) -> None:
     if not 0 <= spec.edge_error <= 1:
         raise ParameterError("edge_error", f"must be from 0 to 1, not {float(spec.edge_error):.9g}")
     if spec.edge_error and not spec.bounds:
         raise ParameterError("edge_error", "must be given together with --bounds")
 
 
-def _check_lowpass(spec: TachometerSpec, bandwidth: Fraction) -> None:
+def _check_lowpass(spec: Core, bandwidth: Fraction) -> None:
     least = 4 / (spec.timing.tick_seconds * (1 << MAX_EXTRA_BITS))
     greatest = 2 * PI * spec.timing.clock_hz  # nothing is faster than the clock
-    if bandwidth <= 0 or spec.scale.low_pass.extra_bits > MAX_EXTRA_BITS or bandwidth > greatest:
+    if bandwidth <= 0 or spec.velocity.low_pass.extra_bits > MAX_EXTRA_BITS or bandwidth > greatest:
         raise ParameterError(
             "lowpass",
             f"must be from {rounded(least, up=True)} to {rounded(greatest, up=False)} rad/s here, "
@@ -117,7 +112,7 @@ def _check_lowpass(spec: TachometerSpec, bandwidth: Fraction) -> None:
         )
 
 
-def _check_ticks(spec: TachometerSpec) -> None:
+def _check_ticks(spec: Core) -> None:
     if not spec.external_tick:
         if spec.max_tick_cycles is not None:
             raise ParameterError("max_tick_cycles", "must be given together with --external-tick")
@@ -127,40 +122,40 @@ def _check_ticks(spec: TachometerSpec) -> None:
     shortest = spec.timing.tick_cycles
     if shortest < 2:
         raise ParameterError("tick_cycles", "must be at least 2 with an external tick, not 1")
-    if not shortest <= spec.times.longest_tick <= MAX_TICK_CYCLES:
+    if not shortest <= spec.tick.longest <= MAX_TICK_CYCLES:
         raise ParameterError(
             "max_tick_cycles",
             f"must be from {shortest}, one tick, to {MAX_TICK_CYCLES}, not {spec.max_tick_cycles}",
         )
 
 
-def _check_velocity(spec: TachometerSpec) -> None:
-    coarsest, finest = spec.widths.frac_bits_range(spec.unit)
-    if coarsest <= spec.widths.frac_bits <= finest:
+def _check_velocity(spec: Core) -> None:
+    coarsest, finest = spec.velocity.frac_bits_range(spec.unit)
+    if coarsest <= spec.velocity.frac_bits <= finest:
         _check_full_scale(spec, coarsest)
         return
     if spec.unit == NATIVE:
-        raise ParameterError("frac_bits", f"must be from {coarsest} to {finest}, not {spec.widths.frac_bits}")
+        raise ParameterError("frac_bits", f"must be from {coarsest} to {finest}, not {spec.velocity.frac_bits}")
     raise ParameterError(
         "lsb",
         f"must be from 2^{-finest} to 2^{-coarsest} {spec.unit} with this encoder and tick, "
-        f"not 2^{-spec.widths.frac_bits}",
+        f"not 2^{-spec.velocity.frac_bits}",
     )
 
 
-def _check_full_scale(spec: TachometerSpec, coarsest: int) -> None:
+def _check_full_scale(spec: Core, coarsest: int) -> None:
     """Check that a velocity of so many bits shows the greatest speed."""
     if spec.max_speed is None or spec.velocity_width is None:
         return
     counts = spec.max_speed.counts(spec.encoder.counts_per_rev, spec.timing.tick_seconds)
-    counts = min(counts, Fraction(spec.widths.max_velocity))
-    fitting = spec.widths.fitting_frac_bits(counts)
-    if spec.widths.frac_bits <= fitting:
+    counts = min(counts, Fraction(spec.velocity.max))
+    fitting = spec.velocity.fitting_frac_bits(counts)
+    if spec.velocity.frac_bits <= fitting:
         return
     needs = f"to show {spec.max_speed} in {spec.velocity_width} bits"
     if fitting < coarsest:
         width = signed_width(math.ceil(counts * spec.scale.per_count * Fraction(2) ** coarsest))
         raise ParameterError("velocity_width", f"must be at least {width} to show {spec.max_speed} in {spec.unit}")
     if spec.unit == NATIVE:
-        raise ParameterError("frac_bits", f"must be at most {fitting} {needs}, not {spec.widths.frac_bits}")
-    raise ParameterError("lsb", f"must be at least 2^{-fitting} {spec.unit} {needs}, not 2^{-spec.widths.frac_bits}")
+        raise ParameterError("frac_bits", f"must be at most {fitting} {needs}, not {spec.velocity.frac_bits}")
+    raise ParameterError("lsb", f"must be at least 2^{-fitting} {spec.unit} {needs}, not 2^{-spec.velocity.frac_bits}")

@@ -1,19 +1,15 @@
 """A spec as files have it: its options as texts and in canonical form."""
 
-from __future__ import annotations
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
-
+from tachometry.spec.core.core import Core
 from tachometry.spec.language.option import options_of
 from tachometry.spec.language.units import written_time
-
-if TYPE_CHECKING:
-    from tachometry.spec.core.tachometer import TachometerSpec
 
 CHOSEN = "method-chosen"  # what `options_as_asked` call why a method was taken
 
 
-def options_as_asked(spec: TachometerSpec) -> dict[str, str]:
+def options_as_asked(spec: Core) -> dict[str, str]:
     """Return texts of all options that are asked for, by their names."""
     found = {"method": spec.method} | ({CHOSEN: spec.chosen} if spec.chosen else {})
     for part in (spec.encoder, spec.timing, spec):
@@ -21,7 +17,7 @@ def options_as_asked(spec: TachometerSpec) -> dict[str, str]:
     return found
 
 
-def parameters_of(spec: TachometerSpec) -> dict[str, Any]:
+def parameters_of(spec: Core) -> dict[str, Any]:
     """Return every option in canonical form, defaults and what follows included."""
     found: dict[str, Any] = {"method": spec.method}
     for part in (spec.encoder, spec.timing, spec):
@@ -31,14 +27,14 @@ def parameters_of(spec: TachometerSpec) -> dict[str, Any]:
                 found[about.field] = about.canonical(value)
     del found["external_tick"]
     return found | {
-        "frac_bits": spec.widths.frac_bits,
-        "velocity_width": spec.widths.velocity,
-        "max_tick_cycles": spec.times.longest_tick if spec.external_tick else None,
+        "frac_bits": spec.velocity.frac_bits,
+        "velocity_width": spec.velocity.width,
+        "max_tick_cycles": spec.tick.longest if spec.external_tick else None,
         "edge_error": float(spec.bound.edge_error) if spec.facts.bounds else found["edge_error"],
     }
 
 
-def written(part: Any, spec: TachometerSpec) -> dict[str, str]:
+def written(part: Any, spec: Core) -> dict[str, str]:
     """Return what is asked for in the fields of a part of a core, or of the core itself, as texts by option names."""
     fitting = {about.field: about for about in reversed(options_of(type(part))) if about.fits_in(spec)}
     found = {}

@@ -1,7 +1,8 @@
 """The front end of a core: its lines and other inputs, and what the position is counted within and set by."""
 
-from tachometry.spec.core.follows import Follows, S
-from tachometry.spec.core.probe import edges_of
+from dataclasses import dataclass
+
+from tachometry.spec.core.asked import Asked
 from tachometry.spec.core.sensors import EDGE, USUAL_STATE, Levels
 from tachometry.spec.core.tooth_wheel import ToothWheel
 
@@ -9,35 +10,37 @@ from tachometry.spec.core.tooth_wheel import ToothWheel
 OF_CONTROLS = {"preset": "preset", "home": "index_once"}
 
 
-class FrontEnd(Follows[S]):
-    """Names the inputs of a core, and says where its index and its modulus are."""
+@dataclass(frozen=True)
+class FrontEnd:
+    """Inputs of a core; where its index and its modulus are."""
+
+    asked: Asked
+    longest: int  # clocks after which an update is forced
+    n_probes: int
+    complements: bool  # whether lines come with their complements
 
     @property
     def lines(self) -> tuple[str, ...]:
         """Lines of the sensor, the index and `controls` included."""
-        of_index = ("z",) if self.spec.index and not self.spec.encoder.missing else ()  # a gap needs none
-        return (*self.spec.encoder.kind.lines, *of_index, *self.controls)
+        of_index = ("z",) if self.asked.index and not self.asked.encoder.missing else ()  # a gap needs none
+        return (*self.asked.encoder.kind.lines, *of_index, *self.controls)
 
     @property
     def complemented(self) -> tuple[str, ...]:
         """Lines that come with their complements, which are inputs as well: `a_n` of `a`."""
-        spec = self.spec
-        if spec.health is None or spec.health.complements is None:
-            return ()
-        return (*spec.encoder.kind.lines, *("z",) * (spec.index is not None))
+        return (*self.asked.encoder.kind.lines, *("z",) * (self.asked.index is not None)) if self.complements else ()
 
     @property
     def wheel(self) -> ToothWheel | None:
         """The wheel, if teeth of it are missing; they are as far apart as an update may take."""
-        if not (missing := self.spec.encoder.missing):
+        if not (missing := self.asked.encoder.missing):
             return None
-        longest = self.spec.times.longest
-        return ToothWheel(self.spec.encoder.pulses_per_rev - missing, missing, (1 << longest.bit_length()) - 1)
+        return ToothWheel(self.asked.encoder.pulses_per_rev - missing, missing, (1 << self.longest.bit_length()) - 1)
 
     @property
     def controls(self) -> tuple[str, ...]:
         """Inputs whose rises a program or a switch makes."""
-        return ("preset",) * (self.spec.preset is not None) + ("home",) * self.index_once
+        return ("preset",) * (self.asked.preset is not None) + ("home",) * self.index_once
 
     @property
     def pulsed(self) -> tuple[str, ...]:
@@ -47,45 +50,45 @@ class FrontEnd(Follows[S]):
     @property
     def probes(self) -> tuple[str, ...]:
         """Names of the probe inputs, each a bit of `probe`."""
-        return tuple(f"probe_{number}" for number in range(len(edges_of(self.spec.probe))))
+        return tuple(f"probe_{number}" for number in range(self.n_probes))
 
     @property
     def moves_position(self) -> bool:
         """Whether something else than counts changes the position."""
-        return self.index_resets or self.spec.preset is not None
+        return self.index_resets or self.asked.preset is not None
 
     @property
     def index_resets(self) -> bool:
         """Whether the index sets the position to 0."""
-        return self.spec.index is not None and self.spec.index.reset
+        return self.asked.index is not None and self.asked.index.reset
 
     @property
     def index_once(self) -> bool:
         """Whether the index is taken once, after input `home` rises."""
-        return self.spec.index is not None and self.spec.index.once
+        return self.asked.index is not None and self.asked.index.once
 
     @property
     def index_watched(self) -> bool:
         """Whether a watch counts from index to index, each of which is taken."""
-        return self.spec.index is not None and not self.spec.index.once
+        return self.asked.index is not None and not self.asked.index.once
 
     @property
     def modulus(self) -> int | None:
         """Counts within which `position_modulo` is; None: there is none."""
-        if self.spec.position_modulo is None:
+        if self.asked.position_modulo is None:
             return None
-        of, _, parts = self.spec.position_modulo.partition("/")
-        return self.spec.encoder.counts_per_rev // int(parts or 1) if of == "rev" else int(of)
+        of, _, parts = self.asked.position_modulo.partition("/")
+        return self.asked.encoder.counts_per_rev // int(parts or 1) if of == "rev" else int(of)
 
     @property
     def index_state(self) -> Levels | None:
         """Levels of the lines in which the index is taken; None: it is where Z rises, or there is none."""
-        if self.spec.index is None:
+        if self.asked.index is None:
             return None
-        at = self.spec.index.at or (USUAL_STATE if self.spec.encoder.sensor == "quadrature" else EDGE)
+        at = self.asked.index.at or (USUAL_STATE if self.asked.encoder.sensor == "quadrature" else EDGE)
         return None if at == EDGE else tuple(int(word[-1]) for word in at.split(","))
 
     @property
     def index_place(self) -> int:
         """Place in the cycle of the lines where the index is expected; 0 if it is where Z rises."""
-        return 0 if self.index_state is None else self.spec.encoder.kind.cycle.index(self.index_state)
+        return 0 if self.index_state is None else self.asked.encoder.kind.cycle.index(self.index_state)

@@ -1,28 +1,23 @@
 """Ports of the exported core of one axis."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
 
 from tachometry.spec.core.compare import COUNT_WIDTH
+from tachometry.spec.core.core import Core
 from tachometry.spec.core.health import FAULT_TEXTS, FAULT_WIDTH, FAULTS_WIDTH, OPEN, Fault
 from tachometry.spec.core.stream import READY, stream_ports
 from tachometry.spec.language.port import COMPARE, FINE, INDEX, MISSED, TICK, UPDATE, WIDE, Port, held, pin, strobe
-
-if TYPE_CHECKING:
-    from tachometry.spec.core.tachometer import TachometerSpec
 
 # The ends of what encloses the true speed, and which way each is rounded: outward.
 BOUNDS = {"velocity_lower": -1, "velocity_upper": 1}
 
 
-def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> Iterator[Port]:
+def ports_of(spec: Core, own: Iterable[Port]) -> Iterator[Port]:
     """Yield all ports of a core, in the order of the exported module; those of options and methods come last."""
     yield from _inputs(spec)
-    unit = f"2^{-spec.widths.frac_bits} {spec.unit}"
+    unit = f"2^{-spec.velocity.frac_bits} {spec.unit}"
     text = "Measured velocity; multiplied by rad_per_s_per_lsb of the manifest it is in rad/s."
-    yield held(UPDATE, "velocity", spec.widths.velocity, signed=True, unit=unit, help=text)
+    yield held(UPDATE, "velocity", spec.velocity.width, signed=True, unit=unit, help=text)
     yield strobe(UPDATE, "One clock for every update of the velocity.")
     text = "Length of the measurement: m_s in ticks (s), the number of averaged ticks (m), timer periods (t, mt), "
     text += "Ndt1 in sampling periods dt (rairan), or ticks since the last one with counts (track)."
@@ -47,7 +42,7 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> Iterator[Port]:
         text += "time, that is for stalled_after_ticks of the manifest; the time before the first period is one of "
         text += "them. It falls with the next count."
     yield held(spec.facts.stalls_with, "stalled", help=text)
-    if spec.scale.output:
+    if spec.velocity.output:
         yield held(UPDATE, "velocity_overflow", help="This velocity was saturated to the width of the port.")
     if spec.age:
         text = "Ticks after the count or the tick that caused the update, the one of this clock included: 1 with the "
@@ -73,10 +68,11 @@ def ports_of(spec: TachometerSpec, own: Iterable[Port]) -> Iterator[Port]:
         text = "Edges that the glitch filter has kept out, two for each glitch; it stays at 65534. Between the ticks "
         text += "it counts on, and a capture takes what it is then."
         yield held(TICK, "swallowed_edges", 16, unit="edges", help=text)
-    yield from stream_ports(spec)
+    if spec.stream:
+        yield from stream_ports(spec)
 
 
-def _inputs(spec: TachometerSpec) -> Iterator[Port]:
+def _inputs(spec: Core) -> Iterator[Port]:
     front = spec.front_end
     yield pin("clk", "Clock; all outputs change at its rising edge.")
     yield pin("rst", "Synchronous reset, active high.")
@@ -102,7 +98,7 @@ def _inputs(spec: TachometerSpec) -> Iterator[Port]:
         yield pin(READY, "The record is taken in this clock; synchronous to clk.")
 
 
-def _index_ports(spec: TachometerSpec) -> Iterator[Port]:
+def _index_ports(spec: Core) -> Iterator[Port]:
     gap, place = bool(spec.encoder.missing), "the index"
     if gap:
         place = "the first tooth after a gap"
@@ -122,13 +118,13 @@ def _index_ports(spec: TachometerSpec) -> Iterator[Port]:
         yield held(TICK, "homed", help="The index was taken, since home rose. It does not wait for a tick.")
 
 
-def _wrong(spec: TachometerSpec) -> str:
+def _wrong(spec: Core) -> str:
     if spec.encoder.missing:
         return "the gap was not where it had to be, as of a tooth lost or extra; the next gap is taken."
     return spec.encoder.kind.wrong
 
 
-def _probe_ports(spec: TachometerSpec) -> Iterable[Port]:
+def _probe_ports(spec: Core) -> Iterable[Port]:
     probes = range(len(spec.front_end.probes))
     if probes:
         text = "Probes that have latched and are not armed again. It changes between the ticks as well."
@@ -147,7 +143,7 @@ def _probe_ports(spec: TachometerSpec) -> Iterable[Port]:
             yield held(valid, f"probe_age_{number}", spec.times.probe_age_width, unit="clocks", help=text)
 
 
-def _list_pins(spec: TachometerSpec) -> Iterable[Port]:
+def _list_pins(spec: Core) -> Iterable[Port]:
     if spec.compare is None or not spec.compare.depth:
         return
     texts = {
@@ -160,7 +156,7 @@ def _list_pins(spec: TachometerSpec) -> Iterable[Port]:
         yield Port(f"compare_{name}", "input", width, signed=width > 1, help=f"{text} Synchronous to clk.")
 
 
-def _compare_ports(spec: TachometerSpec) -> Iterable[Port]:
+def _compare_ports(spec: Core) -> Iterable[Port]:
     if spec.compare is None:
         return
     yield held(TICK, "compare", help=f"Pulse at a position, of {spec.compare.width}. It does not wait for a tick.")
@@ -175,7 +171,7 @@ def _compare_ports(spec: TachometerSpec) -> Iterable[Port]:
     yield held(COMPARE, "compare_position", spec.position_width + fine, signed=True, unit=unit, help=text)
 
 
-def _health_ports(spec: TachometerSpec) -> Iterable[Port]:
+def _health_ports(spec: Core) -> Iterable[Port]:
     if not spec.health:
         return
     absent = {fault for line, fault in OPEN.items() if line not in spec.front_end.complemented}
@@ -190,15 +186,15 @@ def _health_ports(spec: TachometerSpec) -> Iterable[Port]:
         yield held(TICK, "index_error", spec.position_width, signed=True, unit="counts", help=text)
 
 
-def bound_ports(spec: TachometerSpec) -> Iterator[Port]:
+def bound_ports(spec: Core) -> Iterator[Port]:
     """Yield ports that enclose the true speed."""
     if not spec.bounds:
         return
-    width = spec.bound.width if spec.scale.output is None else spec.widths.velocity
+    width = spec.velocity.bound_width if spec.velocity.output is None else spec.velocity.width
     for name, side, sign in zip(BOUNDS, ("Lower", "Upper"), ("minus", "plus"), strict=True):
         text = f"{side} end of what the true mean speed over the measured window was, for edges within --edge-error "
         text += f"(0: an ideal disc and ideal lines) while no count is lost or added; {sign} bounds.none of the "
         text += "manifest means that there is none."
-        unit = f"2^{-spec.widths.frac_bits} {spec.unit}"
+        unit = f"2^{-spec.velocity.frac_bits} {spec.unit}"
         yield held(UPDATE, name, width, signed=True, unit=unit, help=text)
     yield held(UPDATE, "bounds_valid", help="There are bounds; not yet for the first measurement.")

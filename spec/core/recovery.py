@@ -1,40 +1,44 @@
 """Recovery of a core from an upset: after how many clocks its outputs are right again."""
 
-from tachometry.spec.core.follows import Follows, S
+from dataclasses import dataclass
+
+from tachometry.spec.core.asked import Asked
+from tachometry.spec.core.latency import Latency
+from tachometry.spec.core.tick import Tick
 
 
-class Recovery(Follows[S]):
-    """Says how long it takes, from any state of the flip-flops, until all outputs are right again; position aside.
+@dataclass(frozen=True)
+class Recovery:
+    """How long it takes, from any state of the flip-flops, until all outputs are right again; position aside.
 
     docs/concepts/verification.md defines when outputs are right. Counters that an upset has set beyond their ends
     continue until they wrap.
     """
 
+    asked: Asked
+    tick: Tick
+    latency: Latency
+    remembered: int | None  # clocks of right counts after which the method remembers nothing from before; None: never
+
     @property
     def clocks(self) -> int | None:
-        """Clocks after which all is right; None: the core has a low-pass filter, which forgets only gradually, or a
+        """Clocks after which all is right; None: the core forgets only gradually, as a low-pass filter does, or has a
         wheel with a gap, which must come.
         """
-        spec = self.spec
-        if spec.lowpass is not None or spec.front_end.wheel is not None:
+        asked = self.asked
+        if self.remembered is None or asked.lowpass is not None or asked.encoder.missing:
             return None
         # What counts the ticks of a silence may have to begin anew.
-        silence = ((1 << spec.timing.max_ticks.bit_length()) + 1) * spec.times.longest_tick
-        method = self.remembered + spec.latency.tick_to_velocity
-        return self.front + max(method, silence) + spec.latency.tick
+        silence = ((1 << asked.timing.max_ticks.bit_length()) + 1) * self.tick.longest
+        return self.front + max(self.remembered + self.latency.tick_to_velocity, silence) + self.latency.tick
 
     @property
     def front(self) -> int:
         """Clocks after which, from any state, a window begins all counts of which are right."""
-        clocks, longest = self.spec.filter_clocks, self.spec.times.longest_tick
+        clocks, longest = self.asked.filter_clocks, self.tick.longest
         # A line that must be known anew has to hold still once more.
         held = 1 << max(clocks - 1, 1).bit_length()
         conditioned = 2 + (held + clocks if clocks else 0)
         # One clock to decode. The first complete window then begins with the end of another.
         window = 1 + (1 << (longest if longest >= 16 else max(longest - 2, 0)).bit_length())
         return conditioned + 1 + window
-
-    @property
-    def remembered(self) -> int:
-        """Clocks of right counts after which the method remembers nothing from before."""
-        raise NotImplementedError

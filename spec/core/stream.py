@@ -1,16 +1,12 @@
 """A stream sends records of what the ports show, as AXI4-Stream."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
+from tachometry.spec.core.numbers import Numbers
 from tachometry.spec.language.option import ParameterError
-from tachometry.spec.language.port import STREAM, TICK, UPDATE, Port
-
-if TYPE_CHECKING:
-    from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.language.port import STREAM, TICK, UPDATE, Port, Ports
 
 STREAM_HELP = (
     "AXI4-Stream m_axis for a DMA: a record of time, flags, position and velocity, and of what else track has, with "
@@ -59,32 +55,30 @@ class Part:
         return _WORD if self.width <= 8 * _WORD else 2 * _WORD
 
 
-def parts_of(spec: TachometerSpec) -> tuple[Part, ...]:
+def parts_of(spec: Numbers) -> tuple[Part, ...]:
     """Return what is in a record, without gaps: behind time and flags the numbers of two words come first."""
     found = [Part("time", 32, 0, signed=False), Part("flags", 32, _WORD, signed=False)]
     more = [(port.name, port.width) for port in spec.method_ports if port.name in _FINE]
-    more = [("position", spec.position_width), ("velocity", spec.widths.velocity), *more]
+    more = [("position", spec.position_width), ("velocity", spec.velocity.width), *more]
     for name, width in sorted(more, key=lambda number: number[1] <= 8 * _WORD):
         found.append(Part(name, width, found[-1].offset + found[-1].size))
     return tuple(found)
 
 
-def size_of(spec: TachometerSpec) -> int:
+def size_of(spec: Numbers) -> int:
     """Return the bytes of a record, a power of two."""
     last = parts_of(spec)[-1]
     return 1 << (last.offset + last.size - 1).bit_length()
 
 
-def flags_of(spec: TachometerSpec) -> tuple[str, ...]:
+def flags_of(ports: Ports) -> tuple[str, ...]:
     """Return the bits of `flags`, the lowest first: `LOST`, and ports."""
-    held = (port for port in spec.ports.outputs if port.held_by in (TICK, UPDATE) and not port.is_strobe)
+    held = (port for port in ports.outputs if port.held_by in (TICK, UPDATE) and not port.is_strobe)
     return (LOST, *(port.name for port in held if port.width == 1))
 
 
-def stream_entry(spec: TachometerSpec) -> dict[str, Any] | None:
+def stream_entry(stream: Stream, spec: Numbers, ports: Ports) -> dict[str, Any]:
     """Return what the manifest says of a stream; `dtype` is that of NumPy."""
-    if spec.stream is None:
-        return None
     parts = parts_of(spec)
     dtype = {
         "names": [part.name for part in parts],
@@ -92,13 +86,11 @@ def stream_entry(spec: TachometerSpec) -> dict[str, Any] | None:
         "offsets": [part.offset for part in parts],
         "itemsize": size_of(spec),
     }
-    return {"when": spec.stream.when, "packet": spec.stream.packet, "flags": [*flags_of(spec)], "dtype": dtype}
+    return {"when": stream.when, "packet": stream.packet, "flags": [*flags_of(ports)], "dtype": dtype}
 
 
-def stream_ports(spec: TachometerSpec) -> tuple[Port, ...]:
-    """Return the ports of a stream, if there is one."""
-    if spec.stream is None:
-        return ()
+def stream_ports(spec: Numbers) -> tuple[Port, ...]:
+    """Return the ports of a stream."""
     size = size_of(spec)
     return (
         Port(

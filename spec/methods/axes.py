@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from tachometry.spec.core.follows import Follows
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
-from tachometry.spec.core.scale import Scale
 from tachometry.spec.core.tachometer import TachometerSpec
-from tachometry.spec.core.times import Times
+from tachometry.spec.core.tick import Scale, Tick
 from tachometry.spec.core.timing import Timing
+from tachometry.spec.core.velocity import Velocity
+from tachometry.spec.core.words import Words
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import INDEX, TICK, UPDATE, Port, Ports, held, pin, strobe
 from tachometry.spec.language.units import next_written_time, written_time
@@ -81,102 +81,25 @@ def nearest_ticks(spec: STachometer | TrackTachometer, axes: int) -> list[int]:
     return [one for one in found if one is not None]
 
 
-class AxesLatency(Follows["AxesSpec"]):
-    """Counts the clocks from a pin of an axis to what is shown of it."""
+@dataclass(frozen=True)
+class AxesLatency:
+    """Clocks from a pin of an axis to what is shown of it."""
 
-    @property
-    def pin_to_count(self) -> int:
-        """Most clocks from the sampling of a level to its look: the synchroniser, a round, and more for the filter."""
-        return WARM_UP - 1 + self.spec.slots - 1 + self.spec.axis.filter_clocks * self.spec.slots
-
-    @property
-    def tick(self) -> int:
-        """Clocks from the last one of a tick to the one in which it is shown of the last axis."""
-        return int(self.spec.tick_clock(self.spec.axes - 1, 0)) - (self.spec.timing.tick_cycles - 1)
-
-    @property
-    def tick_to_velocity(self) -> int:
-        """Clocks from `tick` to `velocity_valid`: they come together."""
-        return 0
-
-    @property
-    def tick_to_result(self) -> int:
-        """Clocks from `tick` to what the core is for: to the velocity."""
-        return self.tick_to_velocity
-
-    @property
-    def entries(self) -> dict[str, int]:
-        """Entries of the manifest."""
-        return {
-            "pin_to_count": self.pin_to_count,
-            "tick_latency": self.tick,
-            "tick_to_velocity": self.tick_to_velocity,
-            **({"tick_in_to_window_end": self.tick_in_to_window_end} if self.spec.tachometer.external_tick else {}),
-        }
-
-    @property
-    def tick_in_to_window_end(self) -> int:
-        """Most clocks from the rise of an external tick to the end of its window: the next round is the last."""
-        return TICK_IN_TO_WINDOW_END + 2 * self.spec.slots - 1
-
-    @property
-    def count(self) -> int:
-        """Clocks from the look at an axis to its count."""
-        return COUNT_LATENCY + FILTER_LATENCY * (self.spec.axis.filter_clocks > 0)
-
-    @property
-    def index(self) -> int:
-        """Clocks from the look that sees an index to `index_valid`."""
-        return self.count + 1 + self.spec.parallel
+    # Most clocks from the sampling of a level to its look: the synchroniser, a round, and more for the filter.
+    pin_to_count: int
+    tick: int  # clocks from the last one of a tick to the one in which it is shown of the last axis
+    # Most clocks from the rise of an external tick to the end of its window: the next round is the last.
+    tick_in_to_window_end: int
+    index: int  # clocks from the look that sees an index to `index_valid`
+    tick_to_velocity: int = 0  # clocks from `tick` to `velocity_valid`: they come together
+    tick_to_result: int = 0  # clocks from `tick` to what the core is for: to the velocity
 
 
-class AxesRecovery(Follows["AxesSpec"]):
-    """Says how long a core of many axes takes until all is right again after an upset; see `Recovery`."""
+@dataclass(frozen=True)
+class AxesRecovery:
+    """Recovery of a core of many axes from an upset, see `Recovery`."""
 
-    @property
-    def clocks(self) -> int | None:
-        """Clocks after which all is right; None: the method forgets only gradually.
-
-        Each axis is a core of its own whose clock is a round. Before that the slots go on to the end of their register,
-        and turns that have begun end; after it each axis has its turn.
-        """
-        own = self.spec.axis.recovery.clocks
-        if own is None:
-            return None
-        slots = self.spec.slots
-        return own * slots + (1 << (slots - 1).bit_length()) + 2 * self.spec.axis.times.longest_tick * slots
-
-
-class AxesWords(Follows["AxesSpec"]):
-    """Says of a core of many axes what commands show."""
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Sentences on what is other than might be expected."""
-        spec = self.spec
-        if spec.tachometer.max_speed is None or spec.axis.widths.max_count == spec.tachometer.widths.max_count:
-            return ()
-        return (
-            f"greatest speed: an axis is looked at {spec.rounds} times in a tick, so it has at most as many counts",
-        )
-
-    def tick_of(self, machines: int) -> str:
-        """Return the shortest tick from that of the core on in which so many datapaths end the turns of all axes."""
-        spec, slots, timing = self.spec.tachometer, self.spec.slots, self.spec.timing
-
-        def enough(cycles: int) -> bool:
-            axis = _possible(spec, self.spec.axes, cycles)
-            return axis is not None and axis.plan.machines <= machines
-
-        turns = (1 + spec.external_tick) * (-(-self.spec.axes // machines) * self.spec.turn_cycles + slots)
-        return next_written_time(max(turns, timing.tick_cycles), timing.clock_hz, enough)
-
-    @property
-    def memory(self) -> tuple[str, int, int] | None:
-        """The memory of the reciprocal: its kind, entries, bits of an entry. None: there is no such memory."""
-        axis = self.spec.axis
-        # It is always looked up: there is no time between two axes to divide.
-        return ("table", axis.form.looked_up.depth, axis.form.looked_up.width) if isinstance(axis, SAxis) else None
+    clocks: int | None  # after which all is right; None: the method forgets only gradually
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -204,10 +127,6 @@ class AxesSpec:
     tachometer: STachometer | TrackTachometer
     axes: int
     parallel: bool = False
-
-    latency = cached_property(AxesLatency)
-    recovery = cached_property(AxesRecovery)
-    words = cached_property(AxesWords)
 
     def __post_init__(self) -> None:
         if not 1 <= self.axes <= MAX_AXES:
@@ -250,9 +169,9 @@ class AxesSpec:
         return self.tachometer.method
 
     @property
-    def times(self) -> Times[TachometerSpec]:
-        """How far ticks are apart: as those of the core that each axis would be."""
-        return self.tachometer.times
+    def tick(self) -> Tick:
+        """The sampling period, as that of the core that each axis would be."""
+        return self.tachometer.tick
 
     @property
     def timing(self) -> Timing:
@@ -260,9 +179,14 @@ class AxesSpec:
         return self.tachometer.timing
 
     @property
-    def scale(self) -> Scale[TachometerSpec]:
-        """Unit and LSB of the velocity of every axis."""
+    def scale(self) -> Scale:
+        """One count per tick of every axis, in other units."""
         return self.tachometer.scale
+
+    @property
+    def velocity(self) -> Velocity:
+        """Unit and LSB of the velocity of every axis."""
+        return self.tachometer.velocity
 
     @cached_property
     def slots(self) -> int:
@@ -285,6 +209,68 @@ class AxesSpec:
     def plan(self) -> Plan:
         """When each axis has its turn."""
         return self.axis.plan
+
+    @property
+    def count_latency(self) -> int:
+        """Clocks from the look at an axis to its count."""
+        return COUNT_LATENCY + FILTER_LATENCY * (self.axis.filter_clocks > 0)
+
+    @cached_property
+    def latency(self) -> AxesLatency:
+        """Clocks from a pin of an axis to what is shown of it."""
+        return AxesLatency(
+            pin_to_count=WARM_UP - 1 + self.slots - 1 + self.axis.filter_clocks * self.slots,
+            tick=int(self.tick_clock(self.axes - 1, 0)) - (self.timing.tick_cycles - 1),
+            tick_in_to_window_end=TICK_IN_TO_WINDOW_END + 2 * self.slots - 1,
+            index=self.count_latency + 1 + self.parallel,
+        )
+
+    @property
+    def latency_entries(self) -> dict[str, int]:
+        """Latencies in the manifest, in clocks."""
+        latency = self.latency
+        found = {
+            "pin_to_count": latency.pin_to_count,
+            "tick_latency": latency.tick,
+            "tick_to_velocity": latency.tick_to_velocity,
+        }
+        external = {"tick_in_to_window_end": latency.tick_in_to_window_end}
+        return found | (external if self.tachometer.external_tick else {})
+
+    @cached_property
+    def recovery(self) -> AxesRecovery:
+        """Clocks after which all is right again after an upset.
+
+        Each axis is a core of its own whose clock is a round. Before that the slots go on to the end of their register,
+        and turns that have begun end; after it each axis has its turn.
+        """
+        own, slots = self.axis.recovery.clocks, self.slots
+        if own is None:
+            return AxesRecovery(None)
+        return AxesRecovery(own * slots + (1 << (slots - 1).bit_length()) + 2 * self.axis.tick.longest * slots)
+
+    @cached_property
+    def words(self) -> Words:
+        """Texts about the core."""
+        alone, axis, notes = self.tachometer, self.axis, tuple[str, ...]()
+        if alone.max_speed is not None and axis.tick.max_count != alone.tick.max_count:
+            looked = f"an axis is looked at {self.rounds} times in a tick, so it has at most as many counts"
+            notes = (f"greatest speed: {looked}",)
+        # A reciprocal is always looked up: there is no time between two axes to divide.
+        table = axis.form.looked_up if isinstance(axis, SAxis) else None
+        memory = None if table is None else ("table", table.depth, table.width)
+        return replace(alone.words, notes=notes, memory=memory, division="")
+
+    def tick_of(self, machines: int) -> str:
+        """Return the shortest tick, from that of the core on, in which these datapaths end the turns of all axes."""
+        spec, slots, timing = self.tachometer, self.slots, self.timing
+
+        def enough(cycles: int) -> bool:
+            axis = _possible(spec, self.axes, cycles)
+            return axis is not None and axis.plan.machines <= machines
+
+        turns = (1 + spec.external_tick) * (-(-self.axes // machines) * self.turn_cycles + slots)
+        return next_written_time(max(turns, timing.tick_cycles), timing.clock_hz, enough)
 
     @property
     def turn_cycles(self) -> int:
@@ -312,7 +298,7 @@ class AxesSpec:
 
     def shown(self, axis: int, last: Any) -> Any:
         """Return the clock in which `tick` is high for a tick of an axis that ends with the round `last`."""
-        begun = self.look(0, last) + self.latency.count + 1 + self.tachometer.front_end.index_resets
+        begun = self.look(0, last) + self.count_latency + 1 + self.tachometer.front_end.index_resets
         return begun + self.plan.start(axis) + self.plan.latency + self.parallel
 
     @cached_property

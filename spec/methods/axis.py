@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, cast
@@ -38,16 +38,16 @@ def own_options(spec: TachometerSpec, slots: int) -> dict[str, Any]:
     looks = -(-(spec.filter_clocks - 1) // slots) + 1 if spec.filter_clocks else 0
     own = {
         "timing": Timing(clock_hz, timing.tick_cycles // slots, timing.max_ticks),
-        "frac_bits": spec.widths.frac_bits,
+        "frac_bits": spec.velocity.frac_bits,
         "filter_clocks": looks,
-        "max_tick_cycles": spec.times.longest_tick // slots if spec.external_tick else None,
+        "max_tick_cycles": spec.tick.longest // slots if spec.external_tick else None,
     }
     return {**asked, **own}
 
 
 def output_cycles(axis: TachometerSpec) -> int:
     """Return clocks of the conversion of a velocity, which takes one in every clock."""
-    output = axis.scale.output
+    output = axis.velocity.output
     return 0 if output is None else output.pipelined_latency
 
 
@@ -75,21 +75,17 @@ class Plan:
         return -(-self.axes // self.machines) * self.cycles + (self.machines - 1) * self.apart
 
 
-class AxisTimes(Times["OneAxis"]):
-    """Says how far ticks of an axis are apart, in rounds."""
-
-    @property
-    def min_tick_cycles(self) -> int:
-        # Each axis has its turn, and a round to hand its counts over.
-        return max(2, -(-self.spec.plan.end // self.spec.slots) + 1)
-
-
 @dataclass(frozen=True, kw_only=True)
 class OneAxis(TachometerSpec):
     """Core of one axis that an axis of many is, to the bit; its clock is a round."""
 
     axes_of_tick: int  # how many have their turn in a tick
     slots: int  # clocks of a round
+
+    @cached_property
+    def times(self) -> Times:
+        # Each axis has its turn, and a round to hand its counts over.
+        return replace(super().times, min_tick_cycles=max(2, -(-self.plan.end // self.slots) + 1))
 
     @cached_property
     def ports(self) -> Ports:

@@ -1,44 +1,34 @@
 """The M method: pulses per sampling period (Tsuji 2009, Sec. IV-A)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
+from tachometry.spec.core.asked import Asked
 from tachometry.spec.core.facts import Facts
-from tachometry.spec.core.follows import Follows
 from tachometry.spec.core.latency import Latency
-from tachometry.spec.core.recovery import Recovery
 from tachometry.spec.core.tachometer import TachometerSpec
-from tachometry.spec.core.times import Times
-from tachometry.spec.core.widths import Widths
+from tachometry.spec.core.tick import Tick
+from tachometry.spec.core.times import Times, Widths
+from tachometry.spec.core.velocity import Velocity
 from tachometry.spec.core.words import Words
 from tachometry.spec.formats.reciprocal import Reciprocal
 from tachometry.spec.language.option import option
 from tachometry.spec.language.units import plural, signed_width
 
 
-class MTimes(Times["MTachometer"]):
-    """Says how far ticks and updates of an M-method core are apart."""
+@dataclass(frozen=True)
+class MForm:
+    """Numbers of the datapath of the M method."""
 
-    @property
-    def standstill_ticks(self) -> int:
-        return self.spec.average
-
-
-class MWidths(Widths["MTachometer"]):
-    """Counts the bits of the numbers of an M-method core."""
-
-    @property
-    def interval(self) -> int:
-        return self.spec.average.bit_length()
-
-
-class MForm(Follows["MTachometer"]):
-    """Finds the numbers of the datapath of the M method."""
+    asked: Asked
+    tick: Tick
+    velocity: Velocity
+    average: int  # n, ticks that are averaged
 
     @property
     def max_sum(self) -> int:
         """Largest |Σ m_e| of n ticks."""
-        return self.spec.average * self.spec.widths.max_count
+        return self.average * self.tick.max_count
 
     @property
     def sum_width(self) -> int:
@@ -48,66 +38,44 @@ class MForm(Follows["MTachometer"]):
     @property
     def shift(self) -> int | None:
         """The left shift of the sum, where n is a power of two of at most 2^frac_bits; else None."""
-        average, frac_bits = self.spec.average, self.spec.widths.native_frac_bits
+        average, frac_bits = self.average, self.velocity.native_frac_bits
         halvings = average.bit_length() - 1
-        exact = average == 1 << halvings and halvings + self.spec.bound.error_bits <= frac_bits
+        exact = average == 1 << halvings and halvings + self.velocity.bound.error_bits <= frac_bits
         return frac_bits - halvings if exact else None
 
     @property
     def reciprocal(self) -> Reciprocal:
         """The reciprocal 1/n, where a shift is not enough."""
-        spec = self.spec
-        frac_bits, error_bits = spec.widths.native_frac_bits, spec.bound.error_bits
-        return Reciprocal(spec.average, self.max_numerator, frac_bits, error_bits, spec.bounds)
+        frac_bits, error_bits = self.velocity.native_frac_bits, self.velocity.bound.error_bits
+        return Reciprocal(self.average, self.max_numerator, frac_bits, error_bits, self.asked.bounds)
 
     @property
     def margin(self) -> int:
         """How far the sum is off for the bounds, in 2^−error_bits counts."""
-        return int(self.spec.bound.uncertainty * (1 << self.spec.bound.error_bits))
+        return int(self.velocity.bound.uncertainty * (1 << self.velocity.bound.error_bits))
 
     @property
     def max_numerator(self) -> int:
         """Largest |N| that is multiplied by the reciprocal, in 2^−error_bits counts."""
-        return (self.max_sum << self.spec.bound.error_bits) + self.spec.bounds * self.margin
+        return (self.max_sum << self.velocity.bound.error_bits) + self.asked.bounds * self.margin
 
     @property
     def numerator_width(self) -> int:
         """Bits of the number that is multiplied by the reciprocal, signed."""
         return signed_width(self.max_numerator)
 
-
-class MLatency(Latency["MTachometer"]):
-    """Counts the clocks from a pin to the velocity of an M-method core."""
-
     @property
     def serial(self) -> bool:
-        form = self.spec.form
-        return form.shift is None and self.spec.times.has_room(form.reciprocal.digits + 1)
+        """Whether the sum is multiplied by the reciprocal step by step, between two ticks."""
+        return self.shift is None and self.reciprocal.digits + 1 <= self.tick.room
 
     @property
-    def datapath(self) -> int:
-        form = self.spec.form
-        if form.shift is not None:
+    def clocks(self) -> int:
+        """Clocks from `tick` to the native velocity."""
+        if self.shift is not None:
             return 1
         # One clock for the sum, one to load it, one for each addition, one for the result.
-        return 3 + (form.reciprocal.digits if self.serial else form.numerator_width)
-
-
-class MRecovery(Recovery["MTachometer"]):
-    """Says how long an M-method core takes until all is right again after an upset."""
-
-    @property
-    def remembered(self) -> int:
-        # After an upset the place in the memory may have to begin anew.
-        return (self.spec.average + 1) * self.spec.times.longest_tick
-
-
-class MWords(Words["MTachometer"]):
-    """Says of an M-method core what commands show."""
-
-    @property
-    def description(self) -> str:
-        return f"eq. (6), mean of {plural(self.spec.average, 'tick')}"
+        return 3 + (self.reciprocal.digits if self.serial else self.numerator_width)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,9 +92,30 @@ class MTachometer(TachometerSpec):
 
     method = "m"
     facts = Facts(title="M", summary="counts the pulses of one tick, or of several", update_by="tick")
-    form = cached_property(MForm)
-    times = cached_property(MTimes)
-    widths = cached_property(MWidths)
-    latency = cached_property(MLatency)
-    recovery = cached_property(MRecovery)
-    words = cached_property(MWords)
+
+    @cached_property
+    def form(self) -> MForm:
+        """Numbers of the datapath."""
+        return MForm(self, self.tick, self.velocity, self.average)
+
+    @cached_property
+    def latency(self) -> Latency:
+        clocks = self.form.clocks
+        return Latency(self, self.velocity, self.tick.room, datapath=clocks, busy=clocks if self.form.serial else 0)
+
+    @cached_property
+    def times(self) -> Times:
+        return replace(super().times, standstill_ticks=self.average)
+
+    @cached_property
+    def widths(self) -> Widths:
+        return replace(super().widths, interval=self.average.bit_length())
+
+    @property
+    def remembered(self) -> int:
+        # After an upset the place in the memory may have to begin anew.
+        return (self.average + 1) * self.tick.longest
+
+    @cached_property
+    def words(self) -> Words:
+        return replace(super().words, description=f"eq. (6), mean of {plural(self.average, 'tick')}")

@@ -1,34 +1,28 @@
 """The M/T method: counts over the time that they take, which is longer than a given one (Tsuji 2009, Sec. IV-C)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 from tachometry.spec.core.facts import Facts
+from tachometry.spec.core.times import Times
 from tachometry.spec.core.timing import parse_clocks
+from tachometry.spec.core.words import Words
 from tachometry.spec.language.option import ParameterError, option
-from tachometry.spec.methods.timed import TimedForm, TimedTachometer, TimedTimes, TimedWords
+from tachometry.spec.methods.timed import TimedForm, TimedTachometer
 
 
-class MTForm(TimedForm["MTTachometer"]):
-    """Finds the numbers of timer and divider of the M/T method."""
+@dataclass(frozen=True)
+class MTForm(TimedForm):
+    """Numbers of timer and divider of the M/T method."""
 
-    equation = 13
-
-    @property
-    def min_clocks(self) -> int:
-        """T_c in clocks, as it is asked for; else a tick."""
-        return self.spec.timing.tick_cycles if self.spec.min_time is None else self.spec.min_time
+    min_clocks: int  # T_c in clocks, as it is asked for; else a tick
+    cycle_counts: int  # counts of which a window that has travelled as many holds a multiple; 1: any number
 
     @property
     def min_periods(self) -> int:
         """Timer periods that a measurement has to exceed: T_c, or one less than a division if that is longer."""
         return max(self.min_clocks // self.timer_cycles, self.division_periods - 1)
-
-    @property
-    def cycle_counts(self) -> int:
-        """Counts of which a window that has travelled as many holds a multiple; 1: any number."""
-        return self.spec.encoder.decoding if self.spec.whole_cycles else 1
 
     @property
     def patient_periods(self) -> int:
@@ -37,8 +31,8 @@ class MTForm(TimedForm["MTTachometer"]):
 
     @property
     def max_interval(self) -> int:
-        # A window stays open while the one before is divided.
-        late = -(-self.division_clocks // self.spec.times.min_tick_cycles) if self.may_be_late else 0
+        # A window stays open while the one before is divided, for ticks of two clocks at least.
+        late = -(-self.division_clocks // 2) if self.may_be_late else 0
         return max(self.patient_periods, late) + self.max_periods
 
     @property
@@ -48,29 +42,13 @@ class MTForm(TimedForm["MTTachometer"]):
         Counts come only until one closes the window, which one does that is later than its least length: in each timer
         period up to that, and in the one in which it ends.
         """
-        per_period = self.spec.widths.max_count if self.on_lattice else self.timer_periods
+        per_period = self.tick.max_count if self.on_lattice else self.timer_periods
         return (self.max_interval - self.max_periods + 1) * per_period
 
     @property
     def remembered_periods(self) -> int:
         # The open window, whose length may wrap, ends with a count; then comes the next window.
-        return (1 << self.spec.widths.interval) + self.max_periods + self.max_interval + 2
-
-
-class MTTimes(TimedTimes["MTTachometer"]):
-    """Says how far ticks and updates of an M/T-method core are apart."""
-
-    @property
-    def shortest(self) -> int:
-        return self.spec.form.min_periods * self.spec.form.timer_cycles
-
-
-class MTWords(TimedWords["MTTachometer"]):
-    """Says of an M/T-method core what commands show."""
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        return (*self._raised("minimum time", self.spec.form.min_clocks, self.spec.times.shortest), *super().notes)
+        return (1 << self.max_interval.bit_length()) + self.max_periods + self.max_interval + 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,9 +76,25 @@ class MTTachometer(TimedTachometer):
 
     method = "mt"
     facts = Facts(title="M/T", summary="takes the time of many counts", update_by="count", rest_tenths=22)
-    form = cached_property(MTForm)
-    times = cached_property(MTTimes)
-    words = cached_property(MTWords)
+    equation = 13
+    one_count = False
+
+    @cached_property
+    def form(self) -> MTForm:
+        """Numbers of timer and divider."""
+        min_clocks = self.timing.tick_cycles if self.min_time is None else self.min_time
+        counts = self.encoder.decoding if self.whole_cycles else 1
+        return MTForm(**vars(super().form), min_clocks=min_clocks, cycle_counts=counts)
+
+    @cached_property
+    def times(self) -> Times:
+        return replace(super().times, shortest=self.form.min_periods * self.form.timer_cycles)
+
+    @cached_property
+    def words(self) -> Words:
+        words, shortest = super().words, self.form.min_periods * self.form.timer_cycles
+        notes = self._raised("minimum time", self.form.min_clocks, shortest)
+        return replace(words, notes=(*notes, *words.notes))
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -2,17 +2,17 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 
+from tachometry.spec.core.asked import Asked
 from tachometry.spec.core.facts import Facts
-from tachometry.spec.core.follows import Follows
 from tachometry.spec.core.latency import Latency
-from tachometry.spec.core.recovery import Recovery
 from tachometry.spec.core.tachometer import TachometerSpec
-from tachometry.spec.core.times import Times
-from tachometry.spec.core.widths import Widths
+from tachometry.spec.core.tick import Tick
+from tachometry.spec.core.times import Times, Widths
+from tachometry.spec.core.velocity import Velocity
 from tachometry.spec.core.words import Words
 from tachometry.spec.language.option import ParameterError, option
 from tachometry.spec.language.port import UPDATE, Port, held
@@ -24,59 +24,47 @@ MAX_TABLE = 2048
 ESTIMATES = ("n1", "n2", "n3")
 
 
-class RairanTimes(Times["RairanTachometer"]):
-    """Says how far ticks and updates of Rairán's core are apart."""
+@dataclass(frozen=True)
+class RairanForm:
+    """Tables of Rairán's estimates and of their bounds."""
+
+    asked: Asked
+    tick: Tick
+    velocity: Velocity
+    estimate: str
+    adaptive: Fraction | None
 
     @property
     def max_tick_shift(self) -> int:
         """K: the greatest k for which a tick, of two dt at most, ends within the maximum time and fits the tables."""
-        if self.spec.adaptive is None:
+        if self.adaptive is None:
             return 0
-        longest = (self.spec.timing.max_ticks // 2).bit_length() - 1
-        if self.spec.estimate == "n3" or self.spec.bounds:
-            longest = min(longest, (MAX_TABLE // self.spec.widths.max_count).bit_length() - 1)
+        longest = (self.asked.timing.max_ticks // 2).bit_length() - 1
+        if self.estimate == "n3" or self.asked.bounds:
+            longest = min(longest, (MAX_TABLE // self.tick.max_count).bit_length() - 1)
         # Nep1 or Nep1 − 1 of 2^k dt is not rounded.
-        return longest if self.spec.estimate == "n3" else min(longest, self.spec.widths.native_frac_bits)
-
-    @property
-    def update_spacing(self) -> int:
-        # A count may come at any time.
-        return 1
-
-    def has_room(self, clocks: int) -> bool:
-        return clocks <= self.update_spacing
-
-
-class RairanWidths(Widths["RairanTachometer"]):
-    """Counts the bits of the numbers of Rairán's core."""
+        return longest if self.estimate == "n3" else min(longest, self.velocity.native_frac_bits)
 
     @property
     def max_pulse_count(self) -> int:
-        return self.max_count << self.spec.times.max_tick_shift
-
-
-class RairanForm(Follows["RairanTachometer"]):
-    """Finds the tables of Rairán's estimates and of their bounds."""
+        """Largest |m_e| of the longest tick, less the time that it may wait for a count."""
+        return self.tick.max_count << self.max_tick_shift
 
     @property
     def adaptive_dt(self) -> AdaptiveDt:
         """The rule of dt, for a core that has an adaptive dt."""
-        assert self.spec.adaptive is not None
-        return AdaptiveDt(self.spec.adaptive, self.spec.times.max_tick_shift)
+        assert self.adaptive is not None
+        return AdaptiveDt(self.adaptive, self.max_tick_shift)
 
     def max_dt(self, shift: int) -> int:
         """Return greatest Ndt1 for dt·2^shift: how many of these the maximum time has."""
-        return self.spec.timing.max_ticks >> shift
+        return self.asked.timing.max_ticks >> shift
 
     @property
     def depth(self) -> int:
         """Entries of the table, a power of two: by Ndt1 and, for n3, by Nep1 − 1."""
-        return (
-            1
-            << max(
-                self.spec.timing.max_ticks, self.spec.widths.max_pulse_count - 1 if self.spec.estimate == "n3" else 0
-            ).bit_length()
-        )
+        counts = self.max_pulse_count - 1 if self.estimate == "n3" else 0
+        return 1 << max(self.asked.timing.max_ticks, counts).bit_length()
 
     @property
     def table(self) -> tuple[int, ...]:
@@ -86,11 +74,11 @@ class RairanForm(Follows["RairanTachometer"]):
         among what is rounded, and with h the entry ⌊2^f·2/q + ½⌋ is ⌊(h + 1)/2⌋ (low) and ⌊2^f/(2q) + ½⌋ is
         ⌊(h + 4)/8⌋ (high). If dt is adaptive, n1 and n2 have one more bit, ⌊2^(f+1)/d⌋, as they are rounded later.
         """
-        f = self.spec.widths.native_frac_bits
-        if self.spec.estimate == "n3":
+        f = self.velocity.native_frac_bits
+        if self.estimate == "n3":
             return (0, *((1 << (f + 2)) // (2 * i + 1) for i in range(1, self.depth)))
-        more = self.spec.estimate == "n2"
-        if self.spec.adaptive is not None:
+        more = self.estimate == "n2"
+        if self.adaptive is not None:
             return (0, *((1 << (f + 1)) // (i + more) for i in range(1, self.depth)))
         return (0, *(((1 << (f + 1)) // (i + more) + 1) // 2 for i in range(1, self.depth)))
 
@@ -101,11 +89,11 @@ class RairanForm(Follows["RairanTachometer"]):
 
     def _bound(self, counts: Fraction, periods: int, shift: int, more: int, towards: int) -> int:
         """Bound for so many counts in so many dt·2^shift, `more` clocks longer; outward, and clipped."""
-        clocks = (periods * self.spec.timing.tick_cycles << shift) + more
+        clocks = (periods * self.asked.timing.tick_cycles << shift) + more
         if clocks <= 0:
-            return self.spec.bound.absent
-        exact = counts * self.spec.timing.tick_cycles * (1 << self.spec.widths.native_frac_bits) / clocks
-        return min(math.floor(exact) if towards < 0 else math.ceil(exact), self.spec.bound.absent)
+            return self.velocity.absent_bound
+        exact = counts * self.asked.timing.tick_cycles * (1 << self.velocity.native_frac_bits) / clocks
+        return min(math.floor(exact) if towards < 0 else math.ceil(exact), self.velocity.absent_bound)
 
     def _by_address(self, one: Callable[[int, int, bool], int]) -> tuple[int, ...]:
         """Return the table of a bound; `one` gives the entry for n, k and the regime.
@@ -114,10 +102,10 @@ class RairanForm(Follows["RairanTachometer"]):
         tells the k of the address: for a low estimate k places below that of `low_depth`, for a high one k places above
         that of `high_depth`. n is always less than this leading one.
         """
-        if self.spec.adaptive is None:
+        if self.adaptive is None:
             return tuple(one(n, 0, high) for n in range(self.bound_depth) for high in (False, True))
         entries = [0] * (2 * self.bound_depth)
-        for shift in range(self.spec.times.max_tick_shift + 1):
+        for shift in range(self.max_tick_shift + 1):
             low, high = self.low_depth >> shift, self.high_depth << shift
             entries[2 * low : 4 * low : 2] = [one(n, shift, False) for n in range(low)]
             entries[2 * high + 1 : 4 * high + 1 : 2] = [one(n, shift, True) for n in range(high)]
@@ -131,96 +119,45 @@ class RairanForm(Follows["RairanTachometer"]):
         """
 
         def lower(n: int, shift: int, high: bool) -> int:
-            counts = max(Fraction(n if high else 1) - self.spec.bound.edge_error, Fraction(0))
+            counts = max(Fraction(n if high else 1) - self.velocity.bound.edge_error, Fraction(0))
             return self._bound(counts, 1 if high else n + 1, shift, 1, -1) if n or high else 0
 
         def loose(n: int, shift: int, high: bool) -> int:
-            return self._bound(self.spec.bound.edge_error, n, shift, -1, 1) if n and not high else 0
+            return self._bound(self.velocity.bound.edge_error, n, shift, -1, 1) if n and not high else 0
 
-        return self._by_address(lower) + (self._by_address(loose) if self.spec.bound.edge_error else ())
+        return self._by_address(lower) + (self._by_address(loose) if self.velocity.bound.edge_error else ())
 
     @property
     def upper_table(self) -> tuple[int, ...]:
         """Upper bounds: n1 for a dt, or for Ndt1 of them, that took a clock less; absent for the estimate 0."""
 
         def upper(n: int, shift: int, high: bool) -> int:
-            counts = (n if high else 0) + self.spec.bound.uncertainty
-            return self._bound(counts, 1 if high else n, shift, -1, 1) if n or high else self.spec.bound.absent
+            counts = (n if high else 0) + self.velocity.bound.uncertainty
+            return self._bound(counts, 1 if high else n, shift, -1, 1) if n or high else self.velocity.absent_bound
 
         return self._by_address(upper)
 
     @property
     def low_depth(self) -> int:
         """A power of two above every Ndt1."""
-        return 1 << self.spec.timing.max_ticks.bit_length()
+        return 1 << self.asked.timing.max_ticks.bit_length()
 
     @property
     def high_depth(self) -> int:
         """A power of two above every Nep1 − 1 of a dt as long as nominal."""
-        return 1 << (self.spec.widths.max_count - 1).bit_length()
+        return 1 << (self.tick.max_count - 1).bit_length()
 
     @property
     def bound_depth(self) -> int:
         """Entries of each bound's table for low speeds, and for high ones: by Ndt1 and by Nep1 − 1."""
-        if self.spec.adaptive is None:
+        if self.adaptive is None:
             return max(self.low_depth, self.high_depth)
-        return 2 * max(self.low_depth, self.high_depth << self.spec.times.max_tick_shift)
+        return 2 * max(self.low_depth, self.high_depth << self.max_tick_shift)
 
     def tie(self, shift: int) -> int | None:
         """Return the Ndt1 for which n1 or n2 is just half an LSB, if there is one: it rounds up, to 1 or to −0."""
-        ndt1 = (2 << self.spec.widths.native_frac_bits >> shift) - (self.spec.estimate == "n2")
-        return ndt1 if self.spec.estimate != "n3" and ndt1 <= self.max_dt(shift) else None
-
-
-class RairanLatency(Latency["RairanTachometer"]):
-    """Counts the clocks from a pin to the velocity of Rairán's core."""
-
-    @property
-    def tick(self) -> int:
-        # Where it can, a step waits in a register before it decides what a window is.
-        return super().tick + self.registers_steps
-
-    @property
-    def registers_steps(self) -> bool:
-        return self.spec.timing.tick_cycles > 1
-
-    @property
-    def serial(self) -> bool:
-        return False
-
-    @property
-    def datapath(self) -> int:
-        # From the end of dt or a count: a clock for the decision, one for the address, one for the table, one for the
-        # sum; of these `tick` takes two as well.
-        return 4 - super().tick
-
-
-class RairanRecovery(Recovery["RairanTachometer"]):
-    """Says how long Rairán's core takes until all is right again after an upset."""
-
-    @property
-    def clocks(self) -> int | None:
-        # Table 1 to the letter recovers only with counts.
-        return None if self.spec.paper_exact else super().clocks
-
-    @property
-    def remembered(self) -> int:
-        # Cdt may wrap before a count comes. The window up to the next count follows, and the one that this count opens.
-        spec = self.spec
-        dt = (1 << spec.widths.interval) + 2 * spec.timing.max_ticks + 3
-        return dt * spec.timing.tick_cycles << spec.times.max_tick_shift
-
-
-class RairanWords(Words["RairanTachometer"]):
-    """Says of Rairán's core what commands show."""
-
-    @property
-    def description(self) -> str:
-        return f"Rairan 2013, {self.spec.estimate}"
-
-    @property
-    def memory(self) -> tuple[str, int, int]:
-        return "table", self.spec.form.depth, self.spec.form.table_width
+        ndt1 = (2 << self.velocity.native_frac_bits >> shift) - (self.estimate == "n2")
+        return ndt1 if self.estimate != "n3" and ndt1 <= self.max_dt(shift) else None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -257,12 +194,40 @@ class RairanTachometer(TachometerSpec):
         own_ticks=True,
         last_at_rest=True,
     )
-    form = cached_property(RairanForm)
-    times = cached_property(RairanTimes)
-    widths = cached_property(RairanWidths)
-    latency = cached_property(RairanLatency)
-    recovery = cached_property(RairanRecovery)
-    words = cached_property(RairanWords)
+
+    @cached_property
+    def form(self) -> RairanForm:
+        """Tables of the estimates and of their bounds."""
+        return RairanForm(self, self.tick, self.velocity, self.estimate, self.adaptive)
+
+    @cached_property
+    def latency(self) -> Latency:
+        # Where it can, a step waits in a register before it decides what a window is. From the end of dt or a count: a
+        # clock for the decision, one for the address, one for the table, one for the sum; `tick` takes two of these.
+        registered = self.timing.tick_cycles > 1
+        return Latency(self, self.velocity, 1, datapath=2, tick=2 + registered, registers_steps=registered)
+
+    @cached_property
+    def times(self) -> Times:
+        # A count may come at any time.
+        return replace(super().times, max_tick_shift=self.form.max_tick_shift, spacing=1)
+
+    @cached_property
+    def widths(self) -> Widths:
+        return replace(super().widths, max_pulse_count=self.form.max_pulse_count)
+
+    @property
+    def remembered(self) -> int | None:
+        if self.paper_exact:  # Table 1 to the letter recovers only with counts
+            return None
+        # Cdt may wrap before a count comes. The window up to the next count follows, and the one that this count opens.
+        dt = (1 << self.widths.interval) + 2 * self.timing.max_ticks + 3
+        return dt * self.timing.tick_cycles << self.form.max_tick_shift
+
+    @cached_property
+    def words(self) -> Words:
+        memory = "table", self.form.depth, self.form.table_width
+        return replace(super().words, description=f"Rairan 2013, {self.estimate}", memory=memory)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -274,10 +239,10 @@ class RairanTachometer(TachometerSpec):
                 f"must be from 2 to {MAX_TABLE - 1} with method {self.method}, not {self.timing.max_ticks}: "
                 f"try --max-time {self.timing.time_of(MAX_TABLE - 1)}",
             )
-        if (self.estimate == "n3" or self.bounds) and self.widths.max_count > MAX_TABLE:
+        if (self.estimate == "n3" or self.bounds) and self.tick.max_count > MAX_TABLE:
             why = "estimate n3" if self.estimate == "n3" else "bounds"
             raise ParameterError(
-                "max_speed", f"must be at most {MAX_TABLE} counts per tick with {why}, not {self.widths.max_count}"
+                "max_speed", f"must be at most {MAX_TABLE} counts per tick with {why}, not {self.tick.max_count}"
             )
         if self.adaptive is not None:
             self._check_adaptive(self.adaptive)
@@ -296,7 +261,7 @@ class RairanTachometer(TachometerSpec):
         if not self.times.max_tick_shift:
             most = MAX_TABLE // 2
             raise ParameterError(
-                "max_speed", f"must be at most {most} counts per tick with adaptive, not {self.widths.max_count}"
+                "max_speed", f"must be at most {most} counts per tick with adaptive, not {self.tick.max_count}"
             )
         if self.form.adaptive_dt.fewest > self.widths.max_pulse_count:
             least = rounded(Fraction(1, 2 * self.widths.max_pulse_count - 1), up=True)

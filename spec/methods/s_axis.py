@@ -6,22 +6,16 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from tachometry.spec.language.option import ParameterError
-from tachometry.spec.methods.axis import AxisTimes, OneAxis, Plan, output_cycles, own_options
-from tachometry.spec.methods.s import MAX_TABLE, STachometer, STimes
+from tachometry.spec.methods.axis import OneAxis, Plan, output_cycles, own_options
+from tachometry.spec.methods.s import MAX_TABLE, STachometer
 
 # Clocks of a turn of the datapath: what its memories have is in registers, and m_e is.
 READ, DECIDE = 2, 3
 
 
-class SAxisTimes(AxisTimes, STimes):
-    """Says how far ticks of an axis are apart, in rounds."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class SAxis(OneAxis, STachometer):
     """Describes one of many axes with the S method."""
-
-    times = cached_property(SAxisTimes)
 
     @classmethod
     def of(cls, spec: STachometer, axes: int, slots: int) -> SAxis:

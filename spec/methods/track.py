@@ -6,14 +6,13 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
+from tachometry.spec.core.asked import Asked
 from tachometry.spec.core.facts import Facts
-from tachometry.spec.core.follows import Follows
 from tachometry.spec.core.latency import Latency
-from tachometry.spec.core.recovery import Recovery
-from tachometry.spec.core.scale import Scale
 from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.core.tick import Scale
 from tachometry.spec.core.timing import Timing, parse_clocks
-from tachometry.spec.core.widths import Widths
+from tachometry.spec.core.velocity import Velocity
 from tachometry.spec.core.words import Words
 from tachometry.spec.formats.carrying import Carrying
 from tachometry.spec.formats.tracking import MOST_MEMORY, RESULT_BITS, WIDTH, Tracking
@@ -30,41 +29,31 @@ _MAX_TIME = "100ms"  # by default
 _MULTIPLIERS = ("auto", "serial", "block")
 
 
-class TrackWidths(Widths["TrackTachometer"]):
-    """Counts the bits of the numbers of a tracking core."""
+@dataclass(frozen=True)
+class Acceleration:
+    """Format of the acceleration that the tracking method shows."""
 
-    @property
-    def most_native_frac_bits(self) -> int:
-        return RESULT_BITS - 2 - self.max_velocity.bit_length()
-
-    @property
-    def _wished_frac_bits(self) -> int:
-        spec = self.spec
-        lsb = NOISE * 2000 / spec.encoder.counts_per_rev / Fraction(spec.scale.unit_velocity) * spec.scale.per_count
-        return math.ceil(-math.log2(lsb))
-
-
-class Acceleration(Follows["TrackTachometer"]):
-    """Finds the format of the acceleration that the tracking method shows."""
+    asked: Asked
+    scale: Scale
+    form_bits: int  # fraction bits of the acceleration of the recursion, in counts per clock²
 
     width = 32
 
     @property
     def _per_count(self) -> Fraction:
         """One count per tick² in the unit."""
-        count = self.spec.scale.per_count
-        return count if self.spec.unit == NATIVE else count / self.spec.timing.tick_seconds
+        count = self.scale.per_count
+        return count if self.asked.unit == NATIVE else count / self.asked.timing.tick_seconds
 
     @property
     def unit(self) -> str:
         """The unit of the acceleration: that of the velocity per second, or counts per tick²."""
-        return {"rad/s": "rad/s²", "rev/s": "rev/s²", "rpm": "rpm/s"}.get(self.spec.unit, "count/tick²")
+        return {"rad/s": "rad/s²", "rev/s": "rev/s²", "rpm": "rpm/s"}.get(self.asked.unit, "count/tick²")
 
-    @cached_property
+    @property
     def of_form(self) -> Fraction:
         """One LSB of the acceleration of the recursion in the unit."""
-        bits = _tracking(self.spec, Fraction(1, 2)).acceleration_bits  # whatever is shown of it
-        return self._per_count * self.spec.timing.tick_cycles**2 / (1 << bits)
+        return self._per_count * self.asked.timing.tick_cycles**2 / (1 << self.form_bits)
 
     @cached_property
     def frac_bits(self) -> int:
@@ -76,111 +65,7 @@ class Acceleration(Follows["TrackTachometer"]):
     def rad_per_s2_per_lsb(self) -> float:
         """One LSB in rad/s²; ticks are as long as nominal."""
         counts = Fraction(1, 2) ** self.frac_bits / self._per_count
-        return self.spec.scale.unit_velocity * float(counts / self.spec.timing.tick_seconds)
-
-
-def _tracking(spec: "TrackTachometer", slope: Fraction) -> Tracking:
-    """Return formats and constants of the recursion, whose acceleration is shown with so many LSB of its own an LSB."""
-    return Tracking(
-        clock_hz=spec.timing.clock_hz,
-        tick_cycles=spec.timing.tick_cycles,
-        longest_tick=spec.times.longest_tick,
-        external=spec.external_tick,
-        max_count=spec.widths.max_count,
-        counts_per_rev=spec.encoder.counts_per_rev,
-        max_memory=None if spec.max_memory is None else Fraction(spec.max_memory, spec.timing.clock_hz),
-        max_time=spec.timing.max_ticks * spec.timing.tick_cycles,
-        velocity_out=spec.widths.native_frac_bits,
-        slope=slope,
-        quality=spec.timing.tick_cycles * spec.scale.lsb_per_count,
-        quality_bits=min(spec.widths.velocity - 1, RESULT_BITS),
-    )
-
-
-class TrackScale(Scale["TrackTachometer"]):
-    """Says what an LSB of the velocity of a tracking core is worth."""
-
-    @property
-    def rounding_lsb(self) -> float:
-        return super().rounding_lsb + 0.5  # what is below an LSB may round up, whatever it is
-
-    @cached_property
-    def acceleration(self) -> Acceleration:
-        """The format of the acceleration."""
-        return Acceleration(self.spec)
-
-    @property
-    def entries(self) -> dict[str, dict[str, Any]]:
-        return {
-            "acceleration": {
-                "width": self.acceleration.width,
-                "frac_bits": self.acceleration.frac_bits,
-                "unit": self.acceleration.unit,
-                "rad_per_s2_per_lsb": self.acceleration.rad_per_s2_per_lsb,
-            },
-            "position_fine": {"frac_bits": self.spec.fine_bits},
-        }
-
-    @cached_property
-    def carrying(self) -> Carrying:
-        """How `position_fine` is carried on to the pulses of a fine compare output."""
-        spec = self.spec
-        native, cycles = spec.widths.native_frac_bits, spec.timing.tick_cycles
-        bits = spec.fine_bits + 1 + (2 * spec.times.longest_tick).bit_length()
-        shift = max(0, bits - (native + cycles.bit_length() - 3))  # an LSB has to be that of four of the velocity
-        ratio = Fraction(1 << bits, cycles << native + shift)
-        per_clock = VelocityOutput(ratio, spec.widths.max_velocity << native + shift, bits + 2)
-        latency = spec.latency
-        late = latency.pin_to_count + latency.tick + latency.datapath + per_clock.serial_latency + 3
-        return Carrying(per_clock, shift, spec.fine_bits, bits - spec.fine_bits, late)
-
-
-class TrackLatency(Latency["TrackTachometer"]):
-    """Counts the clocks from a pin to the velocity of a tracking core."""
-
-    @property
-    def serial(self) -> bool:
-        return True
-
-    @property
-    def datapath(self) -> int:
-        return self.spec.program.clocks
-
-    @property
-    def busy(self) -> int:
-        # An update is shown before the next tick, so its age needs no number.
-        shown = self.tick_to_velocity + self.low_pass
-        return max(self.spec.program.all_clocks, shown)
-
-
-class TrackRecovery(Recovery["TrackTachometer"]):
-    """Says how long a tracking core takes until all is right again after an upset."""
-
-    @property
-    def clocks(self) -> None:
-        # It forgets gradually; what it has learned of the disc, not even when the shaft rests.
-        return None
-
-
-class TrackWords(Words["TrackTachometer"]):
-    """Says of a tracking core what commands show."""
-
-    @property
-    def description(self) -> str:
-        return f"least squares over a memory that finds its own length{self._bound}"
-
-    @property
-    def heading(self) -> str:
-        return f"{super().heading}{self._bound}"
-
-    @property
-    def on_ramps(self) -> str:
-        return "it does not lag at constant acceleration"
-
-    @property
-    def _bound(self) -> str:
-        longest = self.spec.max_memory
-        return "" if longest is None else f", memory of at most {format_time(self.spec.times.seconds(longest))}"
+        return self.scale.unit_velocity * float(counts / self.asked.timing.tick_seconds)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -225,16 +110,115 @@ class TrackTachometer(TachometerSpec):
         stalls_with=UPDATE,
         usual={"max-time": _MAX_TIME},
     )
-    latency = cached_property(TrackLatency)
-    recovery = cached_property(TrackRecovery)
-    scale = cached_property(TrackScale)
-    widths = cached_property(TrackWidths)
-    words = cached_property(TrackWords)
+
+    @cached_property
+    def velocity(self) -> Velocity:
+        greatest = self.tick.max_count
+        lsb = NOISE * 2000 / self.encoder.counts_per_rev / Fraction(self.scale.unit_velocity) * self.scale.per_count
+        return Velocity(
+            self,
+            self.scale,
+            self.bound,
+            greatest,
+            most_native_frac_bits=RESULT_BITS - 2 - greatest.bit_length(),
+            wished_frac_bits=math.ceil(-math.log2(lsb)),
+            more_rounding=0.5,  # what is below an LSB may round up, whatever it is
+        )
+
+    @cached_property
+    def _recursion(self) -> Tracking:
+        """Formats of the recursion, whatever is shown of its acceleration."""
+        return Tracking(
+            clock_hz=self.timing.clock_hz,
+            tick_cycles=self.timing.tick_cycles,
+            longest_tick=self.tick.longest,
+            external=self.external_tick,
+            max_count=self.tick.max_count,
+            counts_per_rev=self.encoder.counts_per_rev,
+            max_memory=None if self.max_memory is None else Fraction(self.max_memory, self.timing.clock_hz),
+            max_time=self.timing.max_ticks * self.timing.tick_cycles,
+            velocity_out=self.velocity.native_frac_bits,
+            slope=Fraction(1, 2),
+            quality=self.timing.tick_cycles * self.velocity.lsb_per_count,
+            quality_bits=min(self.velocity.width - 1, RESULT_BITS),
+        )
+
+    @cached_property
+    def acceleration(self) -> Acceleration:
+        """The format of the acceleration."""
+        return Acceleration(self, self.scale, self._recursion.acceleration_bits)
+
+    @cached_property
+    def form(self) -> Tracking:
+        """Formats and constants of the recursion."""
+        return replace(self._recursion, slope=self.acceleration.of_form * Fraction(2) ** self.acceleration.frac_bits)
+
+    @cached_property
+    def _around(self) -> Latency:
+        """Latency without the program."""
+        return Latency(self, self.velocity, self.tick.room)
+
+    @cached_property
+    def program(self) -> Program:
+        """The program of the datapath from a tick to the update."""
+        around = self._around
+        delay = around.pin_to_count + around.tick + around.low_pass + around.output
+        serial = Program(self.form, Serial(self.form).times, delay)
+        fits = serial.all_clocks <= self.tick.room
+        return (
+            serial
+            if self.multiplier == "serial" or (self.multiplier == "auto" and fits)
+            else replace(serial, times=BLOCK)
+        )
+
+    @cached_property
+    def latency(self) -> Latency:
+        found = replace(self._around, datapath=self.program.clocks)
+        # An update is shown before the next tick, so its age needs no number.
+        return replace(found, busy=max(self.program.all_clocks, found.tick_to_velocity + found.low_pass))
+
+    @cached_property
+    def carrying(self) -> Carrying:
+        """How `position_fine` is carried on to the pulses of a fine compare output."""
+        native, cycles = self.velocity.native_frac_bits, self.timing.tick_cycles
+        bits = self.fine_bits + 1 + (2 * self.tick.longest).bit_length()
+        shift = max(0, bits - (native + cycles.bit_length() - 3))  # an LSB has to be that of four of the velocity
+        ratio = Fraction(1 << bits, cycles << native + shift)
+        per_clock = VelocityOutput(ratio, self.velocity.max << native + shift, bits + 2)
+        latency = self.latency
+        late = latency.pin_to_count + latency.tick + latency.datapath + per_clock.serial_latency + 3
+        return Carrying(per_clock, shift, self.fine_bits, bits - self.fine_bits, late)
+
+    @property
+    def remembered(self) -> None:
+        # It forgets gradually; what it has learned of the disc, not even when the shaft rests.
+        return None
+
+    @cached_property
+    def words(self) -> Words:
+        words, longest = super().words, self.max_memory
+        bound = "" if longest is None else f", memory of at most {format_time(self.tick.seconds(longest))}"
+        return replace(
+            words,
+            description=f"least squares over a memory that finds its own length{bound}",
+            heading=f"{words.heading}{bound}",
+            on_ramps="it does not lag at constant acceleration",
+        )
+
+    @property
+    def method_entries(self) -> dict[str, dict[str, Any]]:
+        acceleration = {
+            "width": self.acceleration.width,
+            "frac_bits": self.acceleration.frac_bits,
+            "unit": self.acceleration.unit,
+            "rad_per_s2_per_lsb": self.acceleration.rad_per_s2_per_lsb,
+        }
+        return {"acceleration": acceleration, "position_fine": {"frac_bits": self.fine_bits}}
 
     def __post_init__(self) -> None:
         shortest, longest = self.timing.tick_cycles, MOST_MEMORY * self.timing.clock_hz
         if self.max_memory is not None and not shortest <= self.max_memory <= longest:
-            least, given = (format_time(self.times.seconds(clocks)) for clocks in (shortest, self.max_memory))
+            least, given = (format_time(self.tick.seconds(clocks)) for clocks in (shortest, self.max_memory))
             raise ParameterError("max_memory", f"must be from {least}, a tick, to {MOST_MEMORY}s, not {given}")
         super().__post_init__()
         if self.bounds:
@@ -246,7 +230,7 @@ class TrackTachometer(TachometerSpec):
             other = "--multiplier block" if self.multiplier == "serial" else "--method mt"
             raise ParameterError(
                 "tick",
-                f"must be longer for method {self.method}, which takes {short_time(self.times.seconds(shortest))} at "
+                f"must be longer for method {self.method}, which takes {short_time(self.tick.seconds(shortest))} at "
                 f"{self.timing.clock_hz / 1e6:g} MHz, not {given}: try --tick {typed} or {other}",
                 f"needs a tick of {shortest} clocks",
                 self,
@@ -261,41 +245,23 @@ class TrackTachometer(TachometerSpec):
             )
         self._check_fine()
 
-    @cached_property
-    def form(self) -> Tracking:
-        """Formats and constants of the recursion."""
-        return _tracking(self, self.scale.acceleration.of_form * Fraction(2) ** self.scale.acceleration.frac_bits)
-
-    @cached_property
-    def program(self) -> Program:
-        """The program of the datapath from a tick to the update."""
-        latency = self.latency
-        delay = latency.pin_to_count + latency.tick + latency.low_pass + latency.output
-        serial = Program(self.form, Serial(self.form).times, delay)
-        fits = self.times.has_room(serial.all_clocks)
-        return (
-            serial
-            if self.multiplier == "serial" or (self.multiplier == "auto" and fits)
-            else replace(serial, times=BLOCK)
-        )
-
     def _check_fine(self) -> None:
         """Check that the place of an update is carried on before the next; ParameterError if it is not."""
         if self.compare is None or not self.compare.fine:
             return
-        if self.scale.carrying.latency > self.times.shortest_tick:
+        if self.carrying.latency > self.times.shortest_tick:
             raise ParameterError("compare", "must not be fine here: it takes a longer tick or a shorter --filter")
 
     @property
     def method_ports(self) -> tuple[Port, ...]:
-        shown = self.scale.acceleration
+        shown = self.acceleration
         unit = f"2^{-shown.frac_bits} {shown.unit}"
         text = "Acceleration; multiplied by rad_per_s2_per_lsb of the manifest it is in rad/s²."
         acceleration = held(UPDATE, "acceleration", shown.width, signed=True, unit=unit, help=text)
         width, unit = self.position_width + self.fine_bits, f"2^{-self.fine_bits} counts"
         text = "Position at the end of this period, between the counts as well; it wraps as position does."
         position = held(UPDATE, "position_fine", width, signed=True, unit=unit, help=text)
-        unit = f"2^{-self.widths.frac_bits} {self.unit}"
+        unit = f"2^{-self.velocity.frac_bits} {self.unit}"
         text = "Standard deviation that the velocity is expected to have, by the noise that was seen."
         return acceleration, position, held(UPDATE, "quality", self.form.quality_bits, unit=unit, help=text)
 

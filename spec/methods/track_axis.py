@@ -7,7 +7,7 @@ from functools import cached_property
 
 from tachometry.spec.formats.tracking_code import Program
 from tachometry.spec.formats.tracking_units import BLOCK, Serial
-from tachometry.spec.methods.axis import AxisTimes, OneAxis, Plan, output_cycles, own_options
+from tachometry.spec.methods.axis import OneAxis, Plan, output_cycles, own_options
 from tachometry.spec.methods.track import TrackTachometer
 
 
@@ -17,8 +17,6 @@ class TrackAxis(OneAxis, TrackTachometer):
 
     tick_clocks: int  # clocks of the shortest tick in which all turns must end
     ahead: int = 0  # rounds from an edge to what is shown: the velocity is that of the clock in which it is shown
-
-    times = cached_property(AxisTimes)
 
     @classmethod
     def of(cls, spec: TrackTachometer, axes: int, slots: int) -> TrackAxis:

@@ -18,7 +18,7 @@ def entries_of(spec: AnySpec) -> dict[str, Any]:
 
 @entries_of.register
 def _(spec: TachometerSpec) -> dict[str, Any]:
-    times, scale, frac_bits = spec.times, spec.scale, spec.widths.frac_bits
+    times, velocity, frac_bits = spec.times, spec.velocity, spec.velocity.frac_bits
     found = {
         "method": spec.method,
         "clock_hz": spec.timing.clock_hz,
@@ -28,23 +28,23 @@ def _(spec: TachometerSpec) -> dict[str, Any]:
         "counts_per_rev": spec.encoder.counts_per_rev,
         "decoding": spec.encoder.decoding,
         "velocity": {
-            "width": spec.widths.velocity,
+            "width": spec.velocity.width,
             "frac_bits": frac_bits,
             "unit": spec.unit,
-            "rad_per_s_per_lsb": scale.rad_per_s_per_lsb,
-            "full_scale": scale.full_scale * 2.0**-frac_bits,
-            "full_scale_rad_per_s": scale.full_scale * scale.rad_per_s_per_lsb,
+            "rad_per_s_per_lsb": velocity.rad_per_s_per_lsb,
+            "full_scale": velocity.full_scale * 2.0**-frac_bits,
+            "full_scale_rad_per_s": velocity.full_scale * velocity.rad_per_s_per_lsb,
         },
-        **spec.scale.entries,
-        "stream": stream_entry(spec),
+        **spec.method_entries,
+        "stream": stream_entry(spec.stream, spec, spec.ports) if spec.stream else None,
         "max_time_cycles": times.longest,
         "min_time_cycles": times.shortest,
-        "bounds": {"none": spec.bound.shown_absent} if spec.bounds else None,
+        "bounds": {"none": spec.velocity.shown_absent} if spec.bounds else None,
         "interval_unit_cycles": times.interval_unit,
-        "latency_cycles": spec.latency.entries,
+        "latency_cycles": spec.latency_entries,
         "recovery_cycles": spec.recovery.clocks,
         "external_tick_cycles": (
-            {"min": times.min_tick_cycles, "max": times.longest_tick} if spec.external_tick else None
+            {"min": times.min_tick_cycles, "max": spec.tick.longest} if spec.external_tick else None
         ),
     }
     return {name: entry for name, entry in found.items() if entry is not None}
@@ -54,15 +54,15 @@ def _(spec: TachometerSpec) -> dict[str, Any]:
 def _(spec: AxesSpec) -> dict[str, Any]:
     alone, axis = spec.tachometer, spec.axis
     of_one, times = entries_of(alone), axis.times
-    external = {"min": times.min_tick_cycles * spec.slots, "max": times.longest_tick * spec.slots}
+    external = {"min": times.min_tick_cycles * spec.slots, "max": axis.tick.longest * spec.slots}
     of_velocity = {
-        "width": axis.widths.velocity,
-        "full_scale": axis.scale.full_scale * 2.0**-axis.widths.frac_bits,
-        "full_scale_rad_per_s": axis.scale.full_scale * axis.scale.rad_per_s_per_lsb,
+        "width": axis.velocity.width,
+        "full_scale": axis.velocity.full_scale * 2.0**-axis.velocity.frac_bits,
+        "full_scale_rad_per_s": axis.velocity.full_scale * axis.velocity.rad_per_s_per_lsb,
     }
     return of_one | {
         "velocity": of_one["velocity"] | of_velocity,
-        **axis.scale.entries,
+        **axis.method_entries,
         **({} if spec.recovery.clocks is None else {"recovery_cycles": spec.recovery.clocks}),
         **({"external_tick_cycles": external} if alone.external_tick else {}),
         "axes": {
@@ -73,7 +73,7 @@ def _(spec: AxesSpec) -> dict[str, Any]:
             "machines": spec.plan.machines,
             "first_tick": spec.tick_clock(0, 0),
         },
-        "latency_cycles": spec.latency.entries,
+        "latency_cycles": spec.latency_entries,
     }
 
 

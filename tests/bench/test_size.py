@@ -209,10 +209,10 @@ def test_what_a_greatest_speed_changes() -> None:
     for name, without in pairs.items():
         with_, base = specs[name], specs[without]
         assert (with_.max_speed, base.max_speed) == (size.CONFIGURATIONS[0].spec.max_speed, None)
-        assert (with_.method, with_.timing, with_.times.longest_tick) == (
+        assert (with_.method, with_.timing, with_.tick.longest) == (
             base.method,
             base.timing,
-            base.times.longest_tick,
+            base.tick.longest,
         )
     found = results()
     changes: dict[str, dict[str, float]] = {"ECP5": {"COMB": 264, "FF": 273}, "HX8K": {"LC": 330, "Fmax": 135.5}}

@@ -98,7 +98,7 @@ def test_steps_have_windows_of_all_lengths_and_all_counts() -> None:
     spec = next(case for case in CASES if case.name == "s, divided, wide").spec
     run_of = golden.run(spec, steps(spec, np.random.default_rng(1)))
     assert {*run_of.updates.interval.tolist()} == {*range(1, spec.timing.max_ticks + 1)}
-    assert {*run_of.ticks.pulse_count.tolist()} == {*range(-spec.widths.max_count, spec.widths.max_count + 1)}
+    assert {*run_of.ticks.pulse_count.tolist()} == {*range(-spec.tick.max_count, spec.tick.max_count + 1)}
 
 
 @nightly

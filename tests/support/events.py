@@ -156,7 +156,7 @@ def covered_by_track(spec: TrackTachometer, run: Run) -> dict[str, int]:
         "rest": _count(rest),
         "first count": _count(rest[:-1] & ~updates.forced[1:]),
         "speed that falls": _count(updates.forced[1:] & (np.abs(np.diff(updates.velocity)) > 1)),
-        "greatest speed": _count(np.abs(updates.velocity) == spec.scale.full_scale),
+        "greatest speed": _count(np.abs(updates.velocity) == spec.velocity.full_scale),
         "tick as early as may be": _count(np.diff(run.ticks.clock) == spec.times.min_tick_cycles),
     }
 
@@ -177,7 +177,7 @@ def covered_by_timed(spec: TimedTachometer, run: Run) -> dict[str, int]:
         "paper exact": n * spec.paper_exact,
         "reversal": _count(~forced & (velocity == 0)),
         "longer than the maximum time": _count(
-            np.abs(velocity) * interval > spec.form.timer_periods << spec.widths.native_frac_bits + 1
+            np.abs(velocity) * interval > spec.form.timer_periods << spec.velocity.native_frac_bits + 1
         ),
         "count after a silence": _count(overdue[:-1] & ~forced[1:]),
         "count at the maximum time": _count(~forced & (interval == spec.form.max_periods)),
@@ -211,7 +211,7 @@ def covered(spec: TachometerSpec, trace: PinTrace, run: Run) -> Counter[str]:
             "velocity saturated": _count(updates.get("velocity_overflow")),
             "filtered": len(updates.clock) * (spec.lowpass is not None),
             "waited for the filter": spec.lowpass is not None
-            and _count(np.diff(updates.clock) == spec.scale.low_pass.latency - 2),
+            and _count(np.diff(updates.clock) == spec.velocity.low_pass.latency - 2),
             "bounds": _count(updates.get("bounds_valid")),
             "aged": _count(run.ticks.get("age")),
             "update in every clock": _count(np.diff(updates.clock) == 1),

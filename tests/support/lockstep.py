@@ -141,7 +141,7 @@ def watched(spec: TachometerSpec, rng: np.random.Generator) -> TachometerSpec:
     edges, errors = (int(rng.integers(least, 4)) for least in (2, 0))
     compare = Compare(int(rng.integers(-3, 4)), int(rng.integers(3, 6)), int(rng.choice([0, 3, 25])), "2clk")
     compare = replace(compare, direction=str(rng.choice(DIRECTIONS)))
-    limit = Speed(Fraction(str(round(spec.scale.greatest_speed * rng.uniform(0.02, 0.5), 3) or 0.001)))
+    limit = Speed(Fraction(str(round(spec.velocity.greatest_speed * rng.uniform(0.02, 0.5), 3) or 0.001)))
     return replace(spec, health=Health(edges, errors), over_speed=limit, compare=compare)
 
 
@@ -181,11 +181,11 @@ def random_output(spec: TachometerSpec, rng: np.random.Generator) -> TachometerS
     """Return velocity in another unit, with an LSB that it can have, or saturating."""
     unit = str(rng.choice(["count/tick"] * 4 + ["rad/s", "rev/s", "rpm"]))
     if unit != "count/tick":
-        coarsest, finest = spec.widths.frac_bits_range(unit)
+        coarsest, finest = spec.velocity.frac_bits_range(unit)
         spec = replace(spec, unit=unit, frac_bits=int(rng.integers(max(coarsest, finest - 12), finest + 1)))
     if rng.random() < 0.3:
         narrower = 10 if isinstance(spec, TimedTachometer) else 4
-        width = max(8, spec.widths.velocity - int(rng.integers(-2, narrower)))
+        width = max(8, spec.velocity.width - int(rng.integers(-2, narrower)))
         with suppress(ParameterError):
             return replace(spec, velocity_width=width)
         # Too narrow for the greatest speed: it saturates without one.

@@ -22,7 +22,7 @@ class FlatQuotient(wiring.Component):
     def __init__(self, spec: STachometer, *, serial: bool, towards: int = 0) -> None:
         self.box = Quotient(
             spec.form.reciprocal,
-            quotients={"velocity": (spec.widths.velocity, towards, 0)},
+            quotients={"velocity": (spec.velocity.width, towards, 0)},
             numerator_width=spec.form.numerator_width,
             tag=data.StructLayout({"mark": 1}),
             serial=serial,
@@ -125,7 +125,7 @@ def every_quotient(
     distance = form.digits + 2 if serial else 1
     shift = 1 + form.halvings
     main = _MAIN.format(
-        width=spec.widths.velocity,
+        width=spec.velocity.width,
         numerators=", ".join(map(str, numerators)),
         base_shift=shift,
         base_mask=(1 << spec.widths.count) - 1,

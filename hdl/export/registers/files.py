@@ -40,7 +40,7 @@ def register_files(registers: RegisterMap, name: str) -> dict[str, str]:
         pi=math.pi,
         parts=parts_of(registers.spec),
         size=size_of(registers.spec),
-        flags=flags_of(registers.spec),
+        flags=flags_of(registers.spec.ports),
         identifier=rdl.identifier,
         described=rdl.described,
         access=rdl.ACCESS,

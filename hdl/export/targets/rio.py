@@ -54,7 +54,7 @@ def rio(spec: CoreSpec, name: str, bus: Bus | None, made: Mapping[str, str]) -> 
         events=_events(alone),
         sent=sent | dict.fromkeys(counted, EVENT_BITS),
         shift=WORD - alone.position_width,
-        counts_per_s=alone.scale.rad_per_s_per_lsb / (2 * math.pi) * alone.encoder.counts_per_rev,
+        counts_per_s=alone.velocity.rad_per_s_per_lsb / (2 * math.pi) * alone.encoder.counts_per_rev,
         values=values,
         counted=counted,
         sent_as=_sent_as,

@@ -41,7 +41,7 @@ def adaptive_windows(spec: RairanTachometer, start: Ints, next_turn: Ints) -> tu
         after = bisect_left(clock, due, node + 1, end)
         then = min(after, turn[node + 1]) if node else 1
         found.append((node, then, shift))
-        c_ep = min(after - max(node, 1), spec.widths.max_count << shift)
+        c_ep = min(after - max(node, 1), spec.tick.max_count << shift)
         waited = (clock[then] - clock[node] - 1) // (due - clock[node])
         high = c_ep > 1 and waited <= 1
         n = c_ep if high else min(max(waited, 1), spec.form.max_dt(shift))

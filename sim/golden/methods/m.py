@@ -26,7 +26,7 @@ class Model:
         def quotient(counts: int, towards: int) -> np.ndarray:
             # In eighths of a count, which edges may be off by.
             more = int(8 * counts * (1 + self._spec.bound.edge_error))
-            return round_quotient(8 * total + more, 8 * length, self._spec.widths.native_frac_bits, towards)
+            return round_quotient(8 * total + more, 8 * length, self._spec.velocity.native_frac_bits, towards)
 
         columns = {"velocity": quotient(0, 0), "interval": length, "forced": np.zeros(len(m_e), dtype=np.bool_)}
         if self._spec.bounds:

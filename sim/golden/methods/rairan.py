@@ -123,7 +123,7 @@ class Model:
         found, dt = windows(self._spec, steps, n_clocks), self._spec.timing.tick_cycles
         nth = counting(found.n_dt)
         last = np.repeat(found.start, found.n_dt) + (nth + 1) * np.repeat(dt << found.shift, found.n_dt)
-        beyond = (nth == 0) & np.repeat(found.c_ep > self._spec.widths.max_count << found.shift, found.n_dt)
+        beyond = (nth == 0) & np.repeat(found.c_ep > self._spec.tick.max_count << found.shift, found.n_dt)
         return last, beyond, np.repeat(1 << found.shift, found.n_dt)
 
     def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
@@ -149,8 +149,8 @@ class Model:
         if not spec.bounds:
             return {}
         dt = one << events.shift
-        n, high, none = events.n, events.high, spec.bound.absent
-        bits, off = spec.widths.native_frac_bits, int(8 * spec.bound.edge_error)
+        n, high, none = events.n, events.high, spec.velocity.absent_bound
+        bits, off = spec.velocity.native_frac_bits, int(8 * spec.bound.edge_error)
         least, most = 8 * np.where(high, n - 1, 1) - off, 8 * np.where(high, n, 1) + off
         lower = round_quotient(least * one, 8 * np.where(high, dt + 1, (n + 1) * dt + 1), bits, -1)
         # Where no least speed is implied, two edges may be off for all that.
@@ -176,7 +176,7 @@ class Model:
         Clocks, Nep1 or Ndt1, whether it is Nep1, whether it happens, and direction; shape (2n,).
         """
         spec = self._spec
-        n_ep = np.minimum(found.c_ep, spec.widths.max_count << found.shift)
+        n_ep = np.minimum(found.c_ep, spec.tick.max_count << found.shift)
         n_dt = np.clip(found.n_dt, 1, spec.timing.max_ticks >> found.shift)
         shape = (len(found.start), 2)
         clock = np.stack([found.start + (spec.timing.tick_cycles << found.shift), found.end], axis=1)
@@ -268,5 +268,5 @@ class Model:
             up = 2 * n_ep * np.where(high, n_ep - 1, 1)
             down = n_dt * np.where(high, n_ep - 1, 1) + n_ep * np.where(high, 1, n_dt + 1)
         return round_quotient(
-            np.where(n == 0, 0, events.sign * up), down << events.shift, self._spec.widths.native_frac_bits
+            np.where(n == 0, 0, events.sign * up), down << events.shift, self._spec.velocity.native_frac_bits
         )

@@ -93,7 +93,9 @@ class Model:
             whole = 2 if spec.cancel else 1
             # In eighths of a count, which edges may be off by.
             more = int(8 * counts * (1 + spec.bound.edge_error))
-            return round_quotient(8 * numerator + whole * more, 8 * whole * m_s, spec.widths.native_frac_bits, towards)
+            return round_quotient(
+                8 * numerator + whole * more, 8 * whole * m_s, spec.velocity.native_frac_bits, towards
+            )
 
         columns = {"velocity": quotient(0, 0), "interval": m_s, "forced": forced}
         if spec.bounds:

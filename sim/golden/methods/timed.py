@@ -130,8 +130,8 @@ def with_silences(spec: TimedTachometer, counts: Counts, found: Measurements) ->
 
 def rounded(spec: TimedTachometer, distance: Ints, time: Ints) -> tuple[Ints, NDArray[np.bool_]]:
     """Return velocity in counts per tick of a distance in half counts, saturated, and whether that changed it."""
-    exact = round_quotient(distance * spec.form.timer_periods, time, spec.widths.native_frac_bits - 1)
-    limit = spec.widths.max_count << spec.widths.native_frac_bits
+    exact = round_quotient(distance * spec.form.timer_periods, time, spec.velocity.native_frac_bits - 1)
+    limit = spec.tick.max_count << spec.velocity.native_frac_bits
     return np.clip(exact, -limit, limit), np.abs(exact) > limit
 
 
@@ -227,7 +227,7 @@ def _bounds(spec: TimedTachometer, taken: Measurements) -> dict[str, NDArray[Any
         assert ends is not None
         distance, time = ends.T
         exact = round_quotient(
-            distance * spec.form.timer_periods, 8 * np.maximum(time, 1), spec.widths.native_frac_bits, towards
+            distance * spec.form.timer_periods, 8 * np.maximum(time, 1), spec.velocity.native_frac_bits, towards
         )
-        found[name] = np.where(time > 0, exact, towards * spec.bound.absent)
+        found[name] = np.where(time > 0, exact, towards * spec.velocity.absent_bound)
     return found

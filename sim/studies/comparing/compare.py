@@ -104,7 +104,7 @@ def run_curve(name: str, spec: TachometerSpec, run: Run, trace: PinTrace) -> Cur
     """Return what a core shows in the run of a trace."""
     updates = run.updates
     clock_hz = spec.timing.clock_hz
-    velocity = updates.velocity.astype(np.float64) * spec.scale.rad_per_s_per_lsb
+    velocity = updates.velocity.astype(np.float64) * spec.velocity.rad_per_s_per_lsb
     return Curve(
         name,
         f"{spec.method} method, tick {spec.timing.tick_cycles} clocks",

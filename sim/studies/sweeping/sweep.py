@@ -56,8 +56,8 @@ _CORE: dict[str, tuple[str, str, Callable[[TachometerSpec], Any]]] = {
     "max_time_s": ("float", "s", lambda spec: _seconds(spec, spec.timing.max_ticks * spec.timing.tick_cycles)),
     "max_tick_period_s": ("float", "s, of an external tick", lambda spec: _of(spec, "max_tick_cycles", "clocks")),
     "unit": ("text", "of the velocity", lambda spec: spec.unit),
-    "frac_bits": ("int", "bits", lambda spec: spec.widths.frac_bits),
-    "velocity_width": ("int", "bits", lambda spec: spec.widths.velocity),
+    "frac_bits": ("int", "bits", lambda spec: spec.velocity.frac_bits),
+    "velocity_width": ("int", "bits", lambda spec: spec.velocity.width),
     "max_speed_rad_s": ("float", "rad/s", lambda spec: spec.max_speed and spec.max_speed.rad_per_s),
     "position_width": ("int", "bits", lambda spec: spec.position_width),
     "filter": ("int", "clocks", lambda spec: spec.filter_clocks),
@@ -144,9 +144,9 @@ class Point:
     read_delay: float = 0.0  # seconds: a loop reads each value this much later
 
     def __post_init__(self) -> None:
-        needed = self.spec.times.longest_tick + self.spec.latency.tick
+        needed = self.spec.tick.longest + self.spec.latency.tick
         if self.motion.duration * self.spec.timing.clock_hz < needed:
-            least = format_time(self.spec.times.seconds(needed))
+            least = format_time(self.spec.tick.seconds(needed))
             raise ParameterError(
                 "motion", f"must last at least {needed} clocks of --clock ({least}), a tick and its latency"
             )
@@ -280,7 +280,7 @@ def _of(spec: TachometerSpec, field: str, unit: str) -> Any:
 
 
 def _seconds(spec: TachometerSpec, clocks: int | None) -> float | None:
-    return None if clocks is None else float(spec.times.seconds(clocks))
+    return None if clocks is None else float(spec.tick.seconds(clocks))
 
 
 def _encoder(encoder: VirtualEncoder) -> Row:

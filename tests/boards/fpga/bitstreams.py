@@ -102,7 +102,7 @@ def test_the_netlist_of_the_icebreaker_says_the_same(tmp_path: Path) -> None:
     assert words["IDENTIFICATION"] == IDENTIFICATION
     assert words["CONFIGURATION"] == registers.configuration
     # One count in the ticks over which it was measured is what the method cannot tell.
-    velocity = words["VELOCITY"] * 2.0**-spec.widths.frac_bits
+    velocity = words["VELOCITY"] * 2.0**-spec.velocity.frac_bits
     assert velocity == pytest.approx(spec.timing.tick_cycles / EDGE, abs=1 / words["INTERVAL"])
 
     # An edge less is seen, so the comparison could fail.

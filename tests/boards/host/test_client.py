@@ -67,12 +67,12 @@ def test_snapshots_are_those_of_the_golden_bank(method: str, seed: int) -> None:
         taken = board._bank._captured
         assert dict(snapshot) == {name: taken[name] for name in snapshot}
         assert {port.name for port in spec.ports.outputs if not port.is_strobe} <= snapshot.keys()
-        assert snapshot.velocity_rad_per_s == snapshot["velocity"] * spec.scale.rad_per_s_per_lsb
+        assert snapshot.velocity_rad_per_s == snapshot["velocity"] * spec.velocity.rad_per_s_per_lsb
         assert snapshot.flags.keys() == {field.name for field in registers["STATUS"].fields}
         bounds = snapshot.bounds_rad_per_s
         assert (bounds is None) == (not taken.get("bounds_valid"))
         if bounds is not None:
-            assert [round(bound / spec.scale.rad_per_s_per_lsb) for bound in bounds] == [
+            assert [round(bound / spec.velocity.rad_per_s_per_lsb) for bound in bounds] == [
                 taken["velocity_lower"],
                 taken["velocity_upper"],
             ]

@@ -31,7 +31,7 @@ def frame_of(registers: DemoMap, time: float, **values: int) -> Frame:
 
 
 def frames(registers: DemoMap) -> list[Frame]:
-    lsb, none = registers.spec.scale.rad_per_s_per_lsb, registers.spec.bound.shown_absent
+    lsb, none = registers.spec.velocity.rad_per_s_per_lsb, registers.spec.velocity.shown_absent
     assert lsb < 1
     return [
         frame_of(registers, 0.0, position=-3, bounds_valid=0),
@@ -56,7 +56,7 @@ def test_csv(unit: str, tmp_path: Path) -> None:
     with (tmp_path / "a.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     shown = registers.spec.scale.shown_unit
-    lsb = shown.of(registers.spec.scale.rad_per_s_per_lsb)
+    lsb = shown.of(registers.spec.velocity.rad_per_s_per_lsb)
     assert shown.name == ("rpm" if unit == "rpm" else "rad/s")
     speed, lower, upper = (f"{name} [{shown.name}]" for name in ("velocity", "velocity_lower", "velocity_upper"))
     assert [row["time [s]"] for row in rows] == ["0.0", "0.25", "1e-07"]

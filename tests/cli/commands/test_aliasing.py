@@ -78,5 +78,5 @@ def test_nothing_is_stretched_without_need() -> None:
 
 def test_the_t_method_on_the_lattice_is_as_wide_as_one_count() -> None:
     spec = of_texts("t", {"ppr": "500", "timer": "tick"})
-    assert spec.widths.velocity == 16 + 2
-    assert spec.scale.full_scale == 1 << 16
+    assert spec.velocity.width == 16 + 2
+    assert spec.velocity.full_scale == 1 << 16

@@ -89,7 +89,7 @@ def test_speeds_from_one_count_in_the_maximum_time_to_the_greatest(capsys: pytes
         scale = 1e-3 if t_m.endswith("ms") else 1e-6
         assert float(t_m[:-2]) * scale == pytest.approx(interval * 20e-6, rel=1e-3)
         assert float(q_v) == pytest.approx(50 * math.pi / (interval * (interval - 1)), rel=1e-3)
-        rounding = SPEC.scale.rad_per_s_per_lsb / 2
+        rounding = SPEC.velocity.rad_per_s_per_lsb / 2
         assert float(percent) == pytest.approx(100 * (float(q_v) + rounding) / float(speed), rel=1e-2)
         assert update_by == "alteration"
 

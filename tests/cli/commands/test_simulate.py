@@ -88,7 +88,7 @@ def test_trace_has_a_row_per_update(tmp_path: Path, golden_run: Run) -> None:
         )
     ]
     assert [row[5] for row in rows[1:]] == [
-        repr(raw * SPEC.scale.rad_per_s_per_lsb) for raw in updates.velocity.tolist()
+        repr(raw * SPEC.velocity.rad_per_s_per_lsb) for raw in updates.velocity.tolist()
     ]
 
 

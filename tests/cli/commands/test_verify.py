@@ -71,7 +71,9 @@ def test_a_difference_is_saved_with_the_command_that_replays_it(
 ) -> None:
     cores = {words: spec_of(words) for words in configurations("m")}
     # Of the last one the ticks are short. In other units a difference of one may be rounded away.
-    plain = {words: spec for words, spec in cores.items() if spec.velocity_width is None and spec.scale.output is None}
+    plain = {
+        words: spec for words, spec in cores.items() if spec.velocity_width is None and spec.velocity.output is None
+    }
     averaging = [words for words, spec in plain.items() if isinstance(spec, MTachometer) and spec.average > 2][-2:]
     monkeypatch.setattr(study, "configurations", lambda method: averaging)
     options = ["--methods", "m", "--engines", "pysim", "--jobs", "1", "-o", tmp_path / "out"]

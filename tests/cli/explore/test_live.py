@@ -51,7 +51,7 @@ def test_a_board_is_watched_and_set(attached: tuple[Live, str], told: ToldBoard)
     found = until(live, session, lambda found: len(found["rows"]) > 5)
     time, velocity, lower, upper = found["rows"][-1]
     assert time > 0
-    assert velocity == pytest.approx(1024 * demo_map().spec.scale.rad_per_s_per_lsb)
+    assert velocity == pytest.approx(1024 * demo_map().spec.velocity.rad_per_s_per_lsb)
     assert (lower, upper) == (None, None)
     assert dict(found["facts"][0])["position"] == "77 counts"
     assert dict(found["facts"][1])["overflows"] == "0"

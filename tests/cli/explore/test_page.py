@@ -208,7 +208,7 @@ def test_curves_are_those_of_plan(client: TestClient) -> None:
     error = np.array(found["curves"][0]["error"], dtype=float)
     assert found["unit"] == "rad/s"
     assert (error >= 0.99 * floor).all()
-    assert error.max() <= 1.01 * floor.max() + spec.scale.rad_per_s_per_lsb
+    assert error.max() <= 1.01 * floor.max() + spec.velocity.rad_per_s_per_lsb
     rest = spec.times.standstill_ticks * spec.timing.tick_seconds
     assert found["curves"][0]["cells"] == [f"{error.max():.4g}", "503us", short_time(rest), "252"]
 

@@ -24,8 +24,8 @@ def long_spec(max_ticks: int, frac_bits: int, *, tick_cycles: int = 1, cancel: b
 
 def wanted(spec: STachometer, operands: list[NDArray[np.int64]], towards: int = 0) -> NDArray[np.int64]:
     base, n, m = operands
-    return (base << spec.widths.frac_bits) + round_quotient(
-        n, m << spec.form.reciprocal.halvings, spec.widths.frac_bits, towards
+    return (base << spec.velocity.frac_bits) + round_quotient(
+        n, m << spec.form.reciprocal.halvings, spec.velocity.frac_bits, towards
     )
 
 

@@ -101,8 +101,8 @@ def test_every_bit_of_the_sum_counts(kind: Any, max_speed: str | None) -> None:
     spec = default_spec(max_speed=max_speed and Speed.parse(max_speed))
     form = spec.form.reciprocal
     assert isinstance(form, DividedReciprocal)
-    assert form.is_wide(spec.widths.velocity) == (kind is scaler.WideSerialScaler)
-    base_width, scale = spec.widths.velocity - 16, 1 << form.scale_bits
+    assert form.is_wide(spec.velocity.width) == (kind is scaler.WideSerialScaler)
+    base_width, scale = spec.velocity.width - 16, 1 << form.scale_bits
     dut = kind(
         form, base_width=base_width, numerator_width=spec.form.numerator_width, tag=data.StructLayout({"mark": 1})
     )
@@ -126,7 +126,7 @@ def check_wide(tmp_path: Path) -> None:
     """N at the ends of all digits, with every m."""
     spec = default_spec()
     assert isinstance(spec.form.reciprocal, Reciprocal)
-    assert spec.form.reciprocal.is_wide(spec.widths.velocity)
+    assert spec.form.reciprocal.is_wide(spec.velocity.width)
     ends = [sign * (4**k // 2 + off) for k in range(7) for off in (-1, 0, 1) for sign in (-1, 1)]
     numerators = [*ends, -spec.form.max_numerator, spec.form.max_numerator]
     base, n, m, got = every_quotient(spec, numerators, tmp_path)
@@ -136,7 +136,7 @@ def check_wide(tmp_path: Path) -> None:
 def test_what_is_wide(tmp_path: Path) -> None:
     check_wide(tmp_path)
     assert not any(
-        one.form.reciprocal.is_wide(one.widths.velocity)  # type: ignore[union-attr]
+        one.form.reciprocal.is_wide(one.velocity.width)  # type: ignore[union-attr]
         for one in (default_spec(max_speed=Speed.parse("1000rad/s")), default_spec(reciprocal_source="table"))
     )
 

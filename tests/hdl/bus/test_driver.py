@@ -149,8 +149,8 @@ def check(folder: Path) -> list[dict[str, float]]:
         velocity, position = values["velocity"], values["position"]
         counters = {field.name: word >> field.low & 0xFF for field in registers["COUNTERS"].fields}
         quantities = {
-            "rad_per_s": velocity * spec.scale.rad_per_s_per_lsb,
-            "in_unit": velocity * 2.0**-spec.widths.frac_bits,
+            "rad_per_s": velocity * spec.velocity.rad_per_s_per_lsb,
+            "in_unit": velocity * 2.0**-spec.velocity.frac_bits,
             "rad": pytest.approx(position * 2 * math.pi / spec.encoder.counts_per_rev, rel=1e-14),
         }
         assert one == {**values, **counters, **quantities}
@@ -329,8 +329,8 @@ def test_the_compiler_reads_the_numbers_of_the_map(tmp_path: Path) -> None:
         "MAX_TICKS": spec.timing.max_ticks,
         "COUNTS_PER_REV": spec.encoder.counts_per_rev,
         "INTERVAL_UNIT_CYCLES": spec.times.interval_unit,
-        "UNIT_PER_LSB": 2.0**-spec.widths.frac_bits,
-        "RAD_PER_S_PER_LSB": spec.scale.rad_per_s_per_lsb,
+        "UNIT_PER_LSB": 2.0**-spec.velocity.frac_bits,
+        "RAD_PER_S_PER_LSB": spec.velocity.rad_per_s_per_lsb,
         "RAD_PER_COUNT": 2 * math.pi / spec.encoder.counts_per_rev,
     }
     for one in registers:

@@ -87,14 +87,14 @@ def test_an_edge_of_a_probe_and_a_count_of_the_same_clock_are_in_order(clocks: i
         latched = found.actual.tables["probe_valid_1"]
         assert latched.probe_position_1.tolist() == [position]
         assert latched.probe_time_1.tolist() == [min(time, 2**spec.times.probe_width - 1)]
-        assert latched.clock.tolist() == [at + spec.latency.entries["pin_to_probe"]]
+        assert latched.clock.tolist() == [at + spec.latency_entries["pin_to_probe"]]
 
 
 @pytest.mark.parametrize(("before", "latches"), [(1, True), (2, False)])
 def test_edges_that_a_program_sets_hold_from_the_clock_after(before: int, latches: bool) -> None:
     """An edge is known a clock before it is shown, by what is set before that."""
     spec = of_texts("s", BASE | {"probe": "1"})
-    set_at = 20 + spec.latency.entries["pin_to_probe"] - before
+    set_at = 20 + spec.latency_entries["pin_to_probe"] - before
     low, edges = np.zeros(3, np.uint8), np.array([RISING, RISING, 0])
     trace = PinTrace(np.array([0, 20, set_at]), low, low, 80, more={"probe": np.array([0, 1, 1]), "probe_edges": edges})
     assert len(golden.tables(spec, trace.completed(spec))["probe_valid_0"]) == latches
@@ -108,7 +108,7 @@ def test_fine_position_and_velocity_say_where_an_even_shaft_was() -> None:
     run = golden.run(spec, trace.with_pulses("probe_0", rises, 9).completed(spec))
     latched = run.tables["probe_valid_0"]
     assert len(latched) == len(rises)
-    late = spec.latency.entries["pin_to_probe"]
+    late = spec.latency_entries["pin_to_probe"]
     assert latched.clock.tolist() == (rises + late).tolist()
     shown = latched.probe_fine_0 / 64 + 3 * 100 * latched.probe_age_0 / 10e6
     assert np.ptp(shown - 3 * 100 * rises / 10e6) < 0.03

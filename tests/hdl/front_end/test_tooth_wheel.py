@@ -113,7 +113,7 @@ def test_a_shaft_that_starts_anywhere_is_known_within_a_turn(wheel: str) -> None
         # The acceleration goes on through the gap, and shows with the first tooth after it.
         late = run.updates.clock > 1e6 * first + 100_000
         speed = truth.true_speed(run.updates.clock[late] / 1e6)
-        off = run.updates.velocity[late] * spec.scale.rad_per_s_per_lsb - speed
+        off = run.updates.velocity[late] * spec.velocity.rad_per_s_per_lsb - speed
         a_tooth = 267 * 2 * np.pi / spec.encoder.pulses_per_rev / speed  # change of the speed
         most = spec.encoder.missing * (spec.encoder.missing + 1) / 2 + 3
         assert np.all(np.abs(off) < 1.25 * most * a_tooth + 0.01 * speed)

@@ -20,7 +20,7 @@ def check(average: int, *, tick_cycles: int = 3, frac_bits: int = 4, n: int = 30
         encoder=Encoder(25), timing=Timing(1_000_000, tick_cycles, 10), frac_bits=frac_bits, average=average
     )
     rng = np.random.default_rng(average)
-    limit = spec.widths.max_count
+    limit = spec.tick.max_count
     m_e = [limit] * (average + 3) + [-limit] * (average + 3) + [0] * (average + 5) + [1]
     m_e += rng.integers(-limit, limit + 1, n).tolist()
     rows: list[dict[str, int]] = []

@@ -17,7 +17,7 @@ def datapath_spec(*, cancel: bool = True, serial: bool = True, frac_bits: int = 
     timing = Timing(clock_hz=1_000_000, tick_cycles=16 if serial else 4, max_ticks=MAX_TICKS)
     speed = Speed(Fraction(4_000_000, 100 * timing.tick_cycles), "rev/s")
     spec = STachometer(encoder=Encoder(25), timing=timing, frac_bits=frac_bits, max_speed=speed, cancel=cancel)
-    assert (spec.latency.serial, spec.widths.max_count) == (serial, 4)
+    assert (spec.latency.serial, spec.tick.max_count) == (serial, 4)
     return spec
 
 
@@ -37,7 +37,7 @@ def check_paper_sequences(*, cancel: bool = True, serial: bool = True) -> None:
         got = [(clock, row) for clock, row in enumerate(seen) if row["velocity_valid"]]
         wanted = []
         for tick, m_s, forced, eq17, eq21 in updates:
-            velocity = rounded(eq21 if cancel else eq17, spec.widths.frac_bits)
+            velocity = rounded(eq21 if cancel else eq17, spec.velocity.frac_bits)
             wanted.append(
                 (
                     tick * spec.timing.tick_cycles + spec.latency.tick_to_velocity,

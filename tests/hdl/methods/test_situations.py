@@ -41,10 +41,10 @@ def run(spec: TachometerSpec, m_e: list[int]) -> list[Update]:
     found = []
     for clock, row in enumerate(seen):
         if row["velocity_valid"]:
-            velocity, lower, upper = (row[name] / (1 << spec.widths.frac_bits) for name in names[1:4])
+            velocity, lower, upper = (row[name] / (1 << spec.velocity.frac_bits) for name in names[1:4])
             found.append(Update((clock - spec.latency.datapath) // T, velocity, lower, upper, row["interval"]))
     assert all(update.lower <= update.velocity <= update.upper for update in found)
-    assert all(abs(update.velocity) <= spec.widths.max_count for update in found)
+    assert all(abs(update.velocity) <= spec.tick.max_count for update in found)
     return found
 
 
@@ -89,7 +89,7 @@ def test_one_count_then_silence(spec: TachometerSpec) -> None:
     assert all(update.velocity == 0 for update in updates if update.tick < 50)
     # A count after a silence is no spike: it has come in half the longest time at least, or in the n ticks.
     most = 1 / spec.average if isinstance(spec, MTachometer) else 2 / MAX_TICKS
-    assert all(0 <= update.velocity < most + 2**-spec.widths.frac_bits for update in updates)
+    assert all(0 <= update.velocity < most + 2**-spec.velocity.frac_bits for update in updates)
     check_rest(spec, updates, 50, 151)
 
 
@@ -104,7 +104,7 @@ def test_dithering_on_one_edge(spec: TachometerSpec, rhythm: list[int]) -> None:
     moving = rhythm * (200 // len(rhythm))
     updates = run(spec, moving + [0] * 100)
     for update in updates:
-        assert abs(update.velocity) <= 1 / update.interval + 2**-spec.widths.frac_bits
+        assert abs(update.velocity) <= 1 / update.interval + 2**-spec.velocity.frac_bits
         assert update.lower <= 0 <= update.upper
     check_rest(spec, updates, len(moving) - 1, len(moving) + 100)
 

@@ -25,18 +25,18 @@ ONE_TABLE = Resting(encoder=Encoder(500), timing=Timing(48_000_000, 20, 60), fra
 TWO_TABLES = replace(ONE_TABLE, timing=Timing(48_000_000, 20, 5000), lowpass=Fraction(2000))
 
 
-LAYOUT = data.StructLayout({"velocity": signed(ONE_TABLE.widths.native), "rests": 1, "tag": 4})
+LAYOUT = data.StructLayout({"velocity": signed(ONE_TABLE.velocity.native), "rests": 1, "tag": 4})
 COLUMNS = ("filtered.p.velocity", "filtered.p.tag")
 
 
 def check(spec: STachometer, n: int = 150) -> None:
     """Updates far apart, close together, and while another waits."""
-    form = spec.scale.low_pass
+    form = spec.velocity.low_pass
     rng = np.random.default_rng(2)
     gaps = np.where(rng.random(n) < 0.5, form.latency + rng.integers(-4, 4, n), rng.integers(1, form.latency, n))
     gaps[50] = 800  # more ticks than it can count
     came = np.cumsum(gaps)
-    most = spec.widths.max_count << spec.widths.native_frac_bits
+    most = spec.tick.max_count << spec.velocity.native_frac_bits
     velocity = rng.integers(-most, most + 1, n)
     n_clocks = int(came[-1]) + 2 * form.latency
     # Many ticks, or none, or too many.
@@ -62,5 +62,5 @@ def check(spec: STachometer, n: int = 150) -> None:
 
 @pytest.mark.parametrize("spec", [ONE_TABLE, TWO_TABLES], ids=["one table", "two tables"])
 def test_as_the_golden_one(spec: STachometer) -> None:
-    assert len(spec.scale.low_pass.tables) == (2 if spec is TWO_TABLES else 1)
+    assert len(spec.velocity.low_pass.tables) == (2 if spec is TWO_TABLES else 1)
     check(spec)

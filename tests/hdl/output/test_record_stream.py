@@ -161,7 +161,7 @@ def test_the_page_reads_records_and_so_does_c(tmp_path: Path) -> None:
     found: dict[str, Any] = {"json": json, "np": np, "Path": Path}
     exec(shown, found)
     assert found["seconds"].tolist() == ((clock - 1) % 2**32 / 1e8).tolist()
-    assert np.abs(found["rad_per_s"]).max() == np.abs(records["velocity"]).max() * spec.scale.rad_per_s_per_lsb
+    assert np.abs(found["rad_per_s"]).max() == np.abs(records["velocity"]).max() * spec.velocity.rad_per_s_per_lsb
     assert found["lost"].tolist() == (records["flags"] & 1).tolist()
     (tmp_path / "main.c").write_text(_C)
     flags = ("-x", "c", "-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-o", "main", "main.c")

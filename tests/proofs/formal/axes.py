@@ -74,7 +74,7 @@ def _positions(name: str, axes: int, tick_cycles: int) -> Proof:
         "SLOTS": spec.slots,
         "T": tick_cycles,
         "TURN": spec.turn_cycles,
-        "MAX_COUNT": spec.axis.widths.max_count,
+        "MAX_COUNT": spec.axis.tick.max_count,
         "COUNT_WIDTH": spec.rounds.bit_length() + 1,
         "PULSE_WIDTH": spec.axis.widths.count,
         "POSITION_WIDTH": spec.axis.position_width,

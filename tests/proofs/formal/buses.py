@@ -53,7 +53,7 @@ def _on(bus: str, checker: str, bridge_probes: dict[str, str], depth: int) -> Pr
         "IDENTIFICATION": IDENTIFICATION,
         "CONFIGURATION": RegisterMap(_SPEC).configuration,
         "COUNT_WIDTH": _SPEC.widths.count,
-        "FRAC_BITS": _SPEC.widths.frac_bits,
+        "FRAC_BITS": _SPEC.velocity.frac_bits,
     }
     probes = {wire: f"core.bank.{path}" for wire, path in _BANK_PROBES.items()}
     probes["core_left"] = "core.tachometer.sampling_clock.left"

@@ -74,8 +74,8 @@ _RECIPROCAL_PROBES = {wire: _METHOD_PROBES[wire] for wire in ("core_m_s", "core_
 
 def _sum(spec: STachometer) -> tuple[dict[str, int], dict[str, str]]:
     """Return the sum of a window's steps: how it is kept, and where."""
-    start = raised_for(spec.times.longest_tick, spec.widths.max_count)
-    width = signed_width(spec.times.longest_tick + start)
+    start = raised_for(spec.tick.longest, spec.tick.max_count)
+    width = signed_width(spec.tick.longest + start)
     return {"START": start, "SUM_WIDTH": width}, {"core_sum": f"pulse_counter.{'raised' if start else 'count'}"}
 
 
@@ -87,7 +87,7 @@ def front(name: str, spec: STachometer) -> Proof:
         "FILTER": spec.filter_clocks,
         "T": spec.timing.tick_cycles,
         "TICK_LATENCY": spec.latency.tick,
-        "MAX_COUNT": spec.widths.max_count,
+        "MAX_COUNT": spec.tick.max_count,
         "COUNT_WIDTH": spec.widths.count,
         "POSITION_WIDTH": spec.position_width,
     }
@@ -107,11 +107,11 @@ def method(name: str, spec: STachometer, depth: int = 0, without: str = "", max_
     parameters = kept | {
         "T": spec.timing.tick_cycles,
         "MAX_TICKS": spec.timing.max_ticks,
-        "MAX_COUNT": spec.widths.max_count,
+        "MAX_COUNT": spec.tick.max_count,
         "COUNT_WIDTH": spec.widths.count,
         "INTERVAL_WIDTH": spec.widths.interval,
         "NUMERATOR_WIDTH": spec.form.numerator_width,
-        "FRAC_BITS": spec.widths.frac_bits,
+        "FRAC_BITS": spec.velocity.frac_bits,
         "CANCEL": int(spec.cancel),
         "SERIAL": int(serial),
         "TICK_LATENCY": spec.latency.tick,
@@ -131,12 +131,12 @@ def m_method(name: str, spec: MTachometer) -> Proof:
     """Return the M method, from ticks to updates."""
     parameters = {
         "N": spec.average,
-        "MAX_COUNT": spec.widths.max_count,
+        "MAX_COUNT": spec.tick.max_count,
         "COUNT_WIDTH": spec.widths.count,
         "MAX_TICKS": spec.timing.max_ticks,
         "INTERVAL_WIDTH": spec.widths.interval,
-        "BOUND_WIDTH": spec.bound.width,
-        "FRAC_BITS": spec.widths.frac_bits,
+        "BOUND_WIDTH": spec.velocity.bound_width,
+        "FRAC_BITS": spec.velocity.frac_bits,
         "TICK_TO_VELOCITY": spec.latency.tick_to_velocity,
     }
     return Proof(
@@ -198,14 +198,14 @@ _RAIRAN_PROBES = {
 def rairan(name: str, tick_cycles: int, max_ticks: int, max_count: int) -> Proof:
     """Return PR: the method of Rairán, from steps to updates."""
     spec = RairanTachometer(**counting(tick_cycles, max_ticks, max_count))
-    assert spec.widths.max_count == max_count, spec.widths.max_count
+    assert spec.tick.max_count == max_count, spec.tick.max_count
     parameters = {
         "T": tick_cycles,
         "MAX_TICKS": max_ticks,
         "MAX_COUNT": max_count,
         "COUNT_WIDTH": spec.widths.count,
-        "VELOCITY_WIDTH": spec.widths.velocity,
-        "FRAC_BITS": spec.widths.frac_bits,
+        "VELOCITY_WIDTH": spec.velocity.width,
+        "FRAC_BITS": spec.velocity.frac_bits,
     }
     return Proof(name, spec, "rairan", parameters, _RAIRAN_PROBES | STANDSTILL_PROBES, depth=10)
 

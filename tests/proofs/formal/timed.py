@@ -60,7 +60,7 @@ def timed(
 ) -> Proof:
     """Return PT: the T and the M/T method, from steps and ticks to updates."""
     spec = method(**counting(tick_cycles, max_ticks, max_count), **options)
-    assert spec.widths.max_count == max_count, spec.widths.max_count
+    assert spec.tick.max_count == max_count, spec.tick.max_count
     mt = isinstance(spec, MTTachometer)
     parameters = {
         "MT": int(mt),
@@ -68,8 +68,8 @@ def timed(
         "T": tick_cycles,
         "COUNT_WIDTH": spec.widths.count,
         "MAX_COUNT": max_count,
-        "MAX_VELOCITY": spec.widths.max_velocity,
-        "VELOCITY_WIDTH": spec.widths.velocity,
+        "MAX_VELOCITY": spec.velocity.max,
+        "VELOCITY_WIDTH": spec.velocity.width,
         "MAX_TICKS": max_ticks,
         "MAX_PERIODS": spec.form.max_periods,
         "MIN_PERIODS": spec.form.min_periods if isinstance(spec, MTTachometer) else 0,
@@ -82,7 +82,7 @@ def timed(
         "DIVIDEND_DIGITS": QuotientVelocity(spec).divider.dividend_digits,
         "TRAVELLED_WIDTH": signed_width(spec.form.most_travelled) if isinstance(spec, MTTachometer) else 1,
         "INTERVAL_WIDTH": spec.widths.interval,
-        "FRAC_BITS": spec.widths.frac_bits,
+        "FRAC_BITS": spec.velocity.frac_bits,
         "DIVISION_CLOCKS": spec.form.division_clocks,
     }
     probes = _TIMED_PROBES | STANDSTILL_PROBES | within("mt", _WINDOW_OF_MT_PROBES, mt)

@@ -94,7 +94,7 @@ def _motion(spec: TachometerSpec, rng: np.random.Generator, number: int) -> PinT
         return bursts(spec, rng)
     if kind == 1:
         return steady(spec, rng)
-    longest = spec.times.longest_tick * spec.timing.max_ticks
+    longest = spec.tick.longest * spec.timing.max_ticks
     return noise(spec, rng, int(rng.integers(4, 20 * longest)), 20)
 
 

@@ -97,7 +97,7 @@ def bursts(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
     n_clocks = int(clock[-1]) + 1
     level = _levels(clock, quarter, n_clocks)
     (z,) = noise_lines(rng, n_clocks, 1)
-    tick = np.arange(n_clocks) % rng.integers(2, 2 * spec.times.longest_tick + 2) == 0
+    tick = np.arange(n_clocks) % rng.integers(2, 2 * spec.tick.longest + 2) == 0
     return _trace(spec, np.array([level & 1, level >> 1, z, tick], dtype=np.uint8))
 
 
@@ -122,7 +122,7 @@ def steps(spec: TachometerSpec, rng: np.random.Generator) -> PinTrace:
     lengths.
     """
     longest = spec.timing.max_ticks
-    most = min(spec.timing.tick_cycles, (spec.widths.max_count + 1) * 4 // spec.encoder.decoding)
+    most = min(spec.timing.tick_cycles, (spec.tick.max_count + 1) * 4 // spec.encoder.decoding)
     lasts = rng.integers(1, longest + 2, _STEPS)
     counts = np.where(rng.random(_STEPS) < 0.3, rng.integers(-2, 3, _STEPS), rng.integers(-most, most + 1, _STEPS))
     return _of_counts(spec, np.repeat(np.clip(counts, -most, most), lasts))
@@ -141,8 +141,8 @@ def hard(spec: STachometer, form: Reciprocal) -> PinTrace:
             past = ((d << spec.form.finer) * form.value(m) + form.rounding()) % one
             return min(past, one - past)
 
-        for d in sorted(range(-4 * spec.widths.max_count, 4 * spec.widths.max_count + 1), key=near)[:_HARD]:
-            b = int(np.sign(d)) * -max(0, (abs(d) - 2 * spec.widths.max_count + 1) // 2)
+        for d in sorted(range(-4 * spec.tick.max_count, 4 * spec.tick.max_count + 1), key=near)[:_HARD]:
+            b = int(np.sign(d)) * -max(0, (abs(d) - 2 * spec.tick.max_count + 1) // 2)
             first = (d + 2 * b) // 2
             counts += [b, b, first, *[b] * (m - 1), d + 2 * b - first]
     # The longest one between two empty ticks is no standstill.
@@ -225,7 +225,7 @@ def numbers(spec: TrackTachometer, rng: np.random.Generator) -> PinTrace:
 
 def tracked(spec: TrackTachometer, rng: np.random.Generator) -> Iterator[PinTrace]:
     """Yield what a tracking core is played: first short motions, which end in the middle of a tick or of a program."""
-    ticks = spec.times.longest_tick
+    ticks = spec.tick.longest
     for _ in range(60):
         yield hostile(spec, rng, 6).until(int(rng.integers(1, 3 * ticks)))
     yield from ending(spec, rng)
@@ -259,12 +259,12 @@ def ending(spec: TachometerSpec, rng: np.random.Generator) -> list[PinTrace]:
     found = []
     for before in range(-3, 10):
         for of_tick in (True, False):
-            trace = noise(spec, rng, 4 * spec.times.longest_tick, 2)
+            trace = noise(spec, rng, 4 * spec.tick.longest, 2)
             while not len((run := golden.run(spec, trace)).updates.clock):
-                trace = noise(spec, rng, 4 * spec.times.longest_tick, 2)
+                trace = noise(spec, rng, 4 * spec.tick.longest, 2)
             clocks = run.ticks.clock - spec.latency.tick if of_tick else run.updates.clock
             found.append(trace.until(max(int(rng.choice(clocks[:2])) - before, 1)))
-    return [*found, noise(spec, rng, 4 * spec.times.longest_tick, 2)]
+    return [*found, noise(spec, rng, 4 * spec.tick.longest, 2)]
 
 
 def _levels(clock: NDArray[np.int64], quarter: NDArray[np.int64], n_clocks: int) -> NDArray[np.uint8]:
@@ -315,14 +315,14 @@ def stimulus(spec: TachometerSpec, n_clocks: int, seed: int = 1) -> Stimulus:
         elif len(traces) % 8 in (0, 4):
             trace = stress(spec, int(rng.integers(1 << 30)), _EDGES)
         elif len(traces) % 8 == 1:
-            trace = noise(spec, rng, 40 * spec.times.longest_tick * spec.timing.max_ticks)
+            trace = noise(spec, rng, 40 * spec.tick.longest * spec.timing.max_ticks)
         elif len(traces) % 8 == 2:
             trace = bursts(spec, rng)
         elif len(traces) % 8 == 6:
             trace = steps(spec, rng)
             n_clocks += trace.n_clocks  # the others are as many as without them
         else:  # soon after a reset
-            trace = noise(spec, rng, int(rng.integers(4, 3 * spec.times.longest_tick * spec.timing.max_ticks)), 2)
+            trace = noise(spec, rng, int(rng.integers(4, 3 * spec.tick.longest * spec.timing.max_ticks)), 2)
         # Some end early: the next reset comes in the middle.
         early = rng.random() < 0.5 and trace.n_clocks < _RATTLE
         trace = trace.until(int(rng.integers(1, trace.n_clocks)) if early else trace.n_clocks)

@@ -70,7 +70,7 @@ def upsets(n: int, seed: int = 1, only: str = "") -> Campaign:
         phase = 0
         begun = np.flatnonzero(shown[:, tick].astype(bool) & (shown[:, axis] == 0))
         if len(begun):
-            phase = int((clock + begun[-1] - spec.tick_clock(0, 0)) % spec.times.longest_tick)
+            phase = int((clock + begun[-1] - spec.tick_clock(0, 0)) % spec.tick.longest)
         if phase not in expected:
             late = AxesTrace(tuple(_from(each, phase) for each in trace.each))
             expected[phase] = _dense(spec, golden.run(spec, late), phase)

@@ -167,10 +167,10 @@ def allowed(spec: TachometerSpec, trace: PinTrace, clock: NDArray[np.int64]) -> 
     if spec.recovery.clocks is not None:
         return np.full(len(clock), spec.recovery.clocks)
     silent = np.flatnonzero(
-        np.diff(trace.clock, append=trace.n_clocks) > (spec.timing.max_ticks + 1) * spec.times.longest_tick
+        np.diff(trace.clock, append=trace.n_clocks) > (spec.timing.max_ticks + 1) * spec.tick.longest
     )
     last = trace.clock[silent]  # counts before a rest
-    rest = (spec.timing.max_ticks + 1) * spec.times.longest_tick + spec.latency.pin_to_count + spec.latency.tick
+    rest = (spec.timing.max_ticks + 1) * spec.tick.longest + spec.latency.pin_to_count + spec.latency.tick
     found = np.searchsorted(last, clock + spec.recovery.front)
     return np.append(last, trace.n_clocks)[found] + rest + spec.latency.tick_to_velocity - clock
 

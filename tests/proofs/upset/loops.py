@@ -113,7 +113,7 @@ class _Right:
     def of(cls, spec: LoopSpec, trace: CommandedTrace, ticks: int, control_ticks: int, away: int) -> "_Right":
         """Return with windows and control ticks of these phases, and a position that is so many counts off."""
         alone = spec.tachometer
-        last = np.arange(ticks, trace.n_clocks - alone.latency.tick, alone.times.longest_tick, dtype=np.int64)
+        last = np.arange(ticks, trace.n_clocks - alone.latency.tick, alone.tick.longest, dtype=np.int64)
         with patch.object(golden, "windows", lambda *_: (last, np.empty(0, dtype=np.int64))):
             updates = golden.tables(alone, trace.pins)[UPDATE]
         clock = np.arange(control_ticks, trace.n_clocks, spec.period, dtype=np.int64)
@@ -165,7 +165,7 @@ def upsets(name: str, n: int, seed: int = 1, only: str = "") -> Campaign:
         last = clock + int(ticks[-1]) - alone.latency.tick
         right_position, _ = count(alone, steps, np.array([last]))
         away = int(shown[ticks[-1], position] - right_position.position[0])
-        key = (last % alone.times.longest_tick, (clock + int(controls[-1])) % spec.period, away)
+        key = (last % alone.tick.longest, (clock + int(controls[-1])) % spec.period, away)
         if key not in expected:
             expected[key] = _Right.of(spec, trace, *key)
         seen = shown[:, compared]

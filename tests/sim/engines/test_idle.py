@@ -56,7 +56,7 @@ def check_core(spec: TachometerSpec) -> None:
     if trace.n_clocks > 5e6:
         trace = trace.until(5_000_000)
     check(spec, trace)
-    cycles = spec.times.longest_tick
+    cycles = spec.tick.longest
     slow = turning([3 * cycles + 1, 5, max(cycles - 1, 1)], 12, 5 * cycles)
     low = np.zeros(12, dtype=np.uint8)
     others: dict[str, Any] = {pin.name: low for pin in spec.ports.pins if pin.name not in slow.lines}

@@ -43,8 +43,8 @@ def test_full_scale_is_where_the_velocity_saturates(method: str, options: dict[s
     for sign in (1, -1):
         velocity = golden.run(spec, fastest(sign, 40 * spec.timing.tick_cycles)).updates.velocity
         greatest = (sign * velocity).max()
-        assert greatest == spec.scale.full_scale
-        assert greatest * 2.0**-spec.widths.frac_bits == described["full_scale"]
+        assert greatest == spec.velocity.full_scale
+        assert greatest * 2.0**-spec.velocity.frac_bits == described["full_scale"]
     count = 2 * np.pi / 100 / float(spec.timing.tick_seconds)
     assert described["full_scale_rad_per_s"] == pytest.approx(
         described["full_scale"] * (RAD_PER_S | {"count/tick": count})[spec.unit]
@@ -57,7 +57,7 @@ def test_the_default_lsb_is_the_finest_with_which_nothing_saturates(unit: str, w
     spec = spec_of(unit=unit, velocity_width=str(width), max_speed="300rev/s")
     greatest = {"count/tick": 48, "rpm": 18000, "rev/s": 300}[unit]
     fits = [bits for bits in range(-8, 25) if greatest * 2.0**bits <= 2 ** (width - 1) - 1]
-    assert spec.widths.frac_bits == min(fits[-1], 16 if unit == "count/tick" else 10)
+    assert spec.velocity.frac_bits == min(fits[-1], 16 if unit == "count/tick" else 10)
 
 
 @pytest.mark.parametrize(

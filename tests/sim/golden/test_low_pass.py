@@ -39,7 +39,7 @@ def far_apart(spec: STachometer, velocity: np.ndarray, elapsed: np.ndarray, rest
 
 def velocities(spec: STachometer, rng: np.random.Generator, n: int) -> np.ndarray:
     """Return full swings, steps by one LSB, noise; and 0 at the end."""
-    most = spec.widths.max_count << spec.widths.frac_bits
+    most = spec.tick.max_count << spec.velocity.frac_bits
     parts = [
         np.where(np.arange(n) % 40 < 20, most, -most),
         np.full(n, most),
@@ -103,13 +103,13 @@ def test_takes_the_last_of_those_that_come_meanwhile_for_the_time_of_all() -> No
     got = filtered(spec, Table(tick, {}), updates)
     assert got.velocity.tolist() == through(spec, n[[0, 2, 3]], np.array([5, 6, 1])).velocity.tolist()
     first = 50 + latency
-    assert got.clock.tolist() == [first, first + spec.scale.low_pass.latency - 2, 500 + latency]
+    assert got.clock.tolist() == [first, first + spec.velocity.low_pass.latency - 2, 500 + latency]
 
 
 def test_what_comes_when_one_is_taken_waits_for_the_next_turn() -> None:
     """The one before is taken in clock `then`: what comes a clock earlier takes its place, what comes then does not."""
     spec = spec_of(Fraction(2000))
-    latency = spec.scale.low_pass.latency
+    latency = spec.velocity.low_pass.latency
     then = 51 + latency - 2
     came = np.array([50, 60, then - 1, then, then + 3])
     n = np.array([100, 200, 300, 400, 500]) << 16
@@ -158,7 +158,7 @@ def test_the_first_update_is_filtered_from_0_and_so_is_the_first_after_rest(lowp
         lowpass=Fraction(lowpass),
         max_speed=Speed(Fraction(200)),
     )
-    form, half = rairan.scale.low_pass, Fraction(1, 2)
+    form, half = rairan.velocity.low_pass, Fraction(1, 2)
     assert form.extra_bits == bits
     factor = Fraction(form.tables[0][1], 2**form.factor_bits)
     assert factor == pytest.approx(math.exp(-lowpass * 1e-4))

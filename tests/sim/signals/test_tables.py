@@ -12,7 +12,7 @@ from tachometry.sim.signals.tables import held_velocity, velocity_error, write_c
 from tachometry.spec import AxesSpec, Encoder, STachometer, Timing, of_texts
 
 SPEC = STachometer(encoder=Encoder(100), timing=Timing(20_000, 20, 10))
-LSB = SPEC.scale.rad_per_s_per_lsb
+LSB = SPEC.velocity.rad_per_s_per_lsb
 AFTER = SPEC.latency.tick_to_velocity
 # Ticks 0 to 4; ticks 1 and 3 cause an update; the clocks end before an update of tick 4 could come.
 TICK = np.array([21, 41, 61, 81, 101])

@@ -89,7 +89,7 @@ def test_the_extremes_are_there() -> None:
         assert values(method, "tick_cycles") >= ({(960,)} if method == "track" else {(1,), (3,), (960,)})
         widths = [spec for spec in cores[method] if spec.velocity_width is not None]
         assert 0 < len(widths) < len(cores[method])
-        assert any(spec.widths.native_frac_bits == 24 for spec in cores[method])
+        assert any(spec.velocity.native_frac_bits == 24 for spec in cores[method])
         assert any(spec.max_speed for spec in cores[method])
 
 

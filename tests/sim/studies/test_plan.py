@@ -14,7 +14,7 @@ from tachometry.sim.studies.plan import Plan, Plans, default_range, dense_speeds
 from tachometry.spec import Encoder, Speed, STachometer, Timing
 
 SPEC = STachometer(encoder=Encoder(500), timing=Timing(48_000_000, 960, 50), frac_bits=24)
-HALF_LSB = 2.0 ** -(SPEC.widths.frac_bits + 1)
+HALF_LSB = 2.0 ** -(SPEC.velocity.frac_bits + 1)
 
 
 def with_max_ticks(max_ticks: int, *, cancel: bool = True) -> STachometer:
@@ -33,7 +33,7 @@ def measure(spec: STachometer, units: F, n_ticks: int = 30_000) -> tuple[Table, 
     position = (np.arange(n_ticks + 1) * units.numerator + units.denominator // 3) // units.denominator
     updates = updates_of(spec, np.diff(position))
     updates = updates.rows(updates.clock > 200)  # more than two windows, and two equal pulse numbers
-    return updates, np.abs(updates.velocity / 2.0**spec.widths.frac_bits - float(units))
+    return updates, np.abs(updates.velocity / 2.0**spec.velocity.frac_bits - float(units))
 
 
 def plan_in_units(spec: STachometer, units: F) -> Plan:

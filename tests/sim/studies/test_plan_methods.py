@@ -56,12 +56,12 @@ def test_no_error_is_greater_than_the_resolution(method: str) -> None:
         recording = encoder.record(parse_motion(f"constant:{speed!r}rad/s:{TICKS * tick!r}s")).recording
         updates = golden.run(spec, recording.place(spec.timing.clock_hz)).updates
         settled = updates.clock > SETTLED.get(method, 150) * spec.timing.tick_cycles
-        error = np.abs(updates.velocity[settled] * spec.scale.rad_per_s_per_lsb - speed)
+        error = np.abs(updates.velocity[settled] * spec.velocity.rad_per_s_per_lsb - speed)
         # A count's time is told to a clock. That is in the resolution of methods that measure times by the clock, and
         # not in that of Rairán's, to which the speed is a clock in dt higher or lower.
         clock = speed / spec.timing.tick_cycles if spec.method == "rairan" else 0.0
         expected = plan_at(spec, speed + clock * np.array([-1, 0, 1])).resolution.max()
-        bound = expected + clock + (spec.scale.rounding_lsb + 0.01) * spec.scale.rad_per_s_per_lsb
+        bound = expected + clock + (spec.velocity.rounding_lsb + 0.01) * spec.velocity.rad_per_s_per_lsb
         assert error.max() <= bound, units
         reached.append(error.max() / bound)
     assert max(reached) > 0.6
@@ -108,14 +108,14 @@ def test_no_golden_model_is_worse_than_told(method: str, own: dict[str, str], ov
     spec = of_texts(method, CORE | own)
     worst = Plans.of(spec).worst
     assert worst is not None
-    told = float(worst.resolution[0] + worst.disc[0]) + spec.scale.rad_per_s_per_lsb
+    told = float(worst.resolution[0] + worst.disc[0]) + spec.velocity.rad_per_s_per_lsb
     encoder = VirtualEncoder(500, seed=3, **read_options(VirtualEncoder, REAL))
     seen = []
     for speed in SPEEDS:
         recording = encoder.record(parse_motion(f"constant:{speed}rad/s:600ms")).recording
         updates = golden.run(spec, recording.place(spec.timing.clock_hz)).updates
         settled = updates.velocity[updates.clock > 0.3 * spec.timing.clock_hz]
-        seen.append(np.abs(settled * spec.scale.rad_per_s_per_lsb - speed).max())
+        seen.append(np.abs(settled * spec.velocity.rad_per_s_per_lsb - speed).max())
     assert told / over < max(seen) < told
 
 
@@ -132,9 +132,9 @@ def test_advice_names_what_is_much_better_and_what_it_costs() -> None:
     better = Plans.of(of_texts("track", CORE))
     assert (advice.method, advice.cells) == ("track", CELLS["track"] - CELLS["s"])
     errors = [
-        float(plans.worst.resolution[0] + plans.worst.disc[0]) + plans.spec.scale.rounding_lsb * lsb
+        float(plans.worst.resolution[0] + plans.worst.disc[0]) + plans.spec.velocity.rounding_lsb * lsb
         for plans in (Plans.of(of_texts("s", CORE)), better)
-        if plans.worst is not None and (lsb := plans.spec.scale.rad_per_s_per_lsb)
+        if plans.worst is not None and (lsb := plans.spec.velocity.rad_per_s_per_lsb)
     ]
     assert advice.gain == pytest.approx(errors[0] / errors[1], rel=0.05)
     assert better.advice is None

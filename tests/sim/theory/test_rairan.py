@@ -310,7 +310,7 @@ def settled_n1(spec: RairanTachometer, edges: NDArray[np.int64], windows: int = 
     period = int(np.diff(edges).max())
     run = golden.run(spec, pins(edges, int(edges[-1])))
     late = run.updates.clock > edges[0] + windows * max(spec.timing.tick_cycles, period)
-    return run.updates.velocity[late] / 2.0**spec.widths.frac_bits
+    return run.updates.velocity[late] / 2.0**spec.velocity.frac_bits
 
 
 def test_bounds_are_never_exceeded_at_any_speed_and_phase() -> None:

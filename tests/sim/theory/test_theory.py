@@ -16,7 +16,7 @@ from tachometry.spec import Encoder, STachometer, Timing
 
 SPEC = STachometer(encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "10ms"), frac_bits=20)
 TICK = float(SPEC.timing.tick_seconds)
-HALF_LSB = 2.0 ** -(SPEC.widths.frac_bits + 1)
+HALF_LSB = 2.0 ** -(SPEC.velocity.frac_bits + 1)
 
 
 def measure(
@@ -27,7 +27,7 @@ def measure(
     encoder = VirtualEncoder(spec.encoder.pulses_per_rev, jitter=jitter, start_angle_rad=0.001, seed=1)
     encoding = encoder.record(parse_motion(f"constant:{speed!r}rad/s:{n_ticks * TICK!r}s"))
     run = golden.run(spec, encoding.recording.place(spec.timing.clock_hz))
-    return run.updates, run.updates.velocity / 2.0**spec.widths.frac_bits, run.ticks.pulse_count
+    return run.updates, run.updates.velocity / 2.0**spec.velocity.frac_bits, run.ticks.pulse_count
 
 
 def speeds_over_four_decades() -> list[float]:
@@ -40,7 +40,7 @@ def speeds_over_four_decades() -> list[float]:
 @pytest.mark.parametrize("cancel", only([True], [True, False]))  # eq. (21), which is the default
 def test_interval_and_error_at_constant_speed(cancel: bool) -> None:
     far = 0
-    spec = STachometer(encoder=SPEC.encoder, timing=SPEC.timing, frac_bits=SPEC.widths.frac_bits, cancel=cancel)
+    spec = STachometer(encoder=SPEC.encoder, timing=SPEC.timing, frac_bits=SPEC.velocity.frac_bits, cancel=cancel)
     for units in speeds_over_four_decades():
         updates, velocity, m_e = measure(units, 8000, spec)
         # The offset is known once a pulse number has come twice; then the second window counts.

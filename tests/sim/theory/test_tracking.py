@@ -28,6 +28,6 @@ def test_noise_of_edges_becomes_the_noise_of_the_velocity(speed: float, memory_m
     )
     recording = VirtualEncoder(500, jitter=jitter, seed=1).record(parse_motion(f"constant:{speed}rad/s:2s")).recording
     run = golden.run(spec, recording.place(CLOCK))
-    error = run.updates.velocity[5000:] * spec.scale.rad_per_s_per_lsb - speed
+    error = run.updates.velocity[5000:] * spec.velocity.rad_per_s_per_lsb - speed
     expected, _ = tracking.errors(np.array([speed]), jitter, 2000, TICK / CLOCK, memory_ms / 1000)
     assert np.sqrt(np.mean(error**2)) == pytest.approx(expected[0], rel=0.3)

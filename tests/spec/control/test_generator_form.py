@@ -39,8 +39,8 @@ def test_what_the_formats_hold(number: int) -> None:
     if form.fraction < 36:
         assert greatest * 2 ** (form.fraction + 1) > 2**31 * (1 - 1e-9)
     # A velocity is the greatest that the tachometer shows, or one of 32 bits.
-    lsb = float(spec.tachometer.scale.rad_per_s_per_lsb)
-    fastest = math.ceil(spec.tachometer.scale.full_scale * lsb / count * tick * 2**form.fraction * (1 - 1e-12))
+    lsb = float(spec.tachometer.velocity.rad_per_s_per_lsb)
+    fastest = math.ceil(spec.tachometer.velocity.full_scale * lsb / count * tick * 2**form.fraction * (1 - 1e-12))
     assert form.velocity_bits == max(31, fastest.bit_length())
     assert form.velocity_shift == form.velocity_bits - 31
     assert form.most_velocity == 2**form.velocity_bits - 1
@@ -61,7 +61,7 @@ def test_what_the_formats_hold(number: int) -> None:
     for scale, ratio in ((form.velocity, velocity), (form.acceleration, acceleration)):
         assert scale.factor / 2.0 ** (32 + scale.shift) == pytest.approx(ratio, rel=2**-27)
     assert form.acceleration_width == 20
-    assert form.command_width == spec.tachometer.widths.velocity + spec.units.command_bits
+    assert form.command_width == spec.tachometer.velocity.width + spec.units.command_bits
 
 
 def test_the_clocks_of_a_step() -> None:

@@ -113,7 +113,7 @@ def test_errors_say_what_is_wrong_and_what_is_allowed(make: object, message: str
 )
 def test_max_speed_in_counts_per_tick(text: str, counts: int) -> None:
     spec = STachometer(encoder=Encoder(500), timing=TIMING, max_speed=Speed.parse(text))
-    assert spec.widths.max_count == counts
+    assert spec.tick.max_count == counts
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_max_speed_in_counts_per_tick(text: str, counts: int) -> None:
 def test_max_count_is_that_of_the_longest_external_tick(speed: str | None, longest: str | None, counts: int) -> None:
     texts = {"ppr": "500", "tick": "20us", "external-tick": "yes", "max-speed": speed, "max-tick-period": longest}
     for method in ("m", "s", "mt"):
-        assert of_texts(method, texts).widths.max_count == counts, method
+        assert of_texts(method, texts).tick.max_count == counts, method
 
 
 @pytest.mark.parametrize("text", ["12.5rad/s", "1.98943678864869rev/s", "119.366207318922rpm"])

@@ -75,8 +75,8 @@ def test_the_edge_error_is_rounded_up_to_eighths() -> None:
 
 
 def test_ends_of_external_ticks() -> None:
-    assert spec_of(2, external_tick=True, max_tick_cycles=2).times.longest_tick == 2
-    assert spec_of(20, external_tick=True, max_tick_cycles=MAX_TICK_CYCLES).times.longest_tick == 1 << 20
+    assert spec_of(2, external_tick=True, max_tick_cycles=2).tick.longest == 2
+    assert spec_of(20, external_tick=True, max_tick_cycles=MAX_TICK_CYCLES).tick.longest == 1 << 20
     for tick, longest, message in (
         (1, 2, "tick_cycles must be at least 2 with an external tick, not 1"),
         (20, 19, "max_tick_cycles must be from 20, one tick, to 1048576, not 19"),

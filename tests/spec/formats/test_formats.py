@@ -261,9 +261,9 @@ def test_the_slowest_filter() -> None:
     """α is at least 4/2^26, so the state has at most 26 bits more; α is a little less than G·T."""
     seconds = Fraction(960, 48_000_000)
     slowest = 4 / (seconds * 2**26)
-    assert filtered(slowest * Fraction(10001, 10000)).scale.low_pass.extra_bits == 26
-    assert filtered(slowest * 2).scale.low_pass.extra_bits == 26
-    assert filtered(slowest * Fraction(21, 10)).scale.low_pass.extra_bits == 25
+    assert filtered(slowest * Fraction(10001, 10000)).velocity.low_pass.extra_bits == 26
+    assert filtered(slowest * 2).velocity.low_pass.extra_bits == 26
+    assert filtered(slowest * Fraction(21, 10)).velocity.low_pass.extra_bits == 25
     for bandwidth in (slowest * Fraction(9999, 10000), slowest / 2, slowest / 100, Fraction(0), Fraction(-1)):
         with pytest.raises(ParameterError, match=r"^lowpass must be from 0\.002981 to 3\.015e\+08 rad/s here, not "):
             filtered(bandwidth)

@@ -60,17 +60,17 @@ def test_defaults_are_those_of_python(method: str) -> None:
         spec = made(encoder=Encoder(500), unit=unit)
         assert of_texts(method, PPR | {"unit": unit}) == spec
         if method == "track":  # its noise is less than that of others
-            assert spec.scale.rad_per_s_per_lsb < 7e-5
+            assert spec.velocity.rad_per_s_per_lsb < 7e-5
         else:
-            assert spec.widths.frac_bits == (16 if unit == "count/tick" else 10)
+            assert spec.velocity.frac_bits == (16 if unit == "count/tick" else 10)
     texts = had_by(method, {"ppr": "20", "clock": "100MHz", "tick": "4clk", "max-time": "2000clk", "unit": "rpm"})
     coarse = Timing(100_000_000, int(texts["tick"].removesuffix("clk")), 500)
     assert of_texts(method, texts) == made(encoder=Encoder(20), timing=coarse, unit="rpm")
-    assert of_texts(method, texts).widths.frac_bits < 10  # as many as there can be
+    assert of_texts(method, texts).velocity.frac_bits < 10  # as many as there can be
     if not made.facts.own_ticks:
         external = of_texts(method, PPR | {"external-tick": "yes", "clock": "50MHz"})
         assert external == made(encoder=Encoder(500), timing=Timing.parse("50MHz", **usual), external_tick=True)
-        assert external.times.longest_tick == 2000
+        assert external.tick.longest == 2000
 
 
 def test_every_option_does_what_it_says() -> None:

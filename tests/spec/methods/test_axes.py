@@ -40,10 +40,10 @@ def test_an_axis_is_a_core_whose_clock_is_a_round() -> None:
     assert spec.axis.timing.tick_cycles == 120
     assert spec.axis.timing.max_ticks == 500
     # The greatest speed is as many counts in a tick as of a core of its own, if it can be looked at so often.
-    assert spec.axis.widths.max_count == ALONE.widths.max_count == 7
-    assert spec_of(8, max_speed=None).axis.widths.max_count == 120
-    assert spec_of(64, tick=2560, max_speed=Speed(Fraction(10**6))).axis.widths.max_count == 40
-    assert spec.axis.widths.velocity == ALONE.widths.velocity
+    assert spec.axis.tick.max_count == ALONE.tick.max_count == 7
+    assert spec_of(8, max_speed=None).axis.tick.max_count == 120
+    assert spec_of(64, tick=2560, max_speed=Speed(Fraction(10**6))).axis.tick.max_count == 40
+    assert spec.axis.velocity.width == ALONE.velocity.width
 
 
 def test_it_is_the_same_in_another_process() -> None:
@@ -127,8 +127,10 @@ def test_a_unit_is_one_of_seconds_whatever_a_round_lasts() -> None:
     """An LSB of an axis is that of a core of its own, also where a round is no whole number of hertz."""
     for axes in (1, 7, 33):
         spec = spec_of(axes, unit="rpm", tick=9240)
-        assert spec.axis.scale.rad_per_s_per_lsb == pytest.approx(spec.tachometer.scale.rad_per_s_per_lsb, rel=1e-12)
-        assert spec.axis.scale.lsb_per_count == spec.tachometer.scale.lsb_per_count
+        assert spec.axis.velocity.rad_per_s_per_lsb == pytest.approx(
+            spec.tachometer.velocity.rad_per_s_per_lsb, rel=1e-12
+        )
+        assert spec.axis.velocity.lsb_per_count == spec.tachometer.velocity.lsb_per_count
 
 
 def test_after_an_upset_an_axis_is_right_as_late_as_a_core_of_its_own() -> None:

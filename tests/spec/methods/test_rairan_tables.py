@@ -49,7 +49,7 @@ def test_n3_is_looked_up_by_the_pulses_of_a_tick_too() -> None:
 
 def bounds_of(spec: RairanTachometer, n: int, k: int, high: bool) -> tuple[int, int, int]:
     """Return lower, upper and loose bound of Ndt1 = n, or of Nep1 = n + 1, with dt·2^k; in counts per tick."""
-    f, off, none = spec.widths.frac_bits, spec.bound.edge_error, spec.bound.absent
+    f, off, none = spec.velocity.frac_bits, spec.bound.edge_error, spec.velocity.absent_bound
     clock = Fraction(1, spec.timing.tick_cycles << k)
 
     def above(counts: Fraction, time: Fraction) -> int:
@@ -126,7 +126,7 @@ def test_the_shortest_maximum_time_of_an_adaptive_dt() -> None:
     assert (spec.times.max_tick_shift, spec.widths.max_pulse_count, spec.times.update_spacing) == (1, 80, 1)
     # Lengths that wrap, two maximum times, three dt more; all with the longest dt.
     assert spec.recovery.remembered == (8 + 2 * 4 + 3) * 40 * 2
-    assert [spec.times.has_room(clocks) for clocks in (1, 2)] == [True, False]
+    assert spec.latency.room == 1
 
 
 def test_the_greatest_dt_of_estimates_that_are_not_rounded() -> None:

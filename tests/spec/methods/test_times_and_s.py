@@ -37,7 +37,7 @@ def test_a_division_takes_a_clock_a_digit_its_sign_included_and_one_for_the_divi
     assert t(bounds=True).form.division_clocks == 6 + 4 + 2
     # Of a greatest speed of one count, and one of four, there is one digit more; 16 counts have as many as 20.
     fast = {n: Speed(Fraction(n * 1_000_000, 20 * 32), "rev/s") for n in (1, 4, 16)}  # counts in a tick
-    assert [t(max_speed=speed).widths.max_count for speed in fast.values()] == [1, 4, 16]
+    assert [t(max_speed=speed).tick.max_count for speed in fast.values()] == [1, 4, 16]
     assert [t(max_speed=speed).form.division_clocks for speed in fast.values()] == [1 + 1 + 4 + 2, 3 + 1 + 4 + 2, 11]
     assert t(max_speed=fast[1], bounds=True).form.division_clocks == 6 + 4 + 2
 
@@ -122,7 +122,7 @@ def test_what_is_remembered() -> None:
 def test_speeds_beyond_the_range() -> None:
     """Two counts can be a clock apart; T counts one in a tick of the lattice, M/T all that there are."""
     slow: dict[str, Any] = {"max_speed": Speed(Fraction(1000), "rev/s")}  # 32 counts a ms: one in 20 clocks
-    assert [one.widths.max_count for one in (t(**slow), t())] == [1, 20]
+    assert [one.tick.max_count for one in (t(**slow), t())] == [1, 20]
     assert [one.form.flags_range for one in (t(), t(**slow), mt(), mt(**slow))] == [False, True, False, True]
     assert [one.form.flags_range for one in (t(timer="tick"), mt(timer="tick"), mt(timer="tick", **slow))] == [
         True,
@@ -130,7 +130,7 @@ def test_speeds_beyond_the_range() -> None:
         False,
     ]
     assert [len(one.method_ports) for one in (t(), t(**slow))] == [0, 1]
-    assert [one.widths.max_velocity for one in (t(), t(timer="tick"), mt(timer="tick"))] == [20, 1, 20]
+    assert [one.velocity.max for one in (t(), t(timer="tick"), mt(timer="tick"))] == [20, 1, 20]
 
 
 def test_bounds_of_times() -> None:
@@ -139,7 +139,7 @@ def test_bounds_of_times() -> None:
     off: dict[str, Any] = {"bounds": True, "edge_error": Fraction(1, 8)}
     assert [one.bound.max for one in (t(**off), t(timer="tick", **off))] == [41 + 3, 3 + 1]
     wide = t(**off)
-    assert (wide.bound.width, wide.bound.absent) == (7 + 4, 2**10 - 1)
+    assert (wide.velocity.bound_width, wide.velocity.absent_bound) == (7 + 4, 2**10 - 1)
 
 
 @pytest.mark.parametrize("made", [t, mt])
@@ -237,13 +237,13 @@ def test_a_unit_takes_one_adder_where_it_is_a_sum_of_more_than_two(made: Any) ->
     specs = {
         unit: made(encoder=Encoder(8), timing=seldom, unit=unit, frac_bits=-4) for unit in ("rev/s", "rpm", "rad/s")
     }
-    digits = {unit: len(spec.scale.output.digits) for unit, spec in specs.items()}
+    digits = {unit: len(spec.velocity.output.digits) for unit, spec in specs.items()}
     assert (digits["rev/s"], digits["rpm"]) == (1, 2)
     assert digits["rad/s"] > 2
     assert {unit: spec.latency.output_serial for unit, spec in specs.items()} == {
         "rev/s": False,
         "rpm": False,
-        "rad/s": specs["rad/s"].scale.output.serial_latency <= specs["rad/s"].times.update_spacing,
+        "rad/s": specs["rad/s"].velocity.output.serial_latency <= specs["rad/s"].times.update_spacing,
     }
     assert specs["rad/s"].latency.output_serial
 
@@ -253,12 +253,12 @@ def test_a_digit_more_for_one_adder(made: Any) -> None:
     """With a greatest speed of a count a tick, too: its digit, one that shows that it is exceeded, and that one."""
     fast = Speed.parse("1024rev/s")
     spec = made(encoder=Encoder(8), timing=Timing(1 << 20, 32, 10), unit="rad/s", frac_bits=2, max_speed=fast)
-    assert spec.widths.max_count == 1
-    assert spec.form.quotient_bits == 1 + 1 + spec.widths.native_frac_bits + 1
+    assert spec.tick.max_count == 1
+    assert spec.form.quotient_bits == 1 + 1 + spec.velocity.native_frac_bits + 1
     assert spec.latency.output_serial
     # A sum of three, too: 20 counts have five bits, and six follow.
     three = made(encoder=Encoder(13), timing=Timing(1 << 20, 20, 10), unit="rev/s", frac_bits=-6)
-    assert (len(three.scale.output.digits), three.widths.native_frac_bits) == (3, 6)
+    assert (len(three.velocity.output.digits), three.velocity.native_frac_bits) == (3, 6)
     assert three.form.quotient_bits == 5 + 6 + 2
     assert three.latency.output_serial
 

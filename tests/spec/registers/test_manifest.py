@@ -35,7 +35,7 @@ def test_bounds_are_there_where_they_apply(method: str) -> None:
     spec = of_texts(method, BASE | {"bounds": "yes"})
     bounded = manifest(spec)
     assert bounded.keys() == manifest(of_texts(method, BASE)).keys() | {"bounds"}
-    assert bounded["bounds"] == {"none": 2 ** (spec.bound.width - 1) - 1}
+    assert bounded["bounds"] == {"none": 2 ** (spec.velocity.bound_width - 1) - 1}
 
 
 def test_tracking_has_no_bounds() -> None:

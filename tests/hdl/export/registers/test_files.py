@@ -159,7 +159,7 @@ def check_client(registers: RegisterMap, text: str, folder: Path) -> None:
     snapshot = Client(memory.__getitem__, memory.__setitem__, described).snapshot()
     assert dict(snapshot) == values | dict.fromkeys(RegisterMap(spec).events, 1)
     assert snapshot.flags.keys() == flags(spec) | RegisterMap(spec).events.keys()
-    assert snapshot.velocity_rad_per_s == values["velocity"] * spec.scale.rad_per_s_per_lsb
+    assert snapshot.velocity_rad_per_s == values["velocity"] * spec.velocity.rad_per_s_per_lsb
 
 
 def check_driver(registers: RegisterMap, text: str, folder: Path) -> None:

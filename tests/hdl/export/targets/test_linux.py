@@ -92,7 +92,7 @@ def test_the_client_in_python_reads_all(core: str, tmp_path: Path) -> None:
         found = device_.read()
         assert found == shown
         velocity = next(name for name in found if name.startswith("velocity"))
-        per_lsb = CORES[core][0].tachometer.scale.rad_per_s_per_lsb
+        per_lsb = CORES[core][0].tachometer.velocity.rad_per_s_per_lsb
         assert device_.rad_per_s(found[velocity]) == found[velocity] * per_lsb
         if "INTERRUPTS" in module.REGISTERS:
             device_.enable_interrupts("stall", "error")
@@ -138,7 +138,7 @@ def test_the_program_in_c_shows_the_registers(core: str, name: str, tmp_path: Pa
     names = [f"{kind}_{axis}" for kind in ("velocity", "position") for axis in range(spec.axes or 0)]
     assert found.keys() == ({*names} if isinstance(spec, AxesSpec) else {"velocity", "position"})
     for value, text in found.items():
-        scale = spec.tachometer.scale.rad_per_s_per_lsb if value.startswith("velocity") else 1
+        scale = spec.tachometer.velocity.rad_per_s_per_lsb if value.startswith("velocity") else 1
         assert float(text) == pytest.approx(shown[value] * scale, rel=1e-5)
     (tmp_path / "other").write_bytes(bytes(SIZE))
     done = subprocess.run([program, tmp_path / "other"], capture_output=True, text=True)

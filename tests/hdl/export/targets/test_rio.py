@@ -167,7 +167,7 @@ def check_axis(
     counted |= {"tick-errors": tables["tick_error"].clock} if spec.external_tick else {}
     period, before = 1 << spec.position_width, clocks[0]
     through = np.unwrap(ticks.position, period=period).tolist()
-    per_lsb = spec.scale.rad_per_s_per_lsb
+    per_lsb = spec.velocity.rad_per_s_per_lsb
     first = int(np.searchsorted(ticks.clock, clocks[0], side="right")) - 1
     origin, enabled, resets = through[first] - int(ticks.position[first]), False, 0
     assert any(index.clock < clocks[0])
@@ -194,7 +194,7 @@ def check_axis(
             **{name: ticks.get(name.replace("-", "_"))[at] for name in ("age", "swallowed-edges") if name in found},
             **{name: np.count_nonzero(events < clock) for name, events in counted.items()},
         }
-        if spec.scale.output:
+        if spec.velocity.output:
             expected["velocity-overflow"] = updates.velocity_overflow[row] if row >= 0 else 0
         for port in spec.ports.outputs:  # those of the watch and of comparing
             name, table = port.name.replace("_", "-"), tables.get(port.held_by)
@@ -246,7 +246,7 @@ def test_numbers_come_from_the_spec() -> None:
     """As RIO's test programs show them."""
     spec = core("m")
     plugin = loaded(made("m")[PLUGIN], 1_000_000)
-    rpm = spec.scale.rad_per_s_per_lsb * 30 / np.pi
+    rpm = spec.velocity.rad_per_s_per_lsb * 30 / np.pi
     for value in (-5, 0, 1000):
         assert plugin.convert("velocity-rpm", {}, value) == pytest.approx(value * rpm)
         assert plugin.convert("velocity", {}, value) == pytest.approx(value * rpm / 60 * spec.encoder.counts_per_rev)

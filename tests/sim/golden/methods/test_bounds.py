@@ -56,21 +56,21 @@ def check_enclosure(spec: TachometerSpec, n_motions: int, n_ticks: int = 250_000
     """Return every window of random motions; how many there were, and how near the truth came to a bound, in counts."""
     windows, nearest = 0, 1.0
     for seed in range(n_motions):
-        angle = motion(n_ticks + 1, spec.widths.max_count, seed)
+        angle = motion(n_ticks + 1, spec.tick.max_count, seed)
         seen = angle[1:] - displaced(spec, angle[1:], seed)
         updates = model(spec).updates(ticks_of(seen), None, 1 << 40)
         at = updates.clock - spec.latency.tick_to_velocity
         m_s, valid = updates.interval, updates["bounds_valid"]
         windows += int(np.count_nonzero(valid))
         # Twice the travel in LSB · ticks, so that all is whole.
-        travel = true_travel(spec, angle, at, m_s) << spec.widths.native_frac_bits
+        travel = true_travel(spec, angle, at, m_s) << spec.velocity.native_frac_bits
         above = (2 * updates["velocity_upper"] * m_s * SUBCOUNTS - travel)[valid]
         below = (travel - 2 * updates["velocity_lower"] * m_s * SUBCOUNTS)[valid]
         assert (above >= 0).all(), f"seed {seed}: above the upper bound at {at[valid][above < 0][:1]}"
         assert (below >= 0).all(), f"seed {seed}: below the lower bound at {at[valid][below < 0][:1]}"
         width = updates["velocity_upper"] - updates["velocity_lower"]
-        assert (width * m_s < 2 * (1 + spec.bound.edge_error) * (1 << spec.widths.native_frac_bits) + 2 * m_s).all()
-        scale = 2 * SUBCOUNTS << spec.widths.native_frac_bits
+        assert (width * m_s < 2 * (1 + spec.bound.edge_error) * (1 << spec.velocity.native_frac_bits) + 2 * m_s).all()
+        scale = 2 * SUBCOUNTS << spec.velocity.native_frac_bits
         nearest = min(nearest, above.min() / scale, below.min() / scale)
     return windows, nearest
 

@@ -38,7 +38,7 @@ def updates_of(spec: TachometerSpec, counts: dict[int, int], n_clocks: int) -> T
 def by_the_rules(spec: TTachometer, counts: dict[int, int], n_clocks: int) -> list[Update]:
     """Return those of the naive model."""
     words = {"clock": str(100 * TICK), "tick": f"{TICK}clk", "max-time": f"{TICK * MAX_TICKS}clk", "ppr": "25"}
-    words |= {"timer": spec.timer, "frac-bits": str(spec.widths.frac_bits), "edge-error": str(spec.bound.edge_error)}
+    words |= {"timer": spec.timer, "frac-bits": str(spec.velocity.frac_bits), "edge-error": str(spec.bound.edge_error)}
     settings = Settings("t", words | {"bound-decay": "yes" if spec.bound_decay else "no"})
     front = Front(n_clocks, counts)
     ticks = ticks_of(settings, front, [*range(TICK - 1, n_clocks, TICK)], settings.max_count)
@@ -91,7 +91,7 @@ def test_every_update_is_by_the_rules(timer: str, frac_bits: int, bound_decay: b
         rows = by_the_rules(spec, counts, n_clocks)
         ended = updates.clock < n_clocks - TICK  # counts beyond the end may take the divider
         rows = [row for row in rows if row.cause < n_clocks - TICK]
-        one, none = 2**frac_bits, spec.bound.absent
+        one, none = 2**frac_bits, spec.velocity.absent_bound
         for name, wanted in (
             ("clock", [row.cause for row in rows]),
             ("interval", [row.interval for row in rows]),
@@ -158,7 +158,7 @@ def test_counts_are_the_steps_that_come_before_the_end(n_clocks: int, seen: int)
 def test_just_the_maximum_speed_is_in_range() -> None:
     """At most one count a tick: two counts in 40 clocks are that, in 39 clocks they are more."""
     spec = make_spec(max_speed=Speed(Fraction(1), "rev/s"), frac_bits=8)
-    assert spec.widths.max_count == 1
+    assert spec.tick.max_count == 1
     for sign in (1, -1):
         updates = updates_of(spec, {5: sign, 45: sign, 84: sign, 125: sign}, 130)
         assert updates.velocity[:3].tolist() == [256 * sign, 256 * sign, int(rounded(Fraction(40, 41) * sign, 8) * 256)]

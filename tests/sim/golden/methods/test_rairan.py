@@ -46,7 +46,7 @@ def test_to_the_letter_it_is_table_1_at_every_ts(dt: int) -> None:
 def check_description(spec: RairanTachometer, step: np.ndarray) -> list[Update]:
     """Hold every update and every end of dt against the description; these updates."""
     words = {"dt": f"{spec.timing.tick_cycles}clk", "max-time": f"{spec.timing.tick_cycles * spec.timing.max_ticks}clk"}
-    words |= {"estimate": spec.estimate, "frac-bits": str(spec.widths.frac_bits)}
+    words |= {"estimate": spec.estimate, "frac-bits": str(spec.velocity.frac_bits)}
     words |= {"bound-decay": "yes" if spec.bound_decay else "no"}
     words |= {} if spec.adaptive is None else {"adaptive": str(spec.adaptive)}
     settings = Settings("rairan", words)
@@ -60,7 +60,7 @@ def check_description(spec: RairanTachometer, step: np.ndarray) -> list[Update]:
     assert updates.interval.tolist() == [one.interval for one in found]
     for name in found[0].others:
         assert updates[name].tolist() == [one.others[name] for one in found], name
-    assert updates.velocity.tolist() == [rounded(one.speed, spec.widths.frac_bits) for one in found]
+    assert updates.velocity.tolist() == [rounded(one.speed, spec.velocity.frac_bits) for one in found]
     assert Model(spec).windows(steps_of(step), len(step))[0].tolist() == ends
     return found
 
@@ -151,7 +151,7 @@ def test_a_bound_that_would_divide_by_0_is_absent() -> None:
     step[[0, 1, 2, 3, 7, 8, 9, 12, 14]] = 1
     updates = golden_updates(spec, step)
     low, high = (dict(zip(updates.clock.tolist(), updates[name].tolist(), strict=True)) for name in BOUNDS)
-    none = spec.bound.absent
+    none = spec.velocity.absent_bound
     # t − 1/T = 0 for one dt of one clock.
     assert (low[10], high[10]) == (-none, none)
     # −E/(1 − 1/2) and (1 + E)/(1 − 1/2) counts per dt of two clocks, which has two ticks.
@@ -353,7 +353,7 @@ def test_at_a_steady_speed_eq13_is_within_the_target_and_dt_no_longer_than_that_
     dt, looked_at, shifts = 48, 0, set()
     spec = make_spec(dt, 300, adaptive=target, max_speed=Speed.parse("5000rev/s"))
     rule, most = spec.form.adaptive_dt, spec.times.max_tick_shift
-    assert (spec.widths.max_count, most) == (24, 6)
+    assert (spec.tick.max_count, most) == (24, 6)
     for period in np.geomspace(2.1, 2.2 * rule.fewest * dt, 40):
         gap = Fraction(period).limit_denominator(1000)
         step = pulses(gap, int(30 * gap) + (12 * dt << most))

@@ -48,7 +48,7 @@ def enclosed(dt: int, n: int, seed: int, **options: object) -> tuple[int, float,
     late = np.append(late, late[-1:])
     whole, time = 8 * (last - opening) + late[last] - late[opening], end - true[opening]
     travelled = sign[last] * (whole * gap + part * (8 + late[following] - late[last])) * dt * FINE << FRAC_BITS
-    none = spec.bound.absent
+    none = spec.velocity.absent_bound
     assert ((8 * lower * gap * time <= travelled) | (lower == -none)).all()
     assert ((travelled <= 8 * upper * gap * time) | (upper == none)).all()
 

@@ -26,7 +26,7 @@ def rms(spec: TachometerSpec, motion: str, begin: float, end: float, jitter: flo
     updates = golden.run(spec, encoding.recording.place(spec.timing.clock_hz)).updates
     instants = np.arange(begin, end, 1e-5)
     at = np.searchsorted(updates.clock, instants * spec.timing.clock_hz, side="right") - 1
-    error = updates.velocity[at] * spec.scale.rad_per_s_per_lsb - encoding.motion.speed(instants)
+    error = updates.velocity[at] * spec.velocity.rad_per_s_per_lsb - encoding.motion.speed(instants)
     return float(np.sqrt(np.mean(np.square(error)))), updates
 
 
@@ -101,7 +101,7 @@ def test_contacts_that_bounce_read_their_speed(method: str) -> None:
         run = golden.run(spec, PinTrace.of(recording, spec))
         assert run.ticks.position[-1] == 71  # whatever the filter
         at = np.searchsorted(run.updates.clock, run.ticks.clock[10_000:], side="right") - 1
-        shown.append(run.updates.velocity[at] * 2.0**-spec.widths.frac_bits)
+        shown.append(run.updates.velocity[at] * 2.0**-spec.velocity.frac_bits)
     assert np.mean(shown[0] == 0) > 0.9
     assert np.mean(shown[1] == 0) > 0.5
     np.testing.assert_allclose(shown[2], 15, rtol=0.05)  # 2 ms of 42

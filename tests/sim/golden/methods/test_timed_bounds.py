@@ -41,8 +41,8 @@ def check_silence(spec: TimedTachometer, updates: Table) -> None:
     forced = updates.forced & updates["bounds_valid"]
     lasted = (updates.interval * spec.times.interval_unit)[forced]
     lower, upper = (updates[name][forced] * lasted for name in BOUNDS)
-    off = int(spec.bound.edge_error * (TICK << spec.widths.native_frac_bits))
-    one, velocity = (TICK << spec.widths.native_frac_bits) + off, updates.velocity[forced]
+    off = int(spec.bound.edge_error * (TICK << spec.velocity.native_frac_bits))
+    one, velocity = (TICK << spec.velocity.native_frac_bits) + off, updates.velocity[forced]
     assert (velocity == 0).sum() > 5
     assert ((upper >= one) & (upper < one + lasted))[velocity >= 0].all()
     assert ((lower <= -one) & (lower > -one - lasted))[velocity <= 0].all()
@@ -92,10 +92,10 @@ def check_enclosure(spec: TimedTachometer, n: int, seed: int = 1) -> tuple[int, 
         0, most + 1, len(step)
     )
     way = 16 * way + late[last] - late[first]
-    scale = INSTANTS * TICK << spec.widths.native_frac_bits
+    scale = INSTANTS * TICK << spec.velocity.native_frac_bits
     lasted = time[last] - time[first]
     lower, upper = updates["velocity_lower"][chosen], updates["velocity_upper"][chosen]
-    above, below = upper == spec.bound.absent, lower == -spec.bound.absent  # there is none
+    above, below = upper == spec.velocity.absent_bound, lower == -spec.velocity.absent_bound  # there is none
     assert (below | (16 * lower * lasted <= way * scale)).all()
     assert (above | (16 * upper * lasted >= way * scale)).all()
     if not spec.form.saturates:

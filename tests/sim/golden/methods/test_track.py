@@ -54,10 +54,10 @@ def test_what_is_shown_fits_the_ports(name: str) -> None:
     velocity, _, quality, acceleration, _ = np.concatenate(
         [compiled(spec, windows(spec, seed, 20_000)) for seed in range(2)]
     ).T
-    assert np.abs(velocity).max() < 1 << spec.widths.native - 1
+    assert np.abs(velocity).max() < 1 << spec.velocity.native - 1
     assert quality.min() >= 0
     assert quality.max() < 1 << spec.form.quality_bits
-    assert 1 << spec.scale.acceleration.width - 3 < np.abs(acceleration).max() < 1 << spec.scale.acceleration.width - 1
+    assert 1 << spec.acceleration.width - 3 < np.abs(acceleration).max() < 1 << spec.acceleration.width - 1
 
 
 @nightly
@@ -183,14 +183,14 @@ def test_a_constant_speed_is_settled_upon(start: str) -> None:
     spec = core(max_speed="1000rad/s")
     for counts_per_tick in (0.5, 0.75, 0.9, 0.95, 1.05):
         trace = trace_of(*places(start, spec.timing.tick_cycles / counts_per_tick))
-        velocity = golden.run(spec, trace).updates.velocity[-300:] / 2.0**spec.widths.frac_bits
+        velocity = golden.run(spec, trace).updates.velocity[-300:] / 2.0**spec.velocity.frac_bits
         assert np.abs(velocity) == pytest.approx(np.full(300, counts_per_tick), rel=2e-3), counts_per_tick
 
 
 def test_a_ramp_has_its_acceleration() -> None:
     spec, count = core(), np.arange(1, 1500)
     clock = np.round(spec.timing.tick_cycles * np.sqrt(750 * count)).astype(np.int64)
-    run, lsb = golden.run(spec, trace_of(clock, count)), spec.scale.acceleration.rad_per_s2_per_lsb
+    run, lsb = golden.run(spec, trace_of(clock, count)), spec.acceleration.rad_per_s2_per_lsb
     shown = run.updates.acceleration[-100:] * lsb
     right = 2 / 750 / float(spec.timing.tick_seconds) ** 2 * 2 * np.pi / spec.encoder.counts_per_rev
     assert shown == pytest.approx(np.full(100, right), rel=1e-4)

@@ -98,7 +98,7 @@ def errors(speed: float, **options: str) -> Any:
     recording = encoder.record(parse_motion(f"constant:{speed}rad/s:50ms")).recording
     spec = of_texts("mt", DRIVE | options)
     updates = golden.run(spec, recording.place(spec.timing.clock_hz)).updates
-    return updates.velocity[3:] * spec.scale.rad_per_s_per_lsb - speed
+    return updates.velocity[3:] * spec.velocity.rad_per_s_per_lsb - speed
 
 
 @pytest.mark.parametrize("decoding", ["4", "2"])

@@ -1,0 +1,105 @@
+"""A core of one axis: its measurement, and the features beside that."""
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import ClassVar
+
+from tachometry.spec.core.compare import Compare
+from tachometry.spec.core.front_end import FrontEnd
+from tachometry.spec.core.health import Health
+from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
+from tachometry.spec.core.numbers import Numbers
+from tachometry.spec.core.probe import PROBE_HELP, edges_of, parse_probes
+from tachometry.spec.core.stream import STREAM_HELP, Stream
+from tachometry.spec.core.words import Words, speed_notes
+from tachometry.spec.language.option import option
+from tachometry.spec.language.units import Speed, parse_speed
+
+
+@dataclass(frozen=True, kw_only=True)
+class Core(Numbers):
+    """Features beside the measurement, and the inputs of a core."""
+
+    health: Health | None = option(  # noqa: RUF009
+        None,
+        "Watch the encoder: outputs health (the first fault), faults (how many) and fault (there is one), and with "
+        "--index index_error. A reset clears them, and CONTROL.clear.",
+        tacit=True,
+        part=Health,
+    )
+    over_speed: Speed | None = option(  # noqa: RUF009
+        None,
+        "Output over_speed trips at a velocity beyond this, in rad/s, rev/s or rpm, and stays so until a reset or "
+        "CONTROL.clear.",
+        metavar="SPEED",
+        parse=parse_speed,
+        tests=("", "30rad/s"),
+        tacit=True,
+    )
+    probe: str = option(
+        "", PROBE_HELP, metavar="[N|EDGES]", shown="none", parse=parse_probes, tests=("", "3", "both"), tacit=True
+    )
+    compare: Compare | None = option(  # noqa: RUF009
+        None,
+        "Output compare has pulses of WIDTH, a time or clocks, at COUNT positions (0: no end) from START on, STEP "
+        "counts apart: 100:100:50:10us. They come while the shaft turns forward; with :backward at the end backward, "
+        "and with :both whichever way. list:DEPTH:WIDTH takes positions that a program writes, up to DEPTH ahead. With "
+        ":fine behind all that START and STEP may lie between counts, where track says that the shaft is.",
+        metavar="[START:STEP:COUNT|list:DEPTH]:WIDTH",
+        parse=Compare.parse,
+        tests=("", "2:3:0:2clk", "1.5:2.5:0:2clk:fine", "-2:3:40:1clk:backward", "3:4:9:1clk:both", "list:3:2clk"),
+        few=3,
+        tacit=True,
+    )
+    stream: Stream | None = option(  # noqa: RUF009
+        None,
+        STREAM_HELP,
+        metavar="axi[:WHEN[:N]]",
+        parse=Stream.parse,
+        tests=("", "axi:update:3", "axi:edge:2", "axi:tick:1"),
+        tacit=True,
+    )
+    # why this method was taken, where none was named; empty: it was named
+    chosen: str = field(default="", compare=False, repr=False)
+
+    # How many axes its outputs are of, if they say which.
+    axes: ClassVar[None] = None
+
+    @cached_property
+    def front_end(self) -> FrontEnd:
+        """Inputs of the core; where its index and its modulus are."""
+        complements = self.health is not None and self.health.complements is not None
+        return FrontEnd(self, self.times.longest, len(edges_of(self.probe)), complements)
+
+    @property
+    def over_speed_lsb(self) -> int:
+        """The greatest |velocity|, in its LSB, that is not beyond `over_speed`, for a core that has it."""
+        assert self.over_speed is not None
+        counts = self.over_speed.counts(self.encoder.counts_per_rev, self.timing.tick_seconds)
+        return math.floor(counts * self.scale.per_count * 2**self.velocity.frac_bits)
+
+    @property
+    def latency_entries(self) -> dict[str, int]:
+        """Latencies in the manifest, in clocks."""
+        latency = self.latency
+        found = {
+            "pin_to_count": latency.pin_to_count,
+            "tick_latency": latency.tick,
+            "tick_to_velocity": latency.tick_to_velocity,
+        }
+        if self.compare is not None and not self.compare.fine:  # else it is at the place itself
+            found["pin_to_compare"] = latency.pin_to_count + latency.tick + 1
+        if self.probe:
+            found["pin_to_probe"] = latency.pin_to_count + latency.tick
+        return found | ({"tick_in_to_window_end": TICK_IN_TO_WINDOW_END} if self.external_tick else {})
+
+    @cached_property
+    def words(self) -> Words:
+        """Texts about the core."""
+        return Words(
+            description=self.facts.summary,
+            method=", ".join(filter(None, (self.method, self.chosen))),
+            heading=f"{self.facts.title} method",
+            notes=speed_notes(self, self.velocity),
+        )

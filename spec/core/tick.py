@@ -1,0 +1,66 @@
+"""The sampling period of a core, and one count in it."""
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+
+from tachometry.spec.core.asked import Asked
+from tachometry.spec.core.timing import MAX_TICK_CYCLES
+from tachometry.spec.formats.velocity_output import NATIVE, per_count
+from tachometry.spec.language.units import SpeedUnit
+
+
+@dataclass(frozen=True)
+class Tick:
+    """The sampling period."""
+
+    asked: Asked
+
+    def seconds(self, clocks: int) -> Fraction:
+        """Return a number of clocks in seconds, exactly."""
+        return Fraction(clocks, self.asked.timing.clock_hz)
+
+    @property
+    def longest(self) -> int:
+        """Most clocks in a tick; an external one lasts two nominal ones at most, if nothing else was asked for."""
+        cycles = self.asked.timing.tick_cycles
+        if not self.asked.external_tick:
+            return cycles
+        longest = self.asked.max_tick_cycles
+        return min(2 * cycles, MAX_TICK_CYCLES) if longest is None else longest
+
+    @property
+    def room(self) -> int:
+        """Clocks of work for which a tick is long enough; external ones may come in half the time."""
+        return self.asked.timing.tick_cycles // (1 + self.asked.external_tick)
+
+    @property
+    def max_count(self) -> int:
+        """Largest |m_e|: ⌈max_speed/ω_u⌉, for the longest tick, at most one count per clock."""
+        fastest = self.asked.max_speed
+        if fastest is None:
+            return self.longest
+        counts = fastest.ceil_counts(self.asked.encoder.counts_per_rev, self.seconds(self.longest))
+        return min(self.longest, counts)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """One count per tick, in other units."""
+
+    asked: Asked
+
+    @property
+    def per_count(self) -> Fraction:
+        """One count per tick in the unit."""
+        return per_count(self.asked.unit, self.asked.encoder.counts_per_rev, self.asked.timing.tick_seconds)
+
+    @property
+    def unit_velocity(self) -> float:
+        """ω_u = 2π/(P·T_s) in rad/s, one count per tick (Tsuji 2009, Sec. V-A)."""
+        return 2 * math.pi / float(self.asked.encoder.counts_per_rev * self.asked.timing.tick_seconds)
+
+    @property
+    def shown_unit(self) -> SpeedUnit:
+        """The unit in which commands show speeds; rad/s for counts per tick, which depend on the tick."""
+        return SpeedUnit("rad/s" if self.asked.unit == NATIVE else self.asked.unit)
