@@ -165,10 +165,10 @@ def _reader(parts: Sequence[Part]) -> Callable[..., dict[str, Any]]:
         if (board := given.get("board")) is not None:
             texts = _at(texts, board.clock_hz, ": there is no PLL")
 
-        def within(spec: TachometerSpec) -> Any:
+        def build_core(spec: TachometerSpec) -> Any:
             return reduce(lambda core, step: step(core), steps, spec)
 
-        return dict(spec=within(of_texts(method, texts, within)), **given)
+        return dict(spec=build_core(of_texts(method, texts, build_core)), **given)
 
     return read
 

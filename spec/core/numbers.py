@@ -82,6 +82,11 @@ class Numbers(Asked):
         raise NotImplementedError
 
     @property
+    def wanted_room(self) -> int:
+        """Clocks for which a tick must have room, that `auto` takes this method."""
+        return 0
+
+    @property
     def method_entries(self) -> dict[str, dict[str, Any]]:
         """Entries of the manifest that describe outputs of this method alone, by the names of the ports."""
         return {}

@@ -86,6 +86,10 @@ class MTTachometer(TimedTachometer):
         counts = self.encoder.decoding if self.whole_cycles else 1
         return MTForm(**vars(super().form), min_clocks=min_clocks, cycle_counts=counts)
 
+    @property
+    def wanted_room(self) -> int:
+        return self.form.division_clocks
+
     @cached_property
     def times(self) -> Times:
         return replace(super().times, shortest=self.form.min_periods * self.form.timer_cycles)
