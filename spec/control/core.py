@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 from tachometry.spec.control.loop import Loop
-from tachometry.spec.control.ports import loop_ports
+from tachometry.spec.control.ports import loop_entries, loop_ports
 from tachometry.spec.core.described import written
 from tachometry.spec.core.tick import Scale
 from tachometry.spec.core.velocity import Velocity
@@ -18,6 +18,7 @@ from tachometry.spec.methods.axes import CoreSpec
 class LoopSpec(Loop):
     """A core of a tachometer with a control loop; see `Loop`."""
 
+    kind: ClassVar[Literal["loop"]] = "loop"
     # Outputs are of one axis.
     axes: ClassVar[None] = None
 
@@ -64,6 +65,13 @@ class LoopSpec(Loop):
             for about in options_of(LoopSpec)
         }
         return {**self.tachometer.parameters, "loop": own}
+
+    @property
+    def entries(self) -> dict[str, Any]:
+        """Entries of the manifest, see `TachometerSpec.entries`."""
+        of_tachometer = self.tachometer.entries
+        of_tachometer.pop("recovery_cycles", None)  # a loop forgets gradually
+        return of_tachometer | {"loop": loop_entries(self)}
 
 
 # A core of any kind: all have ports, options, parameters, `axes`, `latency.tick_to_result`, and a `tachometer`,

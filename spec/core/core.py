@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from tachometry.spec.core.compare import Compare
 from tachometry.spec.core.front_end import FrontEnd
@@ -63,6 +63,7 @@ class Core(Numbers):
     # why this method was taken, where none was named; empty: it was named
     chosen: str = field(default="", compare=False, repr=False)
 
+    kind: ClassVar[Literal["one"]] = "one"  # of core
     # How many axes its outputs are of, if they say which.
     axes: ClassVar[None] = None
 

@@ -8,6 +8,7 @@ from tachometry.spec.core.checks import check
 from tachometry.spec.core.core import Core
 from tachometry.spec.core.described import options_as_asked, parameters_of
 from tachometry.spec.core.ports import bound_ports, ports_of
+from tachometry.spec.core.stream import stream_entry
 from tachometry.spec.language.port import Ports
 
 
@@ -43,3 +44,37 @@ class TachometerSpec(Core):
     def parameters(self) -> dict[str, Any]:
         """Every option in canonical form, defaults and what follows included."""
         return parameters_of(self)
+
+    @property
+    def entries(self) -> dict[str, Any]:
+        """Entries of the manifest beside ports and options: what a program must know of a core."""
+        times, velocity, frac_bits = self.times, self.velocity, self.velocity.frac_bits
+        found = {
+            "method": self.method,
+            "clock_hz": self.timing.clock_hz,
+            "tick_cycles": self.timing.tick_cycles,
+            "max_ticks": self.timing.max_ticks,
+            "stalled_after_ticks": times.stalled_after_ticks,
+            "counts_per_rev": self.encoder.counts_per_rev,
+            "decoding": self.encoder.decoding,
+            "velocity": {
+                "width": self.velocity.width,
+                "frac_bits": frac_bits,
+                "unit": self.unit,
+                "rad_per_s_per_lsb": velocity.rad_per_s_per_lsb,
+                "full_scale": velocity.full_scale * 2.0**-frac_bits,
+                "full_scale_rad_per_s": velocity.full_scale * velocity.rad_per_s_per_lsb,
+            },
+            **self.method_entries,
+            "stream": stream_entry(self.stream, self, self.ports) if self.stream else None,
+            "max_time_cycles": times.longest,
+            "min_time_cycles": times.shortest,
+            "bounds": {"none": self.velocity.shown_absent} if self.bounds else None,
+            "interval_unit_cycles": times.interval_unit,
+            "latency_cycles": self.latency_entries,
+            "recovery_cycles": self.recovery.clocks,
+            "external_tick_cycles": (
+                {"min": times.min_tick_cycles, "max": self.tick.longest} if self.external_tick else None
+            ),
+        }
+        return {name: entry for name, entry in found.items() if entry is not None}

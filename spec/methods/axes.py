@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 from tachometry.spec.core.tachometer import TachometerSpec
@@ -127,6 +127,8 @@ class AxesSpec:
     tachometer: STachometer | TrackTachometer
     axes: int
     parallel: bool = False
+
+    kind: ClassVar[Literal["axes"]] = "axes"
 
     def __post_init__(self) -> None:
         if not 1 <= self.axes <= MAX_AXES:
@@ -350,6 +352,33 @@ class AxesSpec:
         source = {"reciprocal_source": "table"} if isinstance(self.axis, SAxis) else {}
         found = source | {"axes": self.axes, "parallel": self.parallel}
         return {**self.tachometer.parameters, **found}
+
+    @property
+    def entries(self) -> dict[str, Any]:
+        """Entries of the manifest, see `TachometerSpec.entries`."""
+        alone, axis = self.tachometer, self.axis
+        of_one, times = alone.entries, axis.times
+        external = {"min": times.min_tick_cycles * self.slots, "max": axis.tick.longest * self.slots}
+        of_velocity = {
+            "width": axis.velocity.width,
+            "full_scale": axis.velocity.full_scale * 2.0**-axis.velocity.frac_bits,
+            "full_scale_rad_per_s": axis.velocity.full_scale * axis.velocity.rad_per_s_per_lsb,
+        }
+        return of_one | {
+            "velocity": of_one["velocity"] | of_velocity,
+            **axis.method_entries,
+            **({} if self.recovery.clocks is None else {"recovery_cycles": self.recovery.clocks}),
+            **({"external_tick_cycles": external} if alone.external_tick else {}),
+            "axes": {
+                "axes": self.axes,
+                "parallel": self.parallel,
+                "round_cycles": self.slots,
+                "turn_cycles": self.turn_cycles,
+                "machines": self.plan.machines,
+                "first_tick": self.tick_clock(0, 0),
+            },
+            "latency_cycles": self.latency_entries,
+        }
 
 
 CoreSpec = TachometerSpec | AxesSpec

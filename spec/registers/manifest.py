@@ -6,7 +6,6 @@ from typing import Any
 from tachometry.spec.control import AnySpec
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import Port
-from tachometry.spec.registers.entries import entries_of
 
 _OF_PORTS = ("name", "direction", "width", "signed")
 _KEYWORDS = frozenset(
@@ -74,7 +73,7 @@ def manifest(spec: AnySpec, name: str = "tachometer") -> dict[str, Any]:
         raise ParameterError("name", f"must not be that of a port, which {name!r} is")
     return {
         "module": check_module_name(name),
-        **entries_of(spec),
+        **spec.entries,
         "ports": [described_port(port) for port in spec.ports],
         "parameters": spec.parameters,
         "options": spec.options,
