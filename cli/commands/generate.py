@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from functools import singledispatch
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +29,7 @@ from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.studies.estimate import Estimate
 from tachometry.sim.testbench.check import left_files
 from tachometry.sim.testbench.vectors import cocotb_bench
-from tachometry.spec import AxesSpec
-from tachometry.spec.control import AnySpec, LoopSpec
+from tachometry.spec.control import AnySpec
 from tachometry.spec.registers.buses import Bus, bus_of
 from tachometry.spec.registers.manifest import check_module_name
 
@@ -81,7 +79,7 @@ class Asked:
         if self.testbench is None and self.record is not None:
             raise ValueError("--motion must be given together with --testbench")
         if self.testbench is not None and self.spec is not self.spec.tachometer and self.bus != "none":
-            whole = "--axes" if isinstance(self.spec, AxesSpec) else "--loop"
+            whole = "--axes" if self.spec.kind == "axes" else "--loop"
             raise ValueError(f"--testbench must not be given together with {whole} and --bus: it drives no bus")
 
     @property
@@ -116,7 +114,7 @@ def _read(*, bus: str | None, target: str, **given: Any) -> dict[str, Any]:
     names = {field.name for field in fields(Asked)}
     asked = {name: given.pop(name) for name in names & given.keys()}
     on, spec = bus_for(target, bus), asked.pop("spec")
-    if isinstance(spec, AxesSpec) and (on != "none" or target == "rio"):
+    if spec.kind == "axes" and (on != "none" or target == "rio"):
         spec = replace(spec, parallel=True)  # registers and pins are of what is held for each axis
     return dict(asked=Asked(spec=spec, bus=on, target=target, **asked), **given)
 
@@ -218,14 +216,7 @@ def _bench(spec: AnySpec, name: str, record: Callable[..., Encoding] | None) -> 
     return cocotb_bench(spec, name, recordings)
 
 
-@singledispatch
 def _rows(spec: AnySpec, bus: Bus | None) -> list[tuple[str, str]]:
-    return core_rows(spec.tachometer, bus)
-
-
-@_rows.register
-def _(spec: AxesSpec, bus: Bus | None) -> list[tuple[str, str]]:
-    return axes_rows(spec)
-
-
-_rows.register(LoopSpec, loop_rows)
+    if spec.kind == "axes":
+        return axes_rows(spec)
+    return loop_rows(spec, bus) if spec.kind == "loop" else core_rows(spec, bus)

@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Sequence
-from functools import singledispatch
 from pathlib import Path
 
 import numpy as np
@@ -49,15 +48,11 @@ def print_simulation(simulation: Simulation, kept: Sequence[Path] = ()) -> int:
     return INTERRUPTED
 
 
-@singledispatch
 def _summary(spec: CoreSpec, axes: Sequence[Axis], mismatches: _Row) -> tuple[list[_Row], list[str]]:
     """Return rows of the table of a core, and warnings."""
-    (axis,) = axes
-    return [*capture_rows(axis), _updates(axis.run), mismatches, *_rows(axis)], _warnings(axis)
-
-
-@_summary.register
-def _(spec: AxesSpec, axes: Sequence[Axis], mismatches: _Row) -> tuple[list[_Row], list[str]]:
+    if spec.kind == "one":
+        (axis,) = axes
+        return [*capture_rows(axis), _updates(axis.run), mismatches, *_rows(axis)], _warnings(axis)
     warnings = [_merged_looks(spec, number, axis.n_merged) for number, axis in enumerate(axes) if axis.n_merged]
     warnings += [f"axis {number}: {warning}" for number, axis in enumerate(axes) for warning in _of_capture(axis)]
     rows = [mismatches, *((f"axis {number}", _line(axis)) for number, axis in enumerate(axes))]

@@ -1,7 +1,5 @@
 """Templates, constraints, FuseSoC core file and smoke test lie beside the Verilog, to build it into a design."""
 
-from functools import singledispatch
-
 from tachometry.hdl.export.render import render_files
 from tachometry.spec import AxesSpec, Encoder, TachometerSpec
 from tachometry.spec.control import AnySpec
@@ -38,7 +36,7 @@ def kit(spec: AnySpec, name: str, bus: Bus | None = None) -> dict[str, str]:
         bits="" if spec.axes is None else "*",
         tick_cycles=spec.timing.tick_cycles,
         idle={**(bus.idle if bus else {}), **_first_levels(spec)},
-        **_bench(spec),
+        **(_axes_bench(spec) if spec.kind == "axes" else _bench(spec.tachometer)),
     )
 
 
@@ -95,10 +93,8 @@ def _wired(spec: TachometerSpec, levels: dict[str, str]) -> dict[str, str]:
     return wired | {f"{line}_n": f"~({wired[line]})" for line in spec.front_end.complemented if line in wired}
 
 
-@singledispatch
-def _bench(spec: AnySpec) -> dict[str, object]:
-    """Return how the smoke test turns one encoder, or many, and the position that must follow."""
-    tacho = spec.tachometer
+def _bench(tacho: TachometerSpec) -> dict[str, object]:
+    """Return how the smoke test turns an encoder, and the position that must follow."""
     encoder = tacho.encoder
     hold = max(_hold(tacho), min(2 * (tacho.filter_clocks + 8), tacho.filter_clocks + 300))
     turns = _turns(hold)
@@ -124,9 +120,8 @@ def _bench(spec: AnySpec) -> dict[str, object]:
     }
 
 
-@_bench.register
-def _(tacho: AxesSpec) -> dict[str, object]:
-    # Every other one goes backward, its lines exchanged.
+def _axes_bench(tacho: AxesSpec) -> dict[str, object]:
+    """Return the same for many encoders: every other one goes backward, its lines exchanged."""
     encoder = tacho.axis.encoder
     # Before the first edge there are rounds in which no axis is counted.
     hold = max(_hold(tacho), (4 + tacho.axis.filter_clocks) * tacho.slots)

@@ -1,6 +1,5 @@
 """A motion that visits what every core must survive."""
 
-from functools import singledispatch
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ from tachometry.sim.encoder.imperfections import pulsed
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.axes import AxesTrace, Trace
 from tachometry.sim.signals.recording import PinTrace, merged, quadrature
-from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
+from tachometry.spec import CoreSpec, TachometerSpec
 from tachometry.spec.core.sensors import packed_levels
 from tachometry.spec.core.stream import READY
 
@@ -126,14 +125,9 @@ def _listed(spec: TachometerSpec, trace: PinTrace, went: NDArray[np.float64], se
     return PinTrace.of_lines(clock, trace.n_clocks, lines)
 
 
-@singledispatch
 def stress_of(spec: CoreSpec, seed: int, n_edges: int = 300) -> Trace:
     """Return the same for many axes as well, each of which has a motion of its own."""
-    return stress(spec.tachometer, seed, n_edges)
-
-
-@stress_of.register
-def _(spec: AxesSpec, seed: int, n_edges: int = 300) -> Trace:
+    axes = spec.axes or 1
     # Of different lengths, so that not all axes stand when one does.
-    each = [stress(spec.tachometer, seed * spec.axes + axis, n_edges + 7 * axis) for axis in range(spec.axes)]
-    return AxesTrace.of(each)
+    each = [stress(spec.tachometer, seed * axes + axis, n_edges + 7 * axis) for axis in range(axes)]
+    return each[0] if spec.axes is None else AxesTrace.of(each)

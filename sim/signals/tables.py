@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import singledispatch
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from tachometry.sim.signals.axes import of_axis
 from tachometry.sim.signals.files import rows_of, write_csv
 from tachometry.sim.signals.run import Run, Table
-from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
+from tachometry.spec import CoreSpec, TachometerSpec
 from tachometry.spec.language.port import TICK, UPDATE
 
 
@@ -86,13 +85,9 @@ def write_trace(path: Path, spec: CoreSpec, run: Run) -> None:
     write_csv(path, tuple(columns), rows_of(list(columns.values())))
 
 
-@singledispatch
 def _columns(spec: CoreSpec, run: Run) -> dict[str, NDArray[Any]]:
-    return _of_updates(spec.tachometer, run, spec.latency.tick_to_velocity)
-
-
-@_columns.register
-def _(spec: AxesSpec, run: Run) -> dict[str, NDArray[Any]]:
+    if spec.kind == "one":
+        return _of_updates(spec, run, spec.latency.tick_to_velocity)
     each = [_of_updates(spec.tachometer, of_axis(spec, run, axis), 0) for axis in range(spec.axes)]
     axis = np.repeat(np.arange(spec.axes), [len(found["clock"]) for found in each])
     together = {name: np.concatenate([found[name] for found in each]) for name in each[0]}

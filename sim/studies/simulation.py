@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import singledispatch
 from pathlib import Path
 
 import numpy as np
@@ -114,7 +113,8 @@ def simulate(
     ValueError
         If the recordings do not last a tick, or have too many.
     """
-    trace = _placed(spec, recordings)
+    trace: Trace
+    trace = AxesTrace.placed(recordings, spec) if spec.kind == "axes" else PinTrace.of(recordings[0], spec)
     if pulses is not None and isinstance(trace, PinTrace):
         for name, rises in pulses(spec.tachometer).items():
             if len(rises) and not 0 < rises[0] <= rises[-1] < trace.n_clocks:  # in clock 0 it would be high, not rise
@@ -151,20 +151,11 @@ def _curves(axes: Sequence[Axis]) -> dict[str, Curve]:
     return found
 
 
-@singledispatch
-def _placed(spec: CoreSpec, recordings: Sequence[Recording]) -> Trace:
-    return PinTrace.of(recordings[0], spec.tachometer)
-
-
-@_placed.register
-def _(spec: AxesSpec, recordings: Sequence[Recording]) -> Trace:
-    return AxesTrace.placed(recordings, spec)
-
-
-@singledispatch
 def _axis(core: CoreSpec, run: Run, number: int, recording: Recording, truth: Encoding | None) -> Axis:
-    """Return what came of an axis."""
-    spec = core.tachometer
+    """Return the results of an axis."""
+    if core.kind == "axes":
+        return _axis_of_many(core, run, number, recording, truth)
+    spec = core
     counts_in = error = None
     held = held_velocity(spec, run)
     if truth is not None:
@@ -189,8 +180,7 @@ def _sampled(clock: int, clock_hz: int) -> float:
     return instant
 
 
-@_axis.register
-def _(spec: AxesSpec, run: Run, axis: int, recording: Recording, truth: Encoding | None) -> Axis:
+def _axis_of_many(spec: AxesSpec, run: Run, axis: int, recording: Recording, truth: Encoding | None) -> Axis:
     own, alone, counts_in, error = of_axis(spec, run, axis), spec.tachometer, None, None
     held = held_from(own.ticks.clock, own.updates, alone)
     if truth is not None and len(own.ticks):

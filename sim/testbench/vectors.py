@@ -3,7 +3,6 @@
 import json
 import math
 from collections.abc import Sequence
-from functools import singledispatch
 from importlib.resources import files
 from typing import Any
 
@@ -19,8 +18,8 @@ from tachometry.sim.signals.recording import PinTrace, Recording, check_ticks
 from tachometry.sim.signals.run import Run
 from tachometry.sim.testbench.loop_inputs import changes as loop_changes
 from tachometry.sim.testbench.loop_inputs import loop_inputs
-from tachometry.spec import AxesSpec, TachometerSpec
-from tachometry.spec.control import AnySpec, LoopSpec
+from tachometry.spec import TachometerSpec
+from tachometry.spec.control import AnySpec
 from tachometry.spec.core.compare import LIST_PINS
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.provenance import LICENSE, generator, notice
@@ -88,34 +87,22 @@ def _unarmed(trace: PinTrace) -> dict[str, NDArray[np.uint8]]:
     return {name: np.zeros_like(trace.lines[name]) for name in _ACTS if name in trace.lines}
 
 
-@singledispatch
 def _put(core: AnySpec, traces: Sequence[PinTrace]) -> tuple[list[str], list[NDArray[Any]], Run]:
     """Return names of the inputs, the clocks of changes with their values, and what the core must show."""
+    if core.kind == "axes":
+        pins = AxesTrace.of(traces)
+        return [*pins.lines], [pins.clock, *pins.lines.values()], golden.run(core, pins)
     (trace,) = traces
+    if core.kind == "loop":
+        inputs, run = loop_inputs(core, trace)
+        return [*trace.lines, *inputs], [*loop_changes(core, trace, inputs)], run
     lines = {name: line for name, line in trace.lines.items() if name in {pin.name for pin in core.ports.pins}}
-    return [*lines], [trace.clock, *lines.values()], golden.run(core.tachometer, trace)
+    return [*lines], [trace.clock, *lines.values()], golden.run(core, trace)
 
 
-@_put.register
-def _(core: AxesSpec, traces: Sequence[PinTrace]) -> tuple[list[str], list[NDArray[Any]], Run]:
-    trace = AxesTrace.of(traces)
-    return [*trace.lines], [trace.clock, *trace.lines.values()], golden.run(core, trace)
-
-
-@_put.register
-def _(core: LoopSpec, traces: Sequence[PinTrace]) -> tuple[list[str], list[NDArray[Any]], Run]:
-    (trace,) = traces
-    inputs, run = loop_inputs(core, trace)
-    return [*trace.lines, *inputs], [*loop_changes(core, trace, inputs)], run
-
-
-@singledispatch
 def _usual(core: AnySpec) -> list[Recording]:
-    return [usual_motion(core.tachometer)]
-
-
-@_usual.register
-def _(core: AxesSpec) -> list[Recording]:
+    if core.kind != "axes":
+        return [usual_motion(core.tachometer)]
     return [usual_motion(core.axis, seed=axis + 1, most=_MOVING // core.slots) for axis in range(core.axes)]
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import Port
@@ -27,6 +28,10 @@ class AxesMap(RegisterMap):
             raise ParameterError(
                 "parallel", "must be given together with --axes and --bus: registers show what is held for each axis"
             )
+
+    @classmethod
+    def of(cls, core: AxesSpec) -> Self:
+        return cls(core.tachometer, core)
 
     @property
     def core(self) -> AxesSpec:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property, singledispatch
+from functools import cached_property
 from typing import Any
 
 from tachometry.spec.control import LoopSpec
@@ -125,15 +125,12 @@ class DemoLoopMap(LoopMap, DemoMap):
         yield from DemoMap._added(self)
 
 
-@singledispatch
+_DEMOS: dict[str, type[DemoMap]] = {"one": DemoMap, "loop": DemoLoopMap}
+
+
 def demo_map(spec: TachometerSpec | LoopSpec) -> DemoMap:
     """Return all registers of the demo of a core; ParameterError if the gains of a loop are fixed."""
-    return DemoMap(spec.tachometer)
-
-
-@demo_map.register
-def _(spec: LoopSpec) -> DemoMap:
-    return DemoLoopMap(spec.tachometer, spec)
+    return _DEMOS[spec.kind].of(spec)
 
 
 def demo_ports(registers: DemoMap, bus: Bus) -> tuple[Port, ...]:

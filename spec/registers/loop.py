@@ -2,14 +2,14 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property, singledispatch
+from functools import cached_property
+from typing import Self
 
 from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.control.form import GAINS
 from tachometry.spec.control.ports import CONTROL, CURRENT, GAIN_PORTS, loop_entries
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import Port
-from tachometry.spec.methods.axes import AxesSpec
 from tachometry.spec.registers.axes import AxesMap
 from tachometry.spec.registers.field import WORD, Draft, Field
 from tachometry.spec.registers.map import RegisterMap
@@ -33,6 +33,10 @@ class LoopMap(RegisterMap):
     def __post_init__(self) -> None:
         if self.loop.gains != "inputs":
             raise ParameterError("gains", "must be inputs with a bus, which makes them registers, not fixed")
+
+    @classmethod
+    def of(cls, core: LoopSpec) -> Self:
+        return cls(core.tachometer, core)
 
     @property
     def core(self) -> LoopSpec:
@@ -122,17 +126,9 @@ def _ranged(field: Field) -> Field:
     return replace(field, least=-most - 1 if field.signed else 0, most=most)
 
 
-@singledispatch
+_MAPS: dict[str, type[RegisterMap]] = {"one": RegisterMap, "axes": AxesMap, "loop": LoopMap}
+
+
 def registers_of(spec: AnySpec) -> RegisterMap:
     """Return all registers of a core; ParameterError if it can have none."""
-    return RegisterMap(spec.tachometer)
-
-
-@registers_of.register
-def _(spec: AxesSpec) -> RegisterMap:
-    return AxesMap(spec.tachometer, spec)
-
-
-@registers_of.register
-def _(spec: LoopSpec) -> RegisterMap:
-    return LoopMap(spec.tachometer, spec)
+    return _MAPS[spec.kind].of(spec)

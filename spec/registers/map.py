@@ -18,7 +18,7 @@ import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 from tachometry.spec.control import AnySpec
 from tachometry.spec.core.probe import packed_edges
@@ -47,6 +47,11 @@ class RegisterMap:
     spec: TachometerSpec
     # there is an output `irq`, with registers of its own, which follow all others
     irq: bool = field(default=False, kw_only=True)
+
+    @classmethod
+    def of(cls, core: Any) -> Self:
+        """Return the registers of a core of the kind that the class is for."""
+        return cls(core.tachometer)
 
     @cached_property
     def registers(self) -> tuple[Register, ...]:

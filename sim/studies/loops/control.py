@@ -182,15 +182,7 @@ def mean(outcomes: Sequence[Outcome]) -> Outcome:
 @functools.lru_cache(maxsize=32)
 def simulation_of(spec: TachometerSpec | LoopSpec) -> Any:
     """Return the compiled simulation of a core: a `GateLoop` if it has its loop in gates, else a `LoopSimulation`."""
-    return _simulation_of(spec)
-
-
-@functools.singledispatch
-def _simulation_of(spec: TachometerSpec | LoopSpec) -> Any:
-    return LoopSimulation(spec.tachometer)
-
-
-_simulation_of.register(LoopSpec, GateLoop)
+    return GateLoop(spec) if spec.kind == "loop" else LoopSimulation(spec)
 
 
 def in_gates(setting: Setting) -> Setting:
