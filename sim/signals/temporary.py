@@ -173,7 +173,9 @@ def run_tool(
             )
         _running.update(started)
         _limit(started[0].pid, memory, seconds)
-        out, err = started[0].communicate(text, seconds if seconds and sys.platform != "linux" else _LONGEST)
+        out, err = started[0].communicate(
+            text, seconds if seconds is not None and sys.platform != "linux" else _LONGEST
+        )
         if sys.platform == "linux" and started[0].returncode == -signal.SIGXCPU:
             raise subprocess.TimeoutExpired(command, seconds or _LONGEST)
     except BaseException:

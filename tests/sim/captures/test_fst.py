@@ -101,21 +101,30 @@ def test_a_plain_waveform_of_this_name_is_refused(folder: Path) -> None:
     [
         ("_MOST_NAMES", 10, "10 characters for its names"),
         ("_MOST_CHANGES", 100, "100 characters for its changes"),
-        ("_LONGEST", 0.0, "0 s"),
     ],
 )
 def test_a_file_beyond_a_limit_is_refused(
-    limit: str, most: float, said: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+    limit: str, most: int, said: str, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(fst, limit, most)
     with pytest.raises(CaptureError, match=rf"w\.fst needs more than {said}: dump only the lines of the encoder, or "):
         read_capture(folder / "w.fst")
 
 
-def test_a_reader_that_takes_too_much_memory_is_ended(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    greedy = [sys.executable, "-c", "import sys; sys.stdin.read(); bytearray(1 << 32)"]
+@pytest.mark.parametrize(
+    ("work", "said"),
+    [
+        ("sys.stdin.read(); bytearray(1 << 32)", f"{2 << 30} bytes of memory"),
+        ("all(True for _ in iter(int, 1))", "1 s"),
+    ],
+)
+def test_a_reader_that_takes_too_much_is_ended(
+    work: str, said: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    greedy = [sys.executable, "-c", f"import sys; {work}"]
+    monkeypatch.setattr(fst, "_LONGEST", 1)
     monkeypatch.setattr(fst, "run_tool", lambda command, **limits: run_tool(greedy, **limits))
-    with pytest.raises(CaptureError, match=rf"w\.fst needs more than {2 << 30} bytes of memory: dump only "):
+    with pytest.raises(CaptureError, match=rf"w\.fst needs more than {said}: dump only "):
         read_capture(folder / "w.fst")
 
 
