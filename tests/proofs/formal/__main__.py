@@ -53,7 +53,7 @@ def _row(proof: Proof, result: Result, refuted: list[tuple[Mutant, Result]]) -> 
 
 
 def main(words: list[str]) -> bool:
-    """Tell whether all was as it should be; prints the table."""
+    """Return whether all was as it should be; prints the table."""
     given = arguments(__doc__ or "", "PROOF").parse_args(words)
     quick = given.names == ["quick"]
     names = chosen("proof", QUICK if quick else given.names, (proof.name for proof in PROOFS))
