@@ -3,7 +3,8 @@
 import ast
 import re
 import sys
-from collections.abc import Collection
+from collections import Counter
+from collections.abc import Callable, Collection
 from functools import cache
 from pathlib import Path
 
@@ -100,7 +101,7 @@ def test_every_folder_is_a_room() -> None:
 
 
 def _is_in(room: str, allowed: str, asking: str) -> bool:
-    """Tell whether a room is an allowed one or within it; within its own layer each room is allowed by its name."""
+    """Return whether a room is an allowed one or within it; within its own layer each room is allowed by its name."""
     own = asking.split("/")[0] == allowed
     return room == allowed or (room.startswith(f"{allowed}/") and (not own or allowed == "cli"))
 
@@ -237,3 +238,83 @@ def test_docstrings_begin_with_a_sentence() -> None:
                 words = (ast.get_docstring(node) or "").split()
                 assert words[:1] not in (["What"], ["See"]), (file, node)
                 assert words[:2] != ["The", "same"], (file, node)
+
+
+PRODUCT = (*LAYERS, "package")
+SPECS = {"TachometerSpec", "AxesSpec", "LoopSpec"}
+
+
+def sources(*folders: str) -> list[Path]:
+    """Return the Python files below these folders."""
+    return [file for folder in folders for file in sorted((ROOT / folder).rglob("*.py"))]
+
+
+def lines(*folders: str) -> Counter[str]:
+    """Return the lines of Python below these folders, by file."""
+    return Counter({named(file): len(file.read_text(encoding="utf-8").splitlines()) for file in sources(*folders)})
+
+
+def named(file: Path) -> str:
+    return file.relative_to(ROOT).as_posix()
+
+
+def calls(node: ast.AST, *names: str) -> bool:
+    return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in names
+
+
+def every(found: Callable[[ast.AST], bool], *folders: str) -> Counter[str]:
+    """Return how many nodes of the syntax trees below these folders are found, by file."""
+    return Counter(named(file) for file in sources(*folders) for node in nodes(file) if found(node))
+
+
+def is_long(node: ast.AST) -> bool:
+    """Return whether it is a function of more than 40 lines, with its signature and docstring."""
+    functions = ast.FunctionDef | ast.AsyncFunctionDef
+    return isinstance(node, functions) and (node.end_lineno or 0) - node.lineno >= 40
+
+
+def has_many_parameters(node: ast.AST) -> bool:
+    """Return whether it is a function with more than 6 parameters, `self` and `cls` included."""
+    if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+        return False
+    every_one = node.args
+    return len([*every_one.posonlyargs, *every_one.args, *every_one.kwonlyargs]) > 6
+
+
+def tells_kinds_apart(node: ast.AST) -> bool:
+    """Return whether it asks a core for its kind: by `isinstance`, by `kind`, or as a function chosen by the type."""
+    if isinstance(node, ast.FunctionDef):
+        return any("singledispatch" in ast.unparse(one) for one in node.decorator_list)
+    if isinstance(node, ast.Compare):
+        return isinstance(node.left, ast.Attribute) and node.left.attr == "kind"
+    return calls(node, "isinstance") and any(isinstance(one, ast.Name) and one.id in SPECS for one in ast.walk(node))
+
+
+def has_a_broken_docstring(node: ast.AST) -> bool:
+    """Return whether a docstring has "Return" before a sentence, or "Tell"."""
+    if not isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+        return False
+    broken = r"Return \w+ (is|are|may|has|counts)\b|Return (of|in)\b|Tells?\b"
+    return re.match(broken, ast.get_docstring(node) or "") is not None
+
+
+# What may only fall, with the rule by which it is counted. A change that brings a capability raises lines alone.
+CEILING: dict[str, tuple[int, Callable[[], Counter[str]]]] = {
+    "lines of Python of the product": (46930, lambda: lines(*PRODUCT)),
+    "lines of Python of the tests": (44000, lambda: lines("tests")),
+    "lines of Python of the benchmarks": (3335, lambda: lines("bench")),
+    "functions over 40 lines": (46, lambda: every(is_long, *PRODUCT)),
+    "functions with more than 6 parameters": (31, lambda: every(has_many_parameters, *PRODUCT)),
+    "getattr and hasattr in hdl": (39, lambda: every(lambda node: calls(node, "getattr", "hasattr"), "hdl")),
+    "places that tell kinds of core apart": (22, lambda: every(tells_kinds_apart, *PRODUCT)),
+    "broken docstrings": (82, lambda: every(has_a_broken_docstring, *PRODUCT, "bench", "tests")),
+}
+
+
+@pytest.mark.parametrize("what", CEILING)
+def test_it_only_falls(what: str) -> None:
+    """When a number has fallen by more than 1 %, write the new one down."""
+    ceiling, count = CEILING[what]
+    found = count()
+    assert found.total() <= ceiling, f"{found.total()} {what}, at most {ceiling}: {dict(found.most_common(20))}"
+    assert found.total() >= 0.99 * ceiling, f"{found.total()} {what}: lower the ceiling, which is {ceiling}"
