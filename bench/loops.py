@@ -81,7 +81,7 @@ def setting(kind: Kind, kv: float, seconds: float, encoder: VirtualEncoder, deco
 
 
 def is_usable(outcome: Outcome) -> bool:
-    """Tell whether nothing is heard or swings: the current stays below its limit, the speed close."""
+    """Return whether nothing is heard or swings: the current stays below its limit, the speed close."""
     return outcome.sound <= SOUND and outcome.limited == 0 and outcome.largest <= DEVIATION
 
 

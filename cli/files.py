@@ -53,7 +53,7 @@ class Outputs:
         return self._staging[target.parent].folder / _NEW / target.name
 
     def get(self, what: str) -> Path | None:
-        """Tell where to write the output `what` for now, or None if it is not wanted."""
+        """Return where to write the output `what` for now, or None if it is not wanted."""
         return self[what] if what in self._targets else None
 
     def __enter__(self) -> Self:

@@ -144,7 +144,7 @@ def _own_folder() -> Path:
 
 
 def cache_folder() -> Path:
-    """Tell where builds are kept: the environment variable TACHOMETRY_CACHE, or the user's cache; it is made if need
+    """Return where builds are kept: the environment variable TACHOMETRY_CACHE, or the user's cache; it is made if need
     be.
 
     Where there is none that can be written, a folder that ends with this process. It has code that this process runs:

@@ -62,7 +62,7 @@ class Client:
         return self.registers.snapshot([self._word(one["name"]) for one in self.registers.captured])
 
     def counters(self) -> dict[str, int]:
-        """Tell how often something happened since reset or `clear`, by the names of the counters; 255: or more."""
+        """Return how often something happened since reset or `clear`, by the names of the counters; 255: or more."""
         return self.registers.fields("COUNTERS", self._word("COUNTERS"))
 
     def clear(self) -> None:

@@ -66,7 +66,7 @@ class DemoBoard:
         return [field for register in SETTINGS for field in self._fields(register)]
 
     def changed(self) -> int:
-        """Tell when a setting was written last, in clocks since the restart."""
+        """Return when a setting was written last, in clocks since the restart."""
         return self.link.read(self.registers.offset("CHANGED"))
 
     def stream(self, ticks: int) -> None:

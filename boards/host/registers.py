@@ -93,7 +93,7 @@ class HostRegisters:
         return Snapshot(values, self._flags, self._rad_per_s_per_lsb)
 
     def possible(self, words: Sequence[int]) -> bool:
-        """Tell whether the captured registers can show these words: bits that no port has are as they must be."""
+        """Return whether the captured registers can show these words: bits that no port has are as they must be."""
         for word, (unused, sign) in zip(words, self._unused, strict=True):
             if word & unused != (unused if sign and word & sign else 0):
                 return False

@@ -84,7 +84,7 @@ def _source(spec: TachometerSpec, text: str) -> Fields:
 
 
 def _error(name: str) -> Callable[[TachometerSpec, str], Fields]:
-    """Tell how late an edge is, as a part of a period of the line."""
+    """Return how late an edge is, as a part of a period of the line."""
     field = name.replace("-", "_")
 
     def read(spec: TachometerSpec, text: str) -> Fields:
@@ -118,7 +118,7 @@ def _glitches(spec: TachometerSpec, text: str) -> Fields:
 
 
 def _wires(name: str) -> Callable[[TachometerSpec, str], Fields]:
-    """Tell which lines are at fault."""
+    """Return which lines are at fault."""
 
     def read(spec: TachometerSpec, text: str) -> Fields:
         words = {word.strip() for word in text.lower().split(",")} - {"none"}

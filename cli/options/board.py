@@ -28,7 +28,7 @@ def board_argument(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def default_folder(board: Board) -> Path:
-    """Tell where files for a board are, if nothing else is said."""
+    """Return where files for a board are, if nothing else is said."""
     return Path("build") / board.name
 
 

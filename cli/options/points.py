@@ -58,7 +58,7 @@ def _listed(methods: str) -> tuple[Sequence[Listed], bool]:
 
 
 def _has_option(settings: Settings, method: str, name: str) -> bool:
-    """Tell whether an option is for a method."""
+    """Return whether an option is for a method."""
     if method == AUTO:
         return True
     own_ticks = METHODS[method].facts.own_ticks

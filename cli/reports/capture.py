@@ -48,12 +48,12 @@ def index_distance(axis: Axis) -> str:
 
 
 def axis_warnings(axis: Axis) -> list[str]:
-    """Tell what of the capture of an axis contradicts itself or the options."""
+    """Return what of the capture of an axis contradicts itself or the options."""
     return capture_warnings(axis.recording) + _index(axis) + _index_place(axis) + _index_missed(axis)
 
 
 def capture_warnings(recording: Recording) -> list[str]:
-    """Tell what of a capture contradicts itself."""
+    """Return what of a capture contradicts itself."""
     warnings = _still(recording.source)
     if together := recording.n_together:
         warnings.append(
@@ -64,7 +64,7 @@ def capture_warnings(recording: Recording) -> list[str]:
 
 
 def _still(source: Source | None) -> list[str]:
-    """Tell which lines never change, and which channels do instead."""
+    """Return which lines never change, and which channels do instead."""
     if source is None or not source.still:
         return []
     names = [source.lines[line] for line in source.still]
@@ -78,7 +78,7 @@ def _do(names: tuple[str, ...]) -> str:
 
 
 def _index(axis: Axis) -> list[str]:
-    """Tell if the index comes at another distance than once a turn; to and fro over one index is no distance."""
+    """Return whether the index comes at another distance than once a turn; to and fro over one index is no distance."""
     encoder, distances = axis.spec.encoder, np.abs(axis.index_distances)
     turn, lines = encoder.counts_per_rev, encoder.pulses_per_rev
     distances = distances[distances > min(encoder.decoding, turn / 2)]
@@ -94,7 +94,7 @@ def _index(axis: Axis) -> list[str]:
 
 
 def _index_place(axis: Axis) -> list[str]:
-    """Tell if the index is at other counts forward than backward, as where it is wide or low."""
+    """Return whether the index is at other counts forward than backward, as where it is wide or low."""
     near = np.abs(axis.index_distances)
     near = near[(near > 0) & (near <= 2 * axis.spec.encoder.decoding) & (near < axis.spec.encoder.counts_per_rev / 2)]
     recording = axis.recording
@@ -115,7 +115,7 @@ def _index_place(axis: Axis) -> list[str]:
 
 
 def _index_missed(axis: Axis) -> list[str]:
-    """Tell if Z comes and goes without the state in which the index is taken, and in which state it mostly is."""
+    """Return whether Z comes without the state in which the index is taken, and in which state it mostly is."""
     if not (times := len(axis.run.tables.get(MISSED, ()))) or (usual := axis.state_of_index) is None:
         return []
     return [

@@ -145,7 +145,7 @@ def typed_unit(spec: TachometerSpec) -> SpeedUnit:
 
 
 def registers_row(spec: AnySpec, bus: Bus) -> tuple[str, str]:
-    """Tell how many registers a core has on a bus."""
+    """Return how many registers a core has on a bus."""
     registers = registers_on(spec, bus)
     number = len(registers.registers)
     return "registers", f"{number} of {WORD} bits on {bus.name}, configuration 0x{registers.configuration:08x}"

@@ -77,7 +77,7 @@ def merged_edges(n_merged: int) -> list[str]:
 
 
 def _warnings(axis: Axis) -> list[str]:
-    """Tell why the core cannot have counted what the shaft did."""
+    """Return why the core cannot have counted what the shaft did."""
     warnings = merged_edges(axis.n_merged)
     warnings += _of_capture(axis)
     if axis.difference:

@@ -140,7 +140,7 @@ class _Console(Console):
 
 
 def stdout_console() -> Console:
-    """Tell where to print: as wide as the terminal, or without breaking a line if there is none."""
+    """Return where to print: as wide as the terminal, or without breaking a line if there is none."""
     return _Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH, highlight=False)
 
 

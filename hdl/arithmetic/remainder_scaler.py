@@ -67,7 +67,7 @@ class RemainderScaler(wiring.Component):
         )
 
     def _up(self, doubled: Value, m: Value) -> Value:
-        """Tell whether ⌊N·R/m⌋ must be increased by one; `doubled` is twice its remainder, less m."""
+        """Return whether ⌊N·R/m⌋ must be increased by one; `doubled` is twice its remainder, less m."""
         nearest = ~doubled[-1]
         return (nearest, doubled + m != 0, Const(0))[self._towards]
 

@@ -67,14 +67,14 @@ def _bit_held(bit: Value, changed: Signal, sign: Signal, limit: int, place: int)
 
 
 def _beyond(value: Signal, limit: int) -> Value:
-    """Tell whether |value| is greater than `limit`."""
+    """Return whether |value| is greater than `limit`."""
     negative = value[-1]
     # value ^ negative is |value|, or one less if it is negative; then equal is beyond, too.
     return _exceeds(value[:-1] ^ negative.replicate(len(value) - 1), limit, negative)
 
 
 def _exceeds(size: Value, limit: int, equal: Value) -> Value:
-    """Tell whether size > limit, or `equal` if it is the same, by gates of few bits.
+    """Return whether size > limit, or `equal` if it is the same, by gates of few bits.
 
     A carry chain is slower up to a dozen bits.
     """

@@ -232,7 +232,7 @@ class Tachometer(wiring.Component):
             m.d.comb += self.pulse_counter.beyond.eq(datapath.beyond)
 
     def _rest(self, m: Module) -> None:
-        """Tell whether the shaft rests."""
+        """Return whether the shaft rests."""
         if isinstance(self.datapath, OwnStandstill):
             m.d.comb += self.stalled.eq(self.datapath.stalled)
         if self.standstill is not None:
@@ -330,7 +330,7 @@ class Tachometer(wiring.Component):
         return level, ready
 
     def _watch(self, m: Module) -> None:
-        """Tell what is wrong with the encoder, if that is watched."""
+        """Return what is wrong with the encoder, if that is watched."""
         if self.watch is None:
             return
         m.submodules.watch = watch = self.watch

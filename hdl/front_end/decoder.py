@@ -64,7 +64,7 @@ class QuadratureDecoder(wiring.Component):
 def transition(
     decoding: int, level_a: Value, level_b: Value, past_a: Value, past_b: Value
 ) -> tuple[Value, Value, Value]:
-    """Tell whether a change of levels counts, whether backward, and whether both have changed, which never counts."""
+    """Return whether a change of levels counts, whether backward, and whether both have changed, which never counts."""
     change_a = level_a ^ past_a
     change_b = level_b ^ past_b
     counted = {
@@ -137,12 +137,12 @@ class SensorDecoder(wiring.Component):
 
 
 def _among(some: tuple[Levels, ...], level: Value) -> Value:
-    """Tell whether the lines have one of these levels."""
+    """Return whether the lines have one of these levels."""
     return level.matches(*map(packed_levels, some))
 
 
 def _looked_up(m: Module, pairs: set[tuple[Levels, Levels]], level: Value, past: Value) -> Value:
-    """Tell whether the levels before and these are one of the pairs."""
+    """Return whether the levels before and these are one of the pairs."""
     # No shift of a constant: Verilator 5.48 joins two of them, and cuts the longer constant.
     numbers = sorted(packed_levels(before) << len(level) | packed_levels(after) for before, after in pairs)
     found = Signal()

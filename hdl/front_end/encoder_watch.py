@@ -134,7 +134,7 @@ class EncoderWatch(wiring.Component):
         return m
 
     def _standing(self, m: Module) -> tuple[Value, Value]:
-        """Tell that a line has had so many edges without one of the other: A stands, B stands."""
+        """Detect that a line has had so many edges without one of the other: A stands, B stands."""
         past_a = Signal()
         past_b = Signal()
         of_b = Signal()
@@ -154,7 +154,7 @@ class EncoderWatch(wiring.Component):
         return last & change_b, last & change_a
 
     def _illegal(self, m: Module) -> Value:
-        """Tell that there is one illegal transition too many."""
+        """Detect that there is one illegal transition too many."""
         errors = Signal(range(self._errors + 2))
         with m.If(self.decode_error & (errors <= self._errors)):
             m.d.sync += errors.eq(errors + 1)
@@ -163,7 +163,7 @@ class EncoderWatch(wiring.Component):
         return self.decode_error & (errors == self._errors)
 
     def _index(self, m: Module) -> Value:
-        """Tell that from an index to the next in the same direction there was neither a turn nor the way back."""
+        """Detect that from an index to the next in the same direction there was neither a turn nor the way back."""
         position = self.index_position
         backward, was_backward, known, checks, same = (Signal(name=f"index_{k}") for k in ("back", "was", *"kcs"))
         origin = Signal.like(position)

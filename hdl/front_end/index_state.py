@@ -68,7 +68,7 @@ class IndexState(wiring.Component):
         return m
 
     def _pass(self, m: Module) -> None:
-        """Tell that Z has come and gone without the state."""
+        """Detect that Z has come and gone without the state."""
         was_z = Signal()
         passing = Signal()  # Z has come, and no step with Z low since it went
         met = Signal()
@@ -91,5 +91,5 @@ class IndexState(wiring.Component):
 
 
 def in_state(levels: Sequence[Signal], state: Levels) -> Signal:
-    """Tell whether lines have these levels."""
+    """Return whether lines have these levels."""
     return Cat(*levels) == packed_levels(state)

@@ -1,4 +1,4 @@
-"""Tell whether the shaft rests."""
+"""Return whether the shaft rests."""
 
 from amaranth import EnableInserter, Module, Mux, ResetInserter, Signal, signed
 from amaranth.lib import wiring

@@ -69,5 +69,5 @@ class GapTimer(wiring.Component):
 
 
 def has_reached(counter: Value, number: int) -> Value:
-    """Tell whether a counter that goes up from below is at this number for the first time: all its ones are there."""
+    """Return whether a counter that goes up from below is at this number for the first time: all its ones are there."""
     return Cat(counter[bit] for bit in range(number.bit_length()) if number >> bit & 1).all()

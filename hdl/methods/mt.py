@@ -70,7 +70,7 @@ class MTMethod(TimedDatapath):
         return ends_before, travelled, total, Mux(ends, length, timer.age)
 
     def _waits(self, m: Module, still: Signal, opens: Signal) -> Value:
-        """Tell whether the count of the next clock lies within a cycle that the window is to complete."""
+        """Return whether the count of the next clock lies within a cycle that the window is to complete."""
         # Counts since the window opened: as long as none is against the one before, their sum but for the sign.
         counted = Signal(range(self._cycle_counts))
         number = Signal.like(counted)

@@ -25,5 +25,5 @@ class TMethod(TimedDatapath):
 
 
 def _many(size: Value) -> Value:
-    """Tell whether a tick had more than one count."""
+    """Return whether a tick had more than one count."""
     return size.any() & (size != 1) & (size != -1)

@@ -50,7 +50,7 @@ class TimedDatapath(wiring.Component):
         return (IdleCounter("gap_timer.age", 1, (self._spec.form.max_periods - 2,)),)
 
     def _window(self, m: Module) -> tuple[Value, Value, Value, Value]:
-        """Tell if a measurement ends in the next clock, its distance before this count and with it, and its length.
+        """Return whether a measurement ends next, its distance before this count and with it, and its length.
 
         Distances are in counts, times the timer periods in a tick. Where nothing ends, the length is the age of the
         last count.

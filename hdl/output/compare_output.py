@@ -109,7 +109,7 @@ class CompareOutput(wiring.Component):
         return self._listed(m, reached) if self._compare.depth else self._computed(m)
 
     def _at(self, awaited: Value) -> Value:
-        """Tell whether this step leads to a position, in a direction that counts."""
+        """Return whether this step leads to a position, in a direction that counts."""
         back, direction = self.step[1], self._compare.direction
         if direction == BOTH:
             return self.step[0] & ((self.position + back)[: len(self.position)] == awaited[: len(self.position)])

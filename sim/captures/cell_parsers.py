@@ -33,7 +33,7 @@ def parse_threshold(what: str, text: str) -> Threshold:
 
 
 def is_value(cell: str) -> bool:
-    """Tell whether a cell may be in a row, and not a name."""
+    """Return whether a cell may be in a row, and not a name."""
     return bool(NUMBER.fullmatch(cell) or DATE.fullmatch(cell)) or cell.lower() in _LEVELS
 
 

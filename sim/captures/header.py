@@ -133,7 +133,7 @@ def read_header(path: Path, lines: Sequence[str], options: TextOptions, samplera
 
 
 def _are_names(table: Table, time: Channel | None) -> bool:
-    """Tell whether the names are some: one for each column, and no numbers unless the times are named beside them."""
+    """Return whether the names are some: one for each column, and no numbers unless the times are named beside them."""
     names = _names(table)
     if not names_times(names, time):
         extra = len(table.first) - len(names)

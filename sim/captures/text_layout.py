@@ -36,7 +36,7 @@ def split(line: str, separator: str) -> list[str]:
 
 
 def is_comment(line: str) -> bool:
-    """Tell whether a line is neither names nor a row."""
+    """Return whether a line is neither names nor a row."""
     text = line.strip()
     return not text or text.startswith((*COMMENTS, MARK))
 
@@ -96,13 +96,13 @@ def trimmed(cells: list[str]) -> list[str]:
 
 
 def _as_many(units: list[str], names: list[str]) -> bool:
-    """Tell whether a line has a cell for each name, and nothing where there is no name."""
+    """Return whether a line has a cell for each name, and nothing where there is no name."""
     as_many = len(units) == len(names) or len(trimmed(units)) == len(trimmed(names))
     return as_many and not any(units[len(trimmed(names)) :])
 
 
 def _is_row(cells: Sequence[str], separator: str) -> bool:
-    """Tell whether a line looks as a row does: it begins with a value, and most of its cells are values."""
+    """Return whether a line looks as a row does: it begins with a value, and most of its cells are values."""
     if separator != ",":
         cells = [cell.replace(",", ".") for cell in cells]
     values = [cell for cell in cells if is_value(cell)]
@@ -112,14 +112,14 @@ def _is_row(cells: Sequence[str], separator: str) -> bool:
 
 
 def names_times(cells: Sequence[str], time: Channel | None) -> bool:
-    """Tell whether a line names the times: as is usual, or as it was asked for."""
+    """Return whether a line names the times: as is usual, or as it was asked for."""
     wanted = time.strip().casefold() if isinstance(time, str) else None
     alike = (wanted in (name.casefold(), parted(name)[0].casefold()) for name in cells if name)
     return len(cells) > 1 and (any(rank(name) is not None for name in cells) or (bool(wanted) and any(alike)))
 
 
 def _are_units(cells: Sequence[str]) -> bool:
-    """Tell whether a line is of units; numbers may be among them, as the increment of an oscilloscope."""
+    """Return whether a line is of units; numbers may be among them, as the increment of an oscilloscope."""
     words = [bare(cell) for cell in cells if cell and not NUMBER.fullmatch(cell)]
     return bool(words) and all(unit_named(word) or word in VOLTS for word in words)
 

@@ -149,7 +149,7 @@ def _sign_change(
 def _interpolate(
     x1: FloatArray, x2: FloatArray, x3: FloatArray, f1: FloatArray, f2: FloatArray, f3: FloatArray
 ) -> FloatArray:
-    """Tell where the root is expected, as a fraction of the distance from x1 to x2."""
+    """Return where the root is expected, as a fraction of the distance from x1 to x2."""
     with np.errstate(divide="ignore", invalid="ignore"):  # of quotients that are not taken
         xi = (x1 - x2) / (x3 - x2)
         phi = (f1 - f2) / (f3 - f2)

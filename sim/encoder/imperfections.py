@@ -130,7 +130,7 @@ def lose_pulses(level: Levels, probability: float, random: np.random.PCG64) -> t
 
 
 def late_edges(level: Levels, row: Rows, probability: float, random: np.random.PCG64) -> NDArray[np.bool_]:
-    """Tell which of the rows `row`, those that change a line, come at the instant of the next of them."""
+    """Return which of the rows `row`, those that change a line, come at the instant of the next of them."""
     late = np.zeros(len(row), dtype=np.bool_)
     drawn = (uniform(random, len(level) - 1) < probability)[row[1:-1] - 1]
     drawn &= level[row[2:]] ^ level[row[:-2]] == 3  # the two edges are of different lines

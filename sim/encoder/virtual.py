@@ -227,7 +227,7 @@ class VirtualEncoder(EncoderOptions):
         return self._indexed(times, level, time, turned, duration), n_illegal, n_lost
 
     def absent(self, quarter: IntArray) -> NDArray[np.bool_]:
-        """Tell which quarters belong to teeth that are not there."""
+        """Return which quarters belong to teeth that are not there."""
         if self.missing_teeth is None:
             return np.zeros(quarter.shape, dtype=np.bool_)
         missing = Encoder(self.pulses_per_rev, sensor=self.sensor, missing_teeth=self.missing_teeth).missing

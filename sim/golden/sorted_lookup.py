@@ -53,7 +53,7 @@ def spans(begin: Ints, end: Ints) -> tuple[Ints, Ints]:
 
 
 def chain(following: Ints) -> NDArray[np.bool_]:
-    """Tell which of n places are met from place 0 on; `following[k]` > k is the next after k, n for none.
+    """Return which of n places are met from place 0 on; `following[k]` > k is the next after k, n for none.
 
     Where 64 jumps lead is found for all places at once. So only each 64th place that is met has to be followed.
     """

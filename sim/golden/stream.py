@@ -26,7 +26,7 @@ def _events(spec: TachometerSpec, steps: Steps, tables: Mapping[str, Table]) -> 
 
 
 def _free(trace: PinTrace, clock: Ints) -> NDArray[np.bool_]:
-    """Tell which of the events find that the record before is taken, or is being taken."""
+    """Return which of the events find that the record before is taken, or is being taken."""
     ready = trace.lines[READY] != 0
     found = np.ones(len(clock), dtype=np.bool_)
     if ready.all():

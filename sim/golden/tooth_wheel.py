@@ -19,7 +19,7 @@ class Teeth:
     errors: Ints  # of those that are where the gap must be
 
     def synced(self, clock: Ints) -> NDArray[np.bool_]:
-        """Tell whether the gap is known in these clocks, from those that are before them."""
+        """Return whether the gap is known in these clocks, from those that are before them."""
         latest = [np.append(-1, at)[np.searchsorted(at, clock)] for at in (self.index, self.errors)]
         known: NDArray[np.bool_] = latest[0] > latest[1]
         return known

@@ -199,5 +199,5 @@ def _texts(method: str, row: Texts) -> Texts:
 
 
 def _less(text: str) -> int:
-    """Tell how much less than the most: 20 of "most - 20"."""
+    """Return how much less than the most: 20 of "most - 20"."""
     return int(text.split()[-1])

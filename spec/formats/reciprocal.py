@@ -100,7 +100,7 @@ class Reciprocal:
         return False
 
     def is_wide(self, result_width: int) -> bool:
-        """Tell whether the sum for a result of so many bits takes two adders: the carries of one would limit the clock.
+        """Return whether the sum for a result of this width takes two adders: the carries of one limit the clock.
 
         They need an odd q, because the carry of −q would need a place of its own.
         """

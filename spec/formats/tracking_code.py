@@ -188,7 +188,7 @@ def _spaced(code: Code, apart: int, ports: int) -> Code:
 
 
 def _clash(one: Instruction, before: Instruction = Instruction(), second: Instruction = Instruction()) -> bool:
-    """Tell whether an instruction is too early for the block unit, as of the two before it; see `BlockUnit`."""
+    """Return whether an instruction is too early for the block unit, as of the two before it; see `BlockUnit`."""
     if one.start == Start.BY:
         return second.start in (Start.TIMES, Start.EXP)
     return before.start == Start.BY and (one.start == Start.TIMES or one.how == "by")
@@ -241,7 +241,7 @@ def _joined(code: list[Instruction], labels: dict[str, int]) -> Code:
 
 
 def _same(stored: str, read: str) -> bool:
-    """Tell whether two names may be of one word."""
+    """Return whether two names may be of one word."""
     return stored == read or ("o@" in stored + read and {stored, read} <= {*OFFSETS, *CHOSEN})
 
 

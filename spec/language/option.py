@@ -50,7 +50,7 @@ class ParameterError(ValueError):
 
 
 def parse_flag(what: str, text: str) -> bool:
-    """Tell whether a text says yes."""
+    """Return whether a text says yes."""
     if (word := text.strip().lower()) not in _YES | _NO:
         raise ParameterError(what, f"must be yes or no, not {text!r}")
     return word in _YES
@@ -131,7 +131,7 @@ class Option:
         return tuple("" if choice == self.default else choice for choice in self.choices)
 
     def fits_in(self, spec: Any) -> bool:
-        """Tell whether a spec, or its class, has the option."""
+        """Return whether a spec, or its class, has the option."""
         return self.fits is None or self.fits(spec)
 
     def value_in(self, spec: Any) -> Any:

@@ -180,7 +180,7 @@ def number_reader(units: Units, default: str = "") -> Callable[[str, str], float
 
 
 def ratio(unit: str, other: str) -> Fraction | None:
-    """Tell how many of `unit` one of `other` is, exactly; None if there is no exact ratio."""
+    """Return how many of `unit` one of `other` is, exactly; None if there is no exact ratio."""
     for units in (TIME, FREQUENCY, SPEED, ANGLE):
         if unit in units and other in units and (units[unit].pi is None) == (units[other].pi is None):
             return units[other].exact / units[unit].exact

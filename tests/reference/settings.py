@@ -45,7 +45,7 @@ class Settings:
         return int(str(self.words.get(name, default)).removesuffix("clk"))
 
     def flag(self, name: str, default: bool = False) -> bool:
-        """Tell whether a flag is set."""
+        """Return whether a flag is set."""
         return self.words.get(name, "yes" if default else "no") == "yes"
 
     @cached_property

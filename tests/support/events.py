@@ -104,7 +104,7 @@ def _count(found: NDArray[Any]) -> int:
 
 
 def covered_by_method(spec: TachometerSpec, run: Run) -> dict[str, int]:
-    """Tell how often each event that only the method knows happened."""
+    """Return how often each event that only the method knows happened."""
     m_e, updates = run.ticks.pulse_count, run.updates
     if isinstance(spec, MTachometer):
         n = spec.average
@@ -193,7 +193,7 @@ def covered_by_timed(spec: TimedTachometer, run: Run) -> dict[str, int]:
 
 
 def covered(spec: TachometerSpec, trace: PinTrace, run: Run) -> Counter[str]:
-    """Tell how often each event of the coverage table happened."""
+    """Return how often each event of the coverage table happened."""
     updates, stalled = run.updates, run.tables[spec.facts.stalls_with].stalled
     sign = np.sign(updates.velocity)
     found = Counter(

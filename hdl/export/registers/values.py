@@ -58,7 +58,7 @@ def written_values(registers: RegisterMap) -> tuple[Value, ...]:
 
 
 def is_whole(register: Register) -> bool:
-    """Tell whether a register has one field, of all of its bits; then the texts speak of the register alone."""
+    """Return whether a register has one field, of all of its bits; then the texts speak of the register alone."""
     return [field.width for field in register.fields] == [WORD]
 
 

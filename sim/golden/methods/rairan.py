@@ -190,7 +190,7 @@ class Model:
         )
 
     def _regime(self, value: Ints, is_nep: Bools, happens: Bools, anew: Bools) -> tuple[Bools, Ints, Bools]:
-        """Tell which events set n, n after each, and whether that is Nep1; `anew` are those that set n to 0."""
+        """Return which events set n, n after each, and whether that is Nep1; `anew` are those that set n to 0."""
         # 1 for Nep1 ends the high regime, for Ndt1 it leaves it; what else happens sets it.
         sets_regime = happens & (is_nep | (value > 1) | anew)
         regime = latest(sets_regime, (is_nep & (value > 1)).astype(np.int64), 0) == 1

@@ -152,7 +152,7 @@ def score(curve: Curve, duration: float, instants: FloatArray, true_speed: TrueS
 
 
 def _says_something(error: FloatArray, left: FloatArray, delay: float) -> bool:
-    """Tell whether a delay is more than noise or an offset, which look like one while the speed rises.
+    """Return whether a delay is more than noise or an offset, which look like one while the speed rises.
 
     It is if a quarter of the mean square error goes with it; or less, but more than twice what goes with an offset.
     """

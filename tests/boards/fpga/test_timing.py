@@ -23,7 +23,7 @@ def report(achieved: float, constraint: float = 27.0, **others: float) -> dict[s
 
 
 def refused(check: Callable[..., object], *args: object) -> str:
-    """Tell why something is refused; empty if it is not."""
+    """Return why something is refused; empty if it is not."""
     try:
         check(*args)
     except ValueError as error:

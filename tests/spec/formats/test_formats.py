@@ -26,7 +26,7 @@ def bits_of(greatest: int) -> int:
 
 
 def wrong_quotients(form: Reciprocal, q: list[int]) -> int:
-    """Tell how many N/(2^s·m) come out wrong, to the nearest, down or up; q(m) is that of the list."""
+    """Return how many N/(2^s·m) come out wrong, to the nearest, down or up; q(m) is that of the list."""
     wrong = 0
     for m, entry in enumerate(q, 1):
         for numerator in range(-form.max_numerator, form.max_numerator + 1):

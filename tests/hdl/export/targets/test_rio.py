@@ -139,7 +139,7 @@ def run(seed: int, folder: Path) -> tuple[list[int], list[dict[str, float]]]:
 
 
 def armed(frame: int) -> bool:
-    """Tell whether index-enable is set before this frame."""
+    """Return whether index-enable is set before this frame."""
     return frame % 10 in (0, 3)
 
 

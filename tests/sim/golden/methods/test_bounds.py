@@ -45,7 +45,7 @@ def true_travel(
 
 
 def displaced(spec: TachometerSpec, angle: NDArray[np.int64], seed: int) -> NDArray[np.int64]:
-    """Tell how much later than that of an ideal disc each edge comes: half because of the disc, half of the lines."""
+    """Return how much later than that of an ideal disc each edge comes: half because of the disc, half of the lines."""
     rng = np.random.default_rng(seed)
     most = int(spec.bound.edge_error * SUBCOUNTS) // 2
     disc = rng.choice([0, most], 101) if seed % 2 else rng.integers(0, most + 1, 101)

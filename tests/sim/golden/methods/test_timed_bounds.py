@@ -23,7 +23,7 @@ Ints = NDArray[np.int64]
 
 
 def edges(n: int, seed: int) -> tuple[Ints, Ints]:
-    """Tell when an ideal shaft passes edges, in 1/`INSTANTS` clocks, at most one a clock, and in which direction."""
+    """Return when an ideal shaft passes edges, in 1/`INSTANTS` clocks, at most one a clock, and in which direction."""
     rng = np.random.default_rng(seed)
     parts: list[NDArray[Any]] = []
     while sum(map(len, parts)) < n:
@@ -55,7 +55,7 @@ def check_silence(spec: TimedTachometer, updates: Table) -> None:
 
 
 def check_enclosure(spec: TimedTachometer, n: int, seed: int = 1) -> tuple[int, float, float]:
-    """Tell how many were checked, the least distance from truth to bound in LSB, the median of (upper −
+    """Return how many were checked, the least distance from truth to bound in LSB, the median of (upper −
     lower)/|truth|.
     """
     time, step = edges(n, seed)
