@@ -115,7 +115,7 @@ def test_a_file_beyond_a_limit_is_refused(
     ("work", "said"),
     [
         ("sys.stdin.read(); bytearray(1 << 32)", f"{2 << 30} bytes of memory"),
-        ("all(True for _ in iter(int, 1))", "1 s"),
+        ("all(iter(object, 1))", "1 s"),
     ],
 )
 def test_a_reader_that_takes_too_much_is_ended(
