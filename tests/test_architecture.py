@@ -277,8 +277,7 @@ def has_many_parameters(node: ast.AST) -> bool:
     """Return whether it is a function with more than 6 parameters, `self` and `cls` included."""
     if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
         return False
-    every_one = node.args
-    return len([*every_one.posonlyargs, *every_one.args, *every_one.kwonlyargs]) > 6
+    return sum(map(len, (node.args.posonlyargs, node.args.args, node.args.kwonlyargs))) > 6
 
 
 def tells_kinds_apart(node: ast.AST) -> bool:
@@ -307,7 +306,7 @@ CEILING: dict[str, tuple[int, Callable[[], Counter[str]]]] = {
     "functions with more than 6 parameters": (31, lambda: every(has_many_parameters, *PRODUCT)),
     "getattr and hasattr in hdl": (39, lambda: every(lambda node: calls(node, "getattr", "hasattr"), "hdl")),
     "places that tell kinds of core apart": (22, lambda: every(tells_kinds_apart, *PRODUCT)),
-    "broken docstrings": (82, lambda: every(has_a_broken_docstring, *PRODUCT, "bench", "tests")),
+    "broken docstrings": (81, lambda: every(has_a_broken_docstring, *PRODUCT, "bench", "tests")),
 }
 
 

@@ -61,7 +61,7 @@ def plan(
     plot: Path | None,
     csv: Path | None,
 ) -> int:
-    """Return what a core can measure, before it is generated.
+    """Show what a core can measure, before it is generated.
 
     Prints what the configuration makes of the core, and what it measures at constant speeds of an ideal encoder: mean
     interval m_s, measurement time T_m and resolution Q_V of its method (Tsuji 2009, eqs. 4 to 20; Rairán 2013). With

@@ -76,7 +76,7 @@ class TelemetrySender(wiring.Component):
         return sequence
 
     def _time_bits(self, m: Module, at: _Bytes) -> None:
-        """Return where a bit begins, and where a byte ends."""
+        """Set the clocks in which a bit begins, and a byte ends."""
         m.d.comb += [at.beat.eq(self.busy & (at.timer == 0)), at.ended.eq(at.beat & (at.place == _STOP))]
         m.d.sync += at.timer.eq(Mux(at.begins | (at.timer == 0), self._bit_cycles - 1, at.timer - 1))
         with m.If(at.beat):

@@ -102,7 +102,7 @@ class UartBridge(Bridge):
         return m
 
     def _time_characters(self, m: Module, at: _Characters) -> None:
-        """Return where a bit is to be sampled, or to begin; a start bit begins to receive."""
+        """Set the clocks in which a bit is sampled, or begins; a start bit begins to receive."""
         beat, place = at.beat, at.place
         m.d.comb += [
             beat.eq(at.timer == 0),

@@ -232,7 +232,7 @@ class Tachometer(wiring.Component):
             m.d.comb += self.pulse_counter.beyond.eq(datapath.beyond)
 
     def _rest(self, m: Module) -> None:
-        """Return whether the shaft rests."""
+        """Drive `stalled`."""
         if isinstance(self.datapath, OwnStandstill):
             m.d.comb += self.stalled.eq(self.datapath.stalled)
         if self.standstill is not None:
@@ -330,7 +330,7 @@ class Tachometer(wiring.Component):
         return level, ready
 
     def _watch(self, m: Module) -> None:
-        """Return what is wrong with the encoder, if that is watched."""
+        """Add the encoder watch and drive its outputs, if the core has one."""
         if self.watch is None:
             return
         m.submodules.watch = watch = self.watch

@@ -1,4 +1,4 @@
-"""Return whether the shaft rests."""
+"""Detector of a shaft that rests."""
 
 from amaranth import EnableInserter, Module, Mux, ResetInserter, Signal, signed
 from amaranth.lib import wiring

@@ -173,9 +173,7 @@ def run_tool(
             )
         _running.update(started)
         _limit(started[0].pid, memory, seconds)
-        out, err = started[0].communicate(
-            text, seconds if seconds is not None and sys.platform != "linux" else _LONGEST
-        )
+        out, err = started[0].communicate(text, _LONGEST if sys.platform == "linux" else seconds or _LONGEST)
         if sys.platform == "linux" and started[0].returncode == -signal.SIGXCPU:
             raise subprocess.TimeoutExpired(command, seconds or _LONGEST)
     except BaseException:
@@ -195,8 +193,7 @@ def _limit(pid: int, memory: int | None, seconds: float | None) -> None:
         for limit, wanted in limits.items():
             with suppress(OSError):  # it has ended
                 _, hard = resource.prlimit(pid, limit)
-                soft = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
-                resource.prlimit(pid, limit, (soft, hard if limit == resource.RLIMIT_CPU else soft))
+                resource.prlimit(pid, limit, (wanted if hard == resource.RLIM_INFINITY else min(wanted, hard), hard))
 
 
 def end_tools() -> None:

@@ -7,8 +7,6 @@ from typing import Any, ClassVar, Literal
 from tachometry.spec.control.loop import Loop
 from tachometry.spec.control.ports import loop_entries, loop_ports
 from tachometry.spec.core.described import written
-from tachometry.spec.core.tick import Scale
-from tachometry.spec.core.velocity import Velocity
 from tachometry.spec.language.option import options_of
 from tachometry.spec.language.port import Port, Ports
 from tachometry.spec.methods.axes import CoreSpec
@@ -21,21 +19,6 @@ class LoopSpec(Loop):
     kind: ClassVar[Literal["loop"]] = "loop"
     # Outputs are of one axis.
     axes: ClassVar[None] = None
-
-    @property
-    def method(self) -> str:
-        """Name of the tachometer's method."""
-        return self.tachometer.method
-
-    @property
-    def scale(self) -> Scale:
-        """One count per tick, in other units."""
-        return self.tachometer.scale
-
-    @property
-    def velocity(self) -> Velocity:
-        """Unit and LSB of the velocity."""
-        return self.tachometer.velocity
 
     @cached_property
     def ports(self) -> Ports:

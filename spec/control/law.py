@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from tachometry.spec.control.motor import Motor
-from tachometry.spec.core.tachometer import TachometerSpec
-from tachometry.spec.core.timing import Timing, parse_clocks
+from tachometry.spec.core.tachometer import TachometerSpec, WithTachometer
+from tachometry.spec.core.timing import parse_clocks
 from tachometry.spec.language.option import ParameterError, option, options_of
 from tachometry.spec.language.units import CURRENT, PLAIN, Quantity, parse_bandwidth
 
@@ -36,7 +36,7 @@ class _Filter:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Law(Motor):
+class Law(WithTachometer, Motor):
     """Says how position and velocity are controlled, and how disturbances are observed.
 
     A value out of range raises ParameterError.
@@ -128,8 +128,3 @@ class Law(Motor):
     def period(self) -> int:
         """Clocks between two control ticks."""
         return self.timing.tick_cycles if self.control_period is None else self.control_period
-
-    @property
-    def timing(self) -> Timing:
-        """Timing of the tachometer."""
-        return self.tachometer.timing

@@ -9,6 +9,9 @@ from tachometry.spec.core.core import Core
 from tachometry.spec.core.described import options_as_asked, parameters_of
 from tachometry.spec.core.ports import bound_ports, ports_of
 from tachometry.spec.core.stream import stream_entry
+from tachometry.spec.core.tick import Scale
+from tachometry.spec.core.timing import Timing
+from tachometry.spec.core.velocity import Velocity
 from tachometry.spec.language.port import Ports
 
 
@@ -78,3 +81,29 @@ class TachometerSpec(Core):
             ),
         }
         return {name: entry for name, entry in found.items() if entry is not None}
+
+
+class WithTachometer:
+    """Properties that a core has from its tachometer."""
+
+    tachometer: TachometerSpec
+
+    @property
+    def method(self) -> str:
+        """Name of the tachometer's method."""
+        return self.tachometer.method
+
+    @property
+    def timing(self) -> Timing:
+        """Clock, tick and maximum time."""
+        return self.tachometer.timing
+
+    @property
+    def scale(self) -> Scale:
+        """One count per tick, in other units."""
+        return self.tachometer.scale
+
+    @property
+    def velocity(self) -> Velocity:
+        """Unit and LSB of the velocity."""
+        return self.tachometer.velocity

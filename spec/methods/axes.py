@@ -8,10 +8,9 @@ from functools import cached_property
 from typing import Any, ClassVar, Literal
 
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
-from tachometry.spec.core.tachometer import TachometerSpec
-from tachometry.spec.core.tick import Scale, Tick
+from tachometry.spec.core.tachometer import TachometerSpec, WithTachometer
+from tachometry.spec.core.tick import Tick
 from tachometry.spec.core.timing import Timing
-from tachometry.spec.core.velocity import Velocity
 from tachometry.spec.core.words import Words
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import INDEX, TICK, UPDATE, Port, Ports, held, pin, strobe
@@ -103,7 +102,7 @@ class AxesRecovery:
 
 
 @dataclass(frozen=True, kw_only=True)
-class AxesSpec:
+class AxesSpec(WithTachometer):
     """Several encoders whose axes have one datapath in turn, or as many as it takes.
 
     In a round each axis is looked at once, in its slot of one clock. So an axis is, to the bit, a core of its own whose
@@ -166,29 +165,9 @@ class AxesSpec:
         )
 
     @property
-    def method(self) -> str:
-        """Name of the method."""
-        return self.tachometer.method
-
-    @property
     def tick(self) -> Tick:
         """The sampling period, as that of the core that each axis would be."""
         return self.tachometer.tick
-
-    @property
-    def timing(self) -> Timing:
-        """Clock, tick and maximum time of the core."""
-        return self.tachometer.timing
-
-    @property
-    def scale(self) -> Scale:
-        """One count per tick of every axis, in other units."""
-        return self.tachometer.scale
-
-    @property
-    def velocity(self) -> Velocity:
-        """Unit and LSB of the velocity of every axis."""
-        return self.tachometer.velocity
 
     @cached_property
     def slots(self) -> int:
