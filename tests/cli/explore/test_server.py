@@ -32,13 +32,19 @@ def served(answer: Answer = lambda name, args: {}) -> Iterator[int]:
             thread.join()
 
 
-def test_half_requests_do_not_count() -> None:
+def test_half_requests_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And the oldest of too many are closed, however long a head may take."""
+    monkeypatch.setattr(module, "_HEAD", 1e6)
     with served() as port, ExitStack() as stack:
+        clients = []
         for _ in range(module._MOST_CLIENTS + 30):
-            client = stack.enter_context(socket.create_connection((HOST, port)))
+            client = stack.enter_context(socket.create_connection((HOST, port), timeout=60))
             client.sendall(b"GET / HTTP/1.1\r\nHost:")
+            clients.append(client)
         with urlopen(f"http://{HOST}:{port}/{TOKEN}/") as reply:
             assert reply.status == 200
+        with suppress(ConnectionResetError):
+            assert clients[0].recv(1) == b""
 
 
 def test_a_head_must_come_soon(monkeypatch: pytest.MonkeyPatch) -> None:
