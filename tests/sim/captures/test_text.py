@@ -57,15 +57,6 @@ def test_csv_round_trip_of_any_blocks(tmp_path: Path, block: int) -> None:
         assert_same(read_csv(tmp_path / "x.csv", _block=block), recording)
 
 
-def test_csv_keeps_what_was_read_from_sr(tmp_path: Path) -> None:
-    trace = random_trace(20_000, 3_000_000)
-    write_sr(tmp_path / "x.sr", trace, 50 * MEGAHERTZ)
-    recording = read_capture(tmp_path / "x.sr")
-    write_csv(tmp_path / "x.csv", recording)
-    assert_same(read_capture(tmp_path / "x.csv"), recording)
-    assert_same(read_capture(tmp_path / "x.csv").place(50 * MEGAHERTZ), trace)
-
-
 def test_csv_as_written(tmp_path: Path) -> None:
     recording = Recording(np.array([-0.0, 1e-7]), np.array([0, 1], np.uint8), np.array([1, 1], np.uint8), 0.1)
     write_csv(tmp_path / "x.csv", recording)

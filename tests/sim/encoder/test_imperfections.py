@@ -223,19 +223,6 @@ def golden_run(encoding: Encoding, clock_hz: int, filter_clocks: int = 0) -> tup
     return run, encoding.true_position(sampled)
 
 
-@pytest.mark.parametrize("filter_clocks", [0, 21])
-def test_the_core_comes_out_even_after_bounce(filter_clocks: int) -> None:
-    # 1 us clocks, an edge every 160 or more, chatter over 20 of them
-    parameters = {"bounce": Bounce(4, 20e-6), "jitter": 0.02, "phase_error_deg": 20, "start_angle_rad": 0.5 * PITCH}
-    encoding = record("ramp:1rad/s:5rad/s:200ms+constant:-5rad/s:100ms", **parameters)
-    run, true = golden_run(encoding, 1_000_000, filter_clocks)
-    assert len(run.errors) == 0
-    behind = run.ticks.position - true
-    assert np.max(np.abs(behind)) <= 1  # an edge of this moment
-    assert np.count_nonzero(behind) < len(behind) / 3
-    assert (run.ticks.get("swallowed_edges")[-1] > 100) == bool(filter_clocks)
-
-
 def test_edges_that_come_together_do_not_bounce() -> None:
     parameters = {"illegal": 0.3, "seed": 2}
     smooth, bouncing = (record("constant:3rad/s:1s", bounce=b, **parameters) for b in (None, Bounce(2, 1e-4)))
@@ -336,17 +323,6 @@ def test_all_together_keep_the_order_of_edges(seed: int) -> None:
     if not (encoding.n_illegal or encoding.n_lost):
         assert position[-1] == encoding.true_position(encoding.motion.duration)
     assert (encoding.true_position(encoding.motion.duration) - position[-1] - 2 * n_illegal) % 4 == 0
-
-
-def test_new_imperfections_leave_the_old_as_they_were() -> None:
-    motion, old = "constant:1rev/s:1s", {"jitter": 0.05, "illegal": 0.1, "seed": 3, "start_angle_rad": PITCH / 2}
-    before = record(motion, **old).recording
-    bouncing = record(motion, bounce=Bounce(2, 1e-5), **old).recording
-    lossy = record(motion, lost=0.01, jitter=0.05, seed=3, start_angle_rad=PITCH / 2).recording
-    both = record(motion, lost=0.01, **old)
-    assert np.all(np.isin(before.time, bouncing.time))
-    assert np.all(np.isin(both.recording.time, lossy.time))
-    assert both.n_lost > 10
 
 
 def test_bounce_is_of_the_edges_that_a_motion_may_have() -> None:

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from amaranth.back import rtlil
-from support.lockstep import random_case
-from support.nightly import nightly, only
+from support.nightly import only
 
 from tachometry.hdl import Tachometer
 from tachometry.sim import build, golden
@@ -33,18 +32,6 @@ def turning(n_clocks: int, spacing: int = 7) -> PinTrace:
     phase = np.arange(len(clock)) + 2 * (clock > n_clocks // 2) - 3 * (clock > n_clocks * 3 // 4)
     a, b = (np.isin(phase % 4, levels).astype(np.uint8) for levels in ((1, 2), (2, 3)))
     return PinTrace(clock, a, b, n_clocks)
-
-
-@pytest.mark.parametrize(
-    ("name", "method", "seed"),
-    [*(("cxxrtl", *case) for case in [("m", 4), ("s", 9), ("mt", 2), ("t", 0), ("rairan", 1)]), ("verilator", "mt", 2)],
-)
-@nightly  # the tests below hold CXXRTL against the golden model, too, and test_matrix.py holds Verilator
-def test_random_cases(name: str, method: str, seed: int) -> None:
-    spec, _, trace = random_case(seed, method)
-    run = pick(name).run(spec, trace)
-    assert run.n_clocks == trace.n_clocks
-    assert compare(golden.run(spec, trace), run) == (0, [])
 
 
 @pytest.mark.parametrize("name", only(["cxxrtl"], COMPILED))

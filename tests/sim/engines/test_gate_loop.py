@@ -9,13 +9,11 @@ import pytest
 from loops import KINDS, MOTOR, REAL, check, setting
 from support.nightly import nightly
 
-from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.engines.gate_loop import GateLoop, Through
 from tachometry.sim.engines.loop import Log, Observer
-from tachometry.sim.golden.command_generator import Command
-from tachometry.sim.golden.control import Control, run_loop
-from tachometry.sim.studies.loops.control import Load, Outcome, Task, edges_of, in_gates, simulation_of
+from tachometry.sim.golden.control import Control
+from tachometry.sim.studies.loops.control import Load, Task, edges_of, in_gates
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.language.option import ParameterError
 
@@ -44,25 +42,6 @@ def through_gates() -> tuple[Log, Through]:
     return GateLoop(SPEC).run(MOTOR, edges_of(replace(REAL, seed=2)), course, feed_forward=True)
 
 
-def agrees(spec: LoopSpec) -> None:
-    """Each current, filtered velocity and disturbance, and its clock, with what the golden models make of the lines."""
-    _, through = through_gates()
-    n_ticks = len(range(spec.latency.first_tick, through.trace.n_clocks, spec.period))
-    commands = [Command(*row) for row in through.commands[:n_ticks].tolist()]
-    expected = run_loop(spec, through.trace, commands, golden.tables).tables["current_valid"]
-    columns = (expected.clock, expected.current, expected.filtered_velocity, expected.disturbance)
-    np.testing.assert_array_equal(np.stack(columns, axis=1), through.currents)
-    assert len(through.currents) == 19_999
-
-
-@nightly
-def test_gates_and_golden_models_agree_in_every_bit() -> None:
-    agrees(SPEC)
-    current = through_gates()[1].currents[:, 1] * float(SPEC.units.amperes)
-    assert current.min() == -8
-    assert current.max() > 6
-
-
 @nightly
 def test_the_log_is_that_of_the_ports() -> None:
     log, through = through_gates()
@@ -73,18 +52,6 @@ def test_the_log_is_that_of_the_ports() -> None:
     per_lsb = float(SPEC.units.rad_per_s / (1 << SPEC.form.extra_bits))
     np.testing.assert_allclose(log["y"][shown], through.currents[last[shown], 2] * per_lsb)
     assert np.abs(log["disturbance"][-400:]).max() > 0.05  # the load
-
-
-@nightly
-def test_the_loop_does_what_one_in_double_precision_does() -> None:
-    gains = replace(DOUBLE.gains, feed_forward=True)
-    double = replace(DOUBLE, gains=gains)
-    found: list[Outcome] = [
-        double.outcome(log) for log in (through_gates()[0], double.run(simulation_of(DOUBLE.spec), 2))
-    ]
-    assert found[0].rms == pytest.approx(found[1].rms, rel=0.05)
-    assert found[0].sound == pytest.approx(found[1].sound, rel=0.05)
-    assert found[0].dip == pytest.approx(found[1].dip, rel=0.05)
 
 
 def test_the_core_of_a_setting_has_its_gains() -> None:

@@ -55,11 +55,6 @@ def test_every_output_of_the_manifest_is_compared(method: str) -> None:
     assert {*bounds, "interval", "stalled", "age"} <= compared
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_equal_runs_are_equal(method: str) -> None:
-    assert compare(run_of(spec_of(method)), run_of(spec_of(method))) == (0, [])
-
-
 @pytest.mark.parametrize("change", [1, 1 << 40, 1 << 62])
 @pytest.mark.parametrize("method", METHODS)
 def test_any_cell(method: str, change: int) -> None:
@@ -88,15 +83,3 @@ def test_rows_that_only_one_run_has(method: str) -> None:
                 assert [found.signal for found in first] == [f"{strobe}.{name}" for name in ("clock", *names)]
                 assert all(found.row == kept.stop for found in first)
                 assert all((found.expected is None) == (pair[0] is fewer) for found in first)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_a_row_that_is_missing_at_the_begin_or_in_the_middle(method: str) -> None:
-    spec = spec_of(method)
-    run = run_of(spec)
-    for strobe in spec.ports.strobes:
-        for missing in range(N_ROWS - 1):
-            rows = np.delete(np.arange(N_ROWS), missing)
-            fewer = Run(run.n_clocks, run.tables | {strobe: run.tables[strobe].rows(rows)})
-            assert compare(run, fewer)[0] > 0
-            assert compare(fewer, run)[0] > 0

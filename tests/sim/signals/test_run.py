@@ -91,28 +91,6 @@ def test_a_missing_column_is_an_error() -> None:
         Run.of_ports(core(), 10, {**EMPTY.tables, "index_valid": TABLE})
 
 
-def test_a_row_too_many_is_a_difference() -> None:
-    """In each column, and at the clock of the first row that only one of the runs has."""
-    fewer = Run(10, EMPTY.tables | {"tick": TABLE.rows(slice(2))})
-    for expected, actual, values in ((EMPTY, fewer, (9, None)), (fewer, EMPTY, (None, 9))):
-        n, first = compare(expected, actual)
-        assert n == len(first) == 3
-        assert (first[0].signal, first[0].row, first[0].expected, first[0].actual) == ("tick.clock", 2, *values)
-        assert {mismatch.clock for mismatch in first} == {9}
-    assert compare(EMPTY, EMPTY) == (0, [])
-
-
-def test_the_first_of_several_differences_is_told() -> None:
-    other = TABLE.having(position=np.array([1, 7, 8]), overflow=np.array([True, True, True]))
-    n, first = compare(EMPTY, Run(10, EMPTY.tables | {"tick": other}))
-    assert n == 4
-    assert [(one.signal, one.row, one.expected, one.actual, one.clock) for one in first] == [
-        ("tick.position", 1, 2, 7, 5),
-        ("tick.overflow", 0, 0, 1, 3),
-    ]
-    assert str(first[0]) == "tick.position[1]: expected 2, got 7"
-
-
 def test_runs_and_tables_are_compared_by_compare_alone() -> None:
     """Arrays have no truth as a whole, so == is whether it is the same object."""
     assert EMPTY == EMPTY != Run(10, EMPTY.tables)

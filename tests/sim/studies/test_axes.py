@@ -5,8 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.nightly import nightly
-from support.verilog import LintingVerilator
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress_of
@@ -50,11 +48,6 @@ def test_no_memory_of_five_tracked_axes_is_read_behind_its_end() -> None:
     assert isinstance(spec, AxesSpec)
     assert spec.slots == 5
     assert lockstep(spec, stress_of(spec, 1, 5), Cxxrtl()).n_mismatches == 0
-
-
-@nightly  # tests/hdl/axes lints it, and the 64 axes above are those of its gates
-def test_the_exported_verilog(tmp_path: Path) -> None:
-    check(1, LintingVerilator(tmp_path, few=True), 1)
 
 
 def test_tables_of_an_axis_are_those_of_a_core_of_its_own(tmp_path: Path) -> None:

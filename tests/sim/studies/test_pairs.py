@@ -35,29 +35,6 @@ APART = {
         )
     ),
 }
-IN_WORDS = {"max-time", "min-time", "max-speed", "frac-bits", "velocity-width"}
-
-
-def shown(name: str, value: str) -> str:
-    """Return what is in the words of a configuration; empty if it cannot be told."""
-    if value == "" or name in IN_WORDS:
-        return ""
-    if value.startswith("yes "):
-        return f"--{name} --{value.removeprefix('yes ')} "
-    value += "clk" * (name == "tick")
-    return f"--{name} " if value == "yes" else f"--no-{name} " if value == "no" else f"--{name} {value} "
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_every_two_options_meet(method: str) -> None:
-    """As far as they can be together at all."""
-    seen = [" ".join(core) + " " for core in configurations(method)]
-    assert len(set(seen)) == len(seen)
-    words = {(name, value): shown(name, value) for name, values in factors(method).items() for value in values}
-    having = {one: {text for text in seen if word in text} for one, word in words.items() if word}
-    for one, other in combinations(having, 2):
-        if one[0] != other[0]:
-            assert bool(having[one] & having[other]) == (frozenset((one, other)) not in APART), (one, other)
 
 
 @pytest.mark.parametrize("method", METHODS)

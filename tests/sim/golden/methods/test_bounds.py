@@ -76,23 +76,6 @@ def check_enclosure(spec: TachometerSpec, n_motions: int, n_ticks: int = 250_000
 
 
 @pytest.mark.parametrize(
-    ("spec", "n_motions"),
-    [
-        # Of ideal discs; bounds with an edge error, below, contain these.
-        pytest.param(S, 36, marks=nightly),
-        pytest.param(PLAIN, 36, marks=nightly),
-        *(pytest.param(replace(M, average=of), 4, marks=nightly) for of in (1, 8, 5)),
-    ],
-    ids=["eq. (21)", "eq. (17)", "M", "M of 8", "M of 5"],
-)
-def test_true_mean_speed_is_always_enclosed(spec: TachometerSpec, n_motions: int) -> None:
-    windows, nearest = check_enclosure(spec, n_motions)
-    assert windows > 999_900
-    # No narrower one would do: the truth comes as near as this, of the whole count on either side.
-    assert nearest < (0.1 if getattr(spec, "cancel", False) else 1e-3)
-
-
-@pytest.mark.parametrize(
     ("spec", "n_motions", "least"),
     [
         (S, 4, 100_000),

@@ -16,7 +16,7 @@ from tachometry.sim.golden.front_end import Steps, count
 from tachometry.sim.golden.methods.timed import Counts
 from tachometry.sim.golden.sorted_lookup import chain
 from tachometry.sim.signals.run import Table
-from tachometry.spec import Encoder, MTTachometer, Speed, TachometerSpec, Timing, TTachometer
+from tachometry.spec import Encoder, Speed, TachometerSpec, Timing, TTachometer
 
 TICK, MAX_TICKS = 40, 8
 NONE = np.empty(0, dtype=np.int64)
@@ -43,18 +43,6 @@ def by_the_rules(spec: TTachometer, counts: dict[int, int], n_clocks: int) -> li
     front = Front(n_clocks, counts)
     ticks = ticks_of(settings, front, [*range(TICK - 1, n_clocks, TICK)], settings.max_count)
     return timed_updates(settings, front, ticks, spec.form.division_clocks)
-
-
-@pytest.mark.parametrize("timer", ["clock", "tick"])
-def test_a_velocity_decays_by_an_lsb_at_least(timer: str) -> None:
-    """After every measurement, and though an LSB is so coarse that it lasts for many ticks."""
-    timing = Timing(100 * TICK, TICK, 60)
-    spec = TTachometer(encoder=Encoder(25), timing=timing, frac_bits=4, timer=timer)
-    counts = {first + gap: 1 for first in range(2 * TICK, 200 * TICK, 50 * TICK) for gap in (0, 2 * TICK)}
-    updates = updates_of(spec, counts, 200 * TICK)
-    velocity, forced = updates.velocity, updates["forced"].astype(bool)
-    assert np.count_nonzero(forced) > 20
-    assert (velocity[1:][forced[1:]] < velocity[:-1][forced[1:]]).all()
 
 
 def rounded(value: Fraction, frac_bits: int) -> Fraction:
@@ -107,29 +95,6 @@ def test_every_update_is_by_the_rules(timer: str, frac_bits: int, bound_decay: b
     assert (decays > 50) == bound_decay
 
 
-def test_a_stop_is_followed_by_one_decay_after_the_other() -> None:
-    """One count in 30 clocks is 1⅓ counts a tick. At ages of 40 and more, 60/age is less."""
-    spec = make_spec(frac_bits=16)
-    updates = updates_of(spec, {9: 1, 39: 1}, 12 * TICK)
-    ages = [TICK * k for k in range(2, MAX_TICKS)]
-    velocities = [Fraction(40, 30), *(Fraction(60, age) for age in ages), Fraction(0)]
-    assert updates.clock.tolist() == [39, *(39 + age for age in ages), 39 + 320]
-    assert updates.interval.tolist() == [30, *ages, 320]
-    assert updates.velocity.tolist() == [rounded(velocity, 16) * 2**16 for velocity in velocities]
-    # The first silence is that of the tick after; of just one tick, 60/40 of a count is no less than 40/30.
-    assert not updates.forced[0]
-    assert updates.forced[1:].all()
-
-
-def test_one_decay_alone() -> None:
-    """In the tick before, 60/45 of a count is no less than 40/32; the next count comes in the tick after."""
-    spec = make_spec(frac_bits=16)
-    updates = updates_of(spec, {2: -1, 34: -1, 159: -1}, 4 * TICK)
-    assert updates.clock.tolist() == [34, 119, 159]
-    wanted = [Fraction(-40, 32), Fraction(-60, 85), Fraction(-40, 125)]
-    assert updates.velocity.tolist() == [rounded(velocity, 16) * 2**16 for velocity in wanted]
-
-
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_least_velocity_decays_to_0(sign: int) -> None:
     """A count in 600 clocks is 1/15 of a count a tick, an LSB; after 1920 clocks half an LSB is left, 60/1920."""
@@ -163,22 +128,6 @@ def test_just_the_maximum_speed_is_in_range() -> None:
         updates = updates_of(spec, {5: sign, 45: sign, 84: sign, 125: sign}, 130)
         assert updates.velocity[:3].tolist() == [256 * sign, 256 * sign, int(rounded(Fraction(40, 41) * sign, 8) * 256)]
         assert updates["out_of_range"][:3].tolist() == [False, True, False]
-
-
-@pytest.mark.parametrize("sign", [1, -1])
-def test_after_a_silence_a_count_only_opens_a_window_of_mt(sign: int) -> None:
-    """A window ends with the first count that comes more than a tick after that which opened it."""
-    spec = MTTachometer(encoder=Encoder(25), timing=Timing(100 * TICK, TICK, MAX_TICKS), frac_bits=16)
-    counts = dict.fromkeys([9, 30, 49, 50, 100, 900, 950], sign)
-    updates = updates_of(spec, counts, 1000)
-    measured = updates.rows(~updates.forced)
-    assert measured.clock.tolist() == [50, 100, 950]
-    assert measured.interval.tolist() == [41, 50, 50]
-    assert measured.velocity.tolist() == [
-        int(rounded(Fraction(40 * n * sign, time), 16) * 2**16) for n, time in ((3, 41), (1, 50), (1, 50))
-    ]
-    zeros = updates.rows(updates.forced & (updates.velocity == 0))
-    assert zeros.clock.tolist() == [100 + 320, 100 + 640]
 
 
 @pytest.mark.parametrize("n", range(1, 7))

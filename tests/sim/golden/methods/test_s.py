@@ -81,20 +81,6 @@ def test_rounding_of_ties_and_of_the_largest_numbers() -> None:
         ]
 
 
-def test_sums_telescope_to_the_position_between_forced_updates() -> None:
-    rng = np.random.default_rng(7)
-    m_e = (3 + rng.choice([0, 0, 0, 1, -1], size=3000)).tolist()
-    rows = results(m_e, 500, cancel=True)
-    assert not any(forced for _, _, forced, _, _ in rows)
-    opening = [-1] + [tick for tick, *_ in rows[:-1]]
-    travelled = 0
-    for (tick, m_s, *_), start in zip(rows, opening, strict=True):
-        assert m_s == tick - start
-        travelled += (m_e[start] if start >= 0 else 0) + m_e[tick] + 2 * sum(m_e[start + 1 : tick])
-    last = rows[-1][0]
-    assert travelled == 2 * sum(m_e[: last + 1]) - m_e[last]
-
-
 @pytest.mark.parametrize("eighths", [0, 1, 4, 8])
 @pytest.mark.parametrize("cancel", [True, False])
 @pytest.mark.parametrize("name", PAPER)

@@ -5,7 +5,6 @@ import pytest
 from support.nightly import only
 
 from tachometry.sim import golden
-from tachometry.sim.encoder.imperfections import Bounce
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.encoder.virtual import VirtualEncoder
@@ -85,23 +84,3 @@ def test_ticks_that_are_shorter_than_a_division(method: str, seed: int) -> None:
     updates = found.actual.updates
     assert np.count_nonzero(updates.velocity) > 20
     assert np.diff(updates.clock).min() >= spec.form.division_clocks
-
-
-@pytest.mark.parametrize("method", ["t", "mt"])
-def test_contacts_that_bounce_read_their_speed(method: str) -> None:
-    """Each return of a contact is a count against the one before, so it reads 0, and the last of them stays: only a
-    filter that is longer than the bounces leaves one count of an edge.
-    """
-    knob = VirtualEncoder(24, bounce=Bounce.parse("3:2ms"), seed=1)
-    recording = knob.record(parse_motion("constant:15rpm:3s")).recording
-    shown = []
-    for text in ("0", "255us", "2ms"):
-        core = {"ppr": "24", "clock": "1MHz", "max-time": "100ms", "unit": "rpm", "filter": text}
-        spec = of_texts(method, core)
-        run = golden.run(spec, PinTrace.of(recording, spec))
-        assert run.ticks.position[-1] == 71  # whatever the filter
-        at = np.searchsorted(run.updates.clock, run.ticks.clock[10_000:], side="right") - 1
-        shown.append(run.updates.velocity[at] * 2.0**-spec.velocity.frac_bits)
-    assert np.mean(shown[0] == 0) > 0.9
-    assert np.mean(shown[1] == 0) > 0.5
-    np.testing.assert_allclose(shown[2], 15, rtol=0.05)  # 2 ms of 42

@@ -25,16 +25,6 @@ def edges_of(motion: str) -> tuple[Steps, FloatArray, FloatArray]:
     return replace(steps, reads=np.arange(2e-3, recording.duration, 2e-3), clock_s=1e-6), stamp, place
 
 
-@pytest.mark.parametrize("order", [2, 3])
-def test_without_process_noise_it_is_the_least_squares_of_all_edges(order: int) -> None:
-    steps, stamp, place = edges_of("ramp:20rad/s:30rad/s:300ms")
-    speed = edge_kalman(steps, 0.0, order, bound=9.0).velocity / COUNT
-    for reading, at in enumerate(steps.reads):
-        n = int(np.sum(steps.time <= at))
-        if n > 20:
-            assert speed[reading] == pytest.approx(np.polyfit(stamp[:n] - at, place[:n], order - 1)[-2], rel=2e-4), at
-
-
 @pytest.mark.parametrize(("noises", "order"), [([30.0], 2), ([1e3], 3), ([3.0, 3e4], 3)])
 def test_one_filter_or_two_are_those_of_matrices(noises: list[float], order: int) -> None:
     steps, stamp, place = edges_of("ramp:0:30rad/s:60ms+ramp:30rad/s:-20rad/s:90ms+stop:150ms+constant:-5rad/s:60ms")

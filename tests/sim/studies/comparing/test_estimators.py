@@ -76,31 +76,6 @@ def test_least_squares_is_the_fit_of_numpy(edges: int, order: int) -> None:
         np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-3 * np.max(np.abs(expected)) / 100)
 
 
-def test_least_squares_of_an_ideal_ramp_is_exact_with_order_2_and_half_a_window_late_with_order_1() -> None:
-    acceleration = 500 * COUNT
-    edge = np.arange(0.5, 200)
-    steps = Steps(np.sqrt(2 * edge / 500), np.ones(200, dtype=np.int64), 0.895, CPR, clock_s=1e-9)
-    estimate = least_squares(steps, PERIOD, edges=16, order=2)
-    late = estimate.time > 0.4
-    np.testing.assert_allclose(estimate.velocity[late], acceleration * estimate.time[late], rtol=1e-5)
-    estimate = least_squares(steps, PERIOD, edges=16, order=1)
-    newest, oldest = (np.interp(estimate.time, steps.time, np.arange(200)) // 1 - back for back in (0, 15))
-    middle = [
-        (steps.time[int(one)] + steps.time[int(other)]) / 2
-        for one, other in zip(newest[late], oldest[late], strict=True)
-    ]
-    np.testing.assert_allclose(estimate.velocity[late], acceleration * np.array(middle), rtol=2e-3)
-
-
-def test_least_squares_rests_after_a_stop_and_begins_anew() -> None:
-    steps = counts_of(*[2] * 50, *[0] * 200, *[-1] * 20)
-    speed = least_squares(steps, PERIOD, edges=16, order=1, timeout_s=0.1).velocity / COUNT
-    silence = PERIOD * np.arange(1, 99) + PERIOD / 2
-    np.testing.assert_allclose(speed[50:148], np.minimum(2000, 2 / silence), rtol=2e-3)
-    assert not np.any(speed[150:251])
-    np.testing.assert_allclose(speed[251:], -1000, rtol=1e-6)
-
-
 def test_edges_at_one_instant_tell_no_speed() -> None:
     steps = Steps(np.full(5, 2.5e-3), np.ones(5, dtype=np.int64), 0.01, CPR)
     assert not np.any(least_squares(steps, PERIOD, 4, 1).velocity)
@@ -134,16 +109,6 @@ def test_adaptive_window_is_its_description(bound: float, best_fit: bool) -> Non
     np.testing.assert_allclose(found, naive_window(steps, bound, 30, best_fit), rtol=1e-9, atol=1e-6)
 
 
-@pytest.mark.parametrize("best_fit", [False, True])
-def test_the_window_on_a_noiseless_ramp_is_the_longest_and_after_a_change_of_speed_begins_there(best_fit: bool) -> None:
-    steps = counts_of(*[3] * 40, *[5] * 40)
-    speed = adaptive_window(steps, PERIOD, 0.0, 10, best_fit).velocity * PERIOD / COUNT
-    np.testing.assert_allclose(speed, [3] * 40 + [5] * 40)
-    wide = adaptive_window(steps, PERIOD, 1e6, 10, best_fit=False).velocity * PERIOD / COUNT
-    np.testing.assert_allclose(wide[:40], 3)  # no window begins before time 0
-    np.testing.assert_allclose(wide[39:51], [3 + 0.2 * n for n in range(11)] + [5])
-
-
 # --- Kalman
 
 
@@ -167,16 +132,6 @@ def test_gains_solve_the_riccati_equation(index: float, order: int) -> None:
     assert kalman_gains(index, 2)[2] == 0
 
 
-@pytest.mark.parametrize("index", [1e-3, 0.05, 0.7, 20.0])
-def test_gains_are_those_of_the_alpha_beta_filter(index: float) -> None:
-    """Kalata 1984: index^2 = beta^2 / (1 - alpha), beta = 2 (2 - alpha) - 4 sqrt(1 - alpha)."""
-    alpha, beta, _ = kalman_gains(index, 2)
-    assert beta**2 / (1 - alpha) == pytest.approx(index**2, rel=1e-9)
-    assert beta == pytest.approx(2 * (2 - alpha) - 4 * math.sqrt(1 - alpha), rel=1e-6)
-    alpha, beta, gamma = kalman_gains(index, 3)
-    assert gamma**2 / (1 - alpha) == pytest.approx(index**2, rel=1e-9)
-
-
 @pytest.mark.parametrize(("order", "noise"), [(2, 60.0), (3, 2e4)])
 def test_kalman_filter_in_matrices(order: int, noise: float) -> None:
     steps = random_steps(1)
@@ -188,19 +143,6 @@ def test_kalman_filter_in_matrices(order: int, noise: float) -> None:
         state = state + gain * (np.sum(steps.step[steps.time <= k * PERIOD]) - state[0])
         expected.append(state[1] / PERIOD * COUNT)
     np.testing.assert_allclose(kalman(steps, PERIOD, noise, order).velocity, expected, rtol=1e-4, atol=1e-4)
-
-
-def test_kalman_filter_with_acceleration_does_not_lag_on_a_ramp() -> None:
-    encoding = record("ramp:0:400rad/s:500ms", pulses_per_rev=CPR // 4)
-    steps = Steps.of_recording(encoding.recording, CPR)
-    lags = []
-    for order, noise in ((2, 200.0), (3, 4e4)):
-        estimate = kalman(steps, PERIOD, noise, order)
-        late = estimate.time > 0.25
-        lags.append(float(np.mean(encoding.true_speed(estimate.time[late]) - estimate.velocity[late])) / 800)
-    alpha, beta, _ = kalman_gains(200.0 * PERIOD**2 / (COUNT * QUANTISATION), 2)
-    assert lags[0] == pytest.approx(PERIOD * (alpha / beta - 0.5), rel=0.05)
-    assert abs(lags[1]) < 1e-4 < lags[0] / 5
 
 
 # --- what is refused
