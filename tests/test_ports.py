@@ -4,7 +4,6 @@ import csv
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 from support.nightly import only
 
@@ -12,7 +11,7 @@ from tachometry.hdl import Tachometer
 from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.engines.probes import shown
-from tachometry.sim.signals.run import Run, Table, compare
+from tachometry.sim.signals.run import Run, compare
 from tachometry.sim.signals.tables import write_counts, write_events, write_trace
 from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.sim.testbench.vectors import strobe_rows
@@ -67,10 +66,3 @@ def check(spec: TachometerSpec, tmp_path: Path) -> None:
             count, (first,) = compare(run, changed(run, port.held_by, port.name))
             assert (count, first.signal) == (1, f"{port.held_by}.{port.name}")
     assert json.dumps(vectors)
-
-
-def test_runs_of_other_ports_are_not_compared() -> None:
-    table = Table(np.array([1]), {"velocity": np.array([1])})
-    runs = Run(2, {"velocity_valid": table}), Run(2, {"velocity_valid": table.having(interval=np.array([1]))})
-    with pytest.raises(ValueError, match="runs must be of the same ports"):
-        compare(*runs)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support.nightly import nightly, only, only_rows
+from support.nightly import only, only_rows
 from support.quotient import FlatQuotient, every_quotient
 from support.simulate import clock_by_clock
 
@@ -39,14 +39,6 @@ def test_every_interval_and_numerator_at_a_tick_a_clock(tmp_path: Path, frac_bit
     spec = long_spec(MAX_TICKS, frac_bits, cancel=cancel)
     numerators = range(-spec.form.max_numerator, spec.form.max_numerator + 1)
     *operands, got = every_quotient(spec, numerators, tmp_path)
-    assert np.array_equal(got, wanted(spec, operands))
-
-
-@nightly  # the longest and the shortest tick are tried above
-def test_every_interval_and_the_extreme_numerators_at_two_clocks_a_tick(tmp_path: Path) -> None:
-    spec = long_spec(MAX_TICKS, 16, tick_cycles=2)
-    extreme = spec.form.max_numerator
-    *operands, got = every_quotient(spec, [-extreme, -1, 1, extreme], tmp_path)
     assert np.array_equal(got, wanted(spec, operands))
 
 

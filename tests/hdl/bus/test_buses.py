@@ -235,10 +235,3 @@ def test_verilog_of_every_bus_has_no_warnings(bus: str, tmp_path: Path) -> None:
 def test_buses_read_what_the_golden_model_says(simulator: str, seed: int, number: int, tmp_path: Path) -> None:
     write_design(tmp_path)
     assert play(tmp_path, simulator, seed, number, clocks_each=12) == dict.fromkeys(NAMES, "")
-
-
-@pytest.mark.parametrize("bus", NAMES)
-def test_registers_that_nobody_reads_are_told(bus: str) -> None:
-    trace, _ = motion(seed=1, n_clocks=100)
-    said = different(bus, [], {"reads": [], "writes": []}, defaultdict(list), GoldenBank(MAP, trace), [])
-    assert said == f"never read, or always the same: {', '.join(one.name for one in MAP)}"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.exported_bus import SPEC, START, Simulate, check, in_icarus, in_verilator
 from support.nightly import nightly
-from support.serial import Host, SpiHost, UartHost, spi_read
+from support.serial import Host, SpiHost, UartHost
 
 from tachometry.spec.registers.map import RegisterMap
 
@@ -53,10 +53,3 @@ def test_over_spi(simulate: Simulate, n_accesses: int, tmp_path: Path) -> None:
 @pytest.mark.parametrize(("simulate", "n_accesses"), SIMULATORS)
 def test_over_uart(simulate: Simulate, n_accesses: int, tmp_path: Path) -> None:
     over_uart(simulate, n_accesses, tmp_path)
-
-
-def test_a_register_that_is_not_read_is_found() -> None:
-    host = SpiHost(np.random.default_rng(0), START, WORDS)
-    host.frame(spi_read(0, N_WORDS - 1), 8 + 40 * (N_WORDS - 1), 4, 4)
-    host.frame(spi_read(N_WORDS - 1), 48, 4, 4)
-    all_registers_are_read(host)

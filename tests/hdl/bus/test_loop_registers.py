@@ -1,14 +1,11 @@
 """Registers of a core with a control loop against their golden model, with random writes to all of them."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from support.control import SMALL
-from support.nightly import nightly
 from support.simulate import clock_by_clock
-from support.verilog import play_native
 
 from tachometry.hdl.core import register_core
 from tachometry.sim.encoder.stress import stress
@@ -105,16 +102,6 @@ def check(spec: LoopSpec, seed: int, n_clocks: int = 1400) -> None:
     named = [{f"bus.{name}" if name in bus else name: value for name, value in row.items()} for row in rows]
     seen = clock_by_clock(box, named, ["bus.read_data", "bus.error"])
     compare(registers, trace, accesses, captures, [(row["bus.read_data"], bool(row["bus.error"])) for row in seen])
-
-
-@nightly  # tests/hdl/core/test_loop_core.py reads the exported loop, and the test below has its registers
-def test_exported_verilog_in_icarus(tmp_path: Path) -> None:
-    """On the native bus, with a serial multiplier and units of another kind."""
-    tachometer = replace(CORE.tachometer, unit="rad/s", max_speed=None, frac_bits=12)
-    spec = replace(SPECS["generator"], tachometer=tachometer, multiplier="serial", control_period=300)
-    registers, trace, accesses, captures, rows = case(spec, 2, 9000)
-    answers = play_native(spec, tmp_path, rows, ["reg_read_data", "reg_error"])
-    compare(registers, trace, accesses, captures, [(data, bool(error)) for data, error in answers])
 
 
 @pytest.mark.parametrize("name", SPECS)

@@ -47,18 +47,6 @@ def test_an_edge_is_in_the_tick_that_ends_pin_to_count_after_it() -> None:
     assert counted(last + 1)[0] == 0
 
 
-@pytest.mark.parametrize("clock", range(5, 11))
-def test_the_first_edge_that_counts_is_between_the_looks_of_the_second_and_third_round(clock: int) -> None:
-    """A level is looked at two clocks after it was sampled, with four slots a round."""
-    spec = small()
-    low = np.zeros(2, dtype=np.uint8)
-    pins = PinTrace(np.array([0, clock]), a=np.array([0, 1], dtype=np.uint8), b=low, n_clocks=4 * TICK_CYCLES)
-    trace = AxesTrace((pins,) * spec.axes)
-    check(spec, trace)
-    counted = golden.run(spec, trace).ticks.pulse_count[: spec.axes].tolist()
-    assert counted == [int(clock + 2 > spec.slots * 2 + axis) for axis in range(spec.axes)]
-
-
 def test_a_run_that_ends_earlier_has_the_same_rows_until_then() -> None:
     """Wherever it ends."""
     spec = small(2, index=Index())
@@ -102,16 +90,3 @@ def test_all_ticks_come_in_step() -> None:
     assert ticks.clock.tolist() == wanted[: len(ticks)]
     assert ticks["axis"].tolist() == [0, 1, 2] * (len(ticks) // 3)
     assert spec.latency.tick == first + 2 * turn - (TICK_CYCLES - 1)
-
-
-def test_two_edges_within_a_round_are_illegal() -> None:
-    """An axis is looked at once in a round: it cannot tell which of two edges came first."""
-    spec = small(3)
-    quiet = PinTrace(np.array([0]), np.zeros(1, np.uint8), np.zeros(1, np.uint8), 400)
-    level = np.array([0, 1, 1], dtype=np.uint8)
-    for apart, errors in ((1, 1), (spec.slots, 0)):
-        at = spec.look(1, 40)
-        quick = PinTrace(np.array([0, at, at + apart]), level, np.array([0, 0, 1], dtype=np.uint8), 400)
-        run = golden.run(spec, AxesTrace((quiet, quick, quiet)))
-        assert len(run.errors) == errors
-        check(spec, AxesTrace((quiet, quick, quiet)))

@@ -1,20 +1,17 @@
 """The whole demo, in the compiled engine: every frame that it sends against the golden models."""
 
 from dataclasses import asdict, replace
-from fractions import Fraction
 
 import numpy as np
 import pytest
 from support.demo import DemoPort, uart
-from support.nightly import nightly, only
+from support.nightly import only
 
 from tachometry.boards.host.demo import DemoBoard
-from tachometry.boards.host.loop import LoopClient
 from tachometry.boards.monitor.selftest import Step, selftest
 from tachometry.spec import of_texts
-from tachometry.spec.control import LoopSpec
 from tachometry.spec.core.index import Index
-from tachometry.spec.registers.demo import DemoMap, demo_manifest, demo_map
+from tachometry.spec.registers.demo import DemoMap, demo_manifest
 from tachometry.spec.registers.emulator import EmulatorSettings, fastest, rate_of, speed_of
 
 _COMMON = {"ppr": "16", "clock": "8MHz", "tick": "20us"}
@@ -116,32 +113,3 @@ def test_the_index_is_high_in_a_quarter_of_each_revolution() -> None:
         if snapshot["indexed"]:
             seen.add(snapshot["index_position"] % spec.encoder.counts_per_rev)
     assert len(seen) == 1
-
-
-# Amaranth's simulator takes ten seconds; tests/hdl/bus/test_loop_registers.py has the same registers, without a board.
-@nightly
-def test_a_control_loop_on_a_board() -> None:
-    """The emulated shaft turns faster than is commanded, so the current brakes it; a restart keeps what was set."""
-    tachometer = of_texts("s", {"ppr": "500", "clock": "12MHz", "max-speed": "1000rad/s"})
-    spec = LoopSpec(tachometer=tachometer, gains="inputs", observer=Fraction(400))
-    registers = demo_map(spec)
-    described = demo_manifest(registers, uart())
-    assert {"drive", "enable"} <= {port["name"] for port in described["ports"]}
-    board = DemoBoard(DemoPort(spec), described, timeout=60)
-    client = LoopClient(board.link.read, board.link.write, described)
-    board.set(emulated=1, speed=speed_of(tachometer, 20.0), rate=0)
-    client.set(gain_position=0, gain_disturbance=0, gain_velocity=10, command_velocity=2)
-    assert client.snapshot()["current"] == 0
-    client.enable(True)
-    for _ in range(2):
-        board.client.snapshot()
-        now = client.snapshot()
-        ampere = described["loop"]["current"]["amperes_per_lsb"]
-        speed = now["filtered_velocity"] * described["loop"]["filtered_velocity"]["rad_per_s_per_lsb"]
-        assert now["current"] * ampere == pytest.approx(10 * (2 - speed) * 0.003 / 0.0603, rel=0.001)
-        assert speed > 2
-        board.restart()
-        board.link.words(0, 1)
-    client.enable(False)
-    client.snapshot()
-    assert client.snapshot()["current"] == 0

@@ -186,19 +186,3 @@ def test_a_jump_changes_both_lines_at_once() -> None:
     trace = GoldenEmulator().trace([Change(10, EmulatorSettings(), jump=True)], 100)
     assert trace.clock.tolist() == [0, 11 + LATENCY]
     assert (trace.a.tolist(), trace.b.tolist()) == ([0, 1], [0, 1])
-
-
-def test_the_random_bits_have_their_full_length() -> None:
-    """x^31 + x^28 + 1 over GF(2) is primitive: 2^31 - 1 is a prime, so x^(2^31) = x is enough."""
-    modulus = 1 << 31 | 1 << 28 | 1
-    value = 2
-    for _ in range(31):
-        squared = 0
-        for bit in range(31):
-            if value >> bit & 1:
-                squared ^= 1 << 2 * bit
-        for bit in range(61, 30, -1):
-            if squared >> bit & 1:
-                squared ^= modulus << bit - 31
-        value = squared
-    assert value == 2

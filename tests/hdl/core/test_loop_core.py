@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.control import GENERATED, SERIAL, SMALL, check_core, core_case
-from support.nightly import nightly
+from support.control import SERIAL, SMALL, check_core, core_case
 from support.simulate import Resettable, clock_by_clock
 from support.verilog import play_in_icarus
 
@@ -43,15 +42,6 @@ def test_exported_verilog_in_icarus(tmp_path: Path) -> None:
     assert len(wanted.tables["current_valid"]) > 20
     count, first = compare(wanted, play_in_icarus(spec, tmp_path, changes, trace.n_clocks))
     assert not count, first
-
-
-@nightly  # the period in which both meet is one of many in tests/hdl/control
-def test_the_first_control_tick_has_the_first_update() -> None:
-    """A period of a tick meets each update a clock after it has come."""
-    spec = replace(GENERATED, tachometer=replace(CORE.tachometer, timing=Timing(1_000_000, 50, 2)), control_period=50)
-    run = check_core(spec, n_edges=1)
-    apart = run.updates.clock[:, None] - run.tables["control_tick"].clock
-    assert set(apart[np.abs(apart) < 25].tolist()) == {-1}
 
 
 def test_a_reset_amid_a_program() -> None:

@@ -2,7 +2,6 @@
 
 import subprocess
 from pathlib import Path
-from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from support.options import had_by
 from support.verilog import LintingVerilator
 
 from tachometry.hdl.export import export
-from tachometry.hdl.front_end import decoder
 from tachometry.sim import golden
 from tachometry.sim.encoder.imperfections import LineFault
 from tachometry.sim.encoder.motion import parse_motion
@@ -21,9 +19,6 @@ from tachometry.sim.engines.pysim import PySim
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import Encoder, of_options, of_texts
-from tachometry.spec.core.sensors import SENSORS, Levels, changes
-
-Table = dict[tuple[Levels, Levels], tuple[int, bool]]
 
 BASE = {"ppr": "8", "clock": "1MHz", "tick": "40us", "max-time": "400us"}
 CASES = {
@@ -63,19 +58,6 @@ def test_halls_that_are_equal_at_reset_are_one_error(level: int) -> None:
     assert found.actual.ticks.position[-1] == 1
 
 
-@pytest.mark.parametrize("sensor", ["hall", "up-down"])
-def test_a_wrong_table_is_seen(sensor: str) -> None:
-    spec = of_texts("s", BASE | {"sensor": sensor})
-
-    def wrong(name: str, decoding: int) -> Table:
-        table = changes(name, decoding)
-        pair = next(pair for pair, (step, _) in table.items() if step)
-        return {**table, pair: (0, False)}
-
-    with patch.object(decoder, "changes", wrong):
-        assert lockstep(spec, stress(spec, 1, 20), PySim()).n_mismatches
-
-
 @pytest.mark.parametrize("sensor", CASES)
 def test_the_virtual_encoder_makes_what_the_core_counts(sensor: str) -> None:
     """Also one that is mounted the other way round, with lines that are inverted."""
@@ -112,13 +94,6 @@ def test_many_axes_invert_and_reverse(tmp_path: Path) -> None:
         (tmp_path / name).write_text(text)
     subprocess.run(["iverilog", "-g2012", "-o", "tb", "spindle.v", "spindle_tb.sv"], cwd=tmp_path, check=True)
     assert "PASS" in subprocess.run([tmp_path / "tb"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
-
-
-@pytest.mark.parametrize("sensor", SENSORS)
-def test_options_of_a_manifest_make_the_core_again(sensor: str) -> None:
-    spec = of_texts("s", BASE | {"sensor": sensor})
-    assert of_options(spec.options) == spec
-    assert ("sensor" in spec.options) == ("sensor" in spec.parameters) == (sensor != "quadrature")
 
 
 def test_a_line_of_halls_is_broken() -> None:

@@ -3,7 +3,7 @@ import itertools
 import numpy as np
 import pytest
 from reference.front import believed
-from support.nightly import nightly, only
+from support.nightly import only
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.front_end.conditioner import InputConditioner
@@ -68,18 +68,6 @@ def test_a_filter_of_many_clocks() -> None:
     assert sum(row["swallowed"] for row in seen[:-1]) == gone
 
 
-@pytest.mark.parametrize("clocks", [1, 4])
-@pytest.mark.parametrize("level", [0, 1])
-def test_the_first_level_is_believed_after_as_many_clocks_as_any(clocks: int, level: int) -> None:
-    rows = [{"a": level, "b": level}] * 12
-    seen = clock_by_clock(
-        InputConditioner(clocks), rows, ["level_a", "level_b", "ready_a", "ready_b", "swallowed_edges"]
-    )
-    for name in ("ready_a", "ready_b"):
-        assert [row[name] for row in seen] == [0] * (3 + clocks) + [1] * (9 - clocks)
-    assert all((row["level_a"], row["level_b"], row["swallowed_edges"]) == (level, level, 0) for row in seen[3:])
-
-
 @pytest.mark.parametrize("line", only(["z"], ["a", "b", "z"]))  # all lines have the same filter
 def test_the_first_samples_are_filtered(line: str) -> None:
     """Neither a step nor an error comes of what rattles at first, whatever level the lines rest at."""
@@ -110,28 +98,6 @@ def test_swallowed_edges_of_both_lines_are_counted() -> None:
     assert seen[-1]["swallowed_edges"] == 6
 
 
-@nightly  # it counts to its end, edge by edge
-def test_the_count_of_swallowed_edges_stays_at_its_end() -> None:
-    dithering = [{"a": 0, "b": 0}] * 4 + [{"a": k & 1, "b": k & 1} for k in range(2 * 16400)]
-    assert clock_by_clock(InputConditioner(2), dithering, ["swallowed_edges"])[-1]["swallowed_edges"] == 65534
-
-
 def test_bad_clocks() -> None:
     with pytest.raises(ValueError, match=r"^clocks must be at least 1, not 0$"):
         GlitchFilter(0)
-
-
-def test_a_level_is_out_after_the_synchroniser() -> None:
-    seen = clock_by_clock(
-        InputConditioner(), [{"a": 0, "b": 1}] * 4 + [{"a": 1}] + [{}] * 4, ["level_a", "level_b", "ready_a", "ready_b"]
-    )
-    latency = 2
-    assert [row["level_a"] for row in seen] == [0] * (4 + latency) + [1] * (5 - latency)
-    assert [row["level_b"] for row in seen] == [0] * latency + [1] * (9 - latency)
-
-
-@pytest.mark.parametrize(("a", "b"), list(itertools.product((0, 1), repeat=2)))
-def test_ready_only_when_the_level_and_the_one_before_are_real(a: int, b: int) -> None:
-    seen = clock_by_clock(InputConditioner(), [{"a": a, "b": b}] * 8, ["level_a", "level_b", "ready_a", "ready_b"])
-    assert [(row["ready_a"], row["ready_b"]) for row in seen] == [(0, 0)] * 3 + [(1, 1)] * 5
-    assert all((row["level_a"], row["level_b"]) == (a, b) for row in seen[2:])

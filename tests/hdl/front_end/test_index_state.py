@@ -1,13 +1,10 @@
 """An index that is taken in a state of the lines is one place, and tells when it cannot be."""
 
-from unittest.mock import patch
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from support.nightly import only
 
-from tachometry.hdl.front_end.index_state import IndexState
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.stress import stress_of
@@ -152,17 +149,6 @@ def test_an_index_of_eight_quarters_is_told_in_both_directions_and_one_of_four_n
             run = PySim().run(spec, trace)
             assert compare(golden.run(spec, trace), run) == (0, [])
             assert len(run.tables["index_wide"]) == told, (sign, width)
-
-
-def test_a_state_that_is_not_looked_at_is_seen() -> None:
-    spec, trace = spec_of(index_at="A=1,B=1"), over_the_index(1, 60, 2)
-
-    class Anywhere(IndexState):
-        def __init__(self, state: tuple[int, ...], after: tuple[int, ...], latency: int) -> None:
-            super().__init__(after, state, latency)
-
-    with patch("tachometry.hdl.core.tachometer.IndexState", Anywhere):
-        assert lockstep(spec, trace, PySim()).n_mismatches
 
 
 @pytest.mark.parametrize(

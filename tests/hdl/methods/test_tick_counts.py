@@ -87,43 +87,6 @@ def third(*counts: tuple[int, int]) -> dict[str, int]:
     return check({3: 1, T + 3: 1} | {2 * T + clock: step for clock, step in counts}, [T] * 4)[2]
 
 
-def test_times() -> None:
-    """A count in the last clock of a tick has time 0, and the next clock belongs to the next tick."""
-    for clock in range(T):
-        row = third((clock, 1))
-        assert (row["number"], row["times"], row["places"]) == (1, T - 1 - clock, 1)
-    row = third((0, 1), (7, 1), (19, 1), (20, 1))
-    assert (row["number"], row["times"], row["last"]) == (3, 19 + 12, 0)
-
-
-def test_places() -> None:
-    """In half counts from the begin of the tick: forward the first is 1, the second 3."""
-    for step in (1, -1):
-        rows = [third(*((2 * k, step) for k in range(n))) for n in range(1, MOST + 1)]
-        assert [row["places"] for row in rows] == [step * n * n for n in range(1, MOST + 1)]
-
-
-def test_turning() -> None:
-    """Counts that cancel: an edge that is met twice has the same place both times, and both are counts."""
-    row = third((4, 1), (9, -1))
-    assert (row["number"], row["times"], row["places"], row["moved"]) == (2, 15 + 10, 2, 0)
-
-
-def test_more_than_an_event_takes() -> None:
-    """It takes the first ones; the others move the position, and say when the last count was."""
-    for extra in range(1, 5):
-        row = third(*((k, 1) for k in range(MOST + extra)), (T + 5, -1))
-        assert (row["number"], row["moved"], row["last"]) == (MOST, MOST + extra, T - MOST - extra)
-    # The clock after a full tick begins the next one.
-    third(*((T - k, 1) for k in range(1, MOST + 1)), (T, 1), (T + 1, 1))
-
-
-def test_silence() -> None:
-    """Ticks since the last one with counts, until they are `max_ticks`; so at first."""
-    seen = check({T + 3: 1, 4 * T + 3: 1, 5 * T: -1, 12 * T: 1}, [T] * 14)
-    assert [row["elapsed"] for row in seen] == [5, 5, 1, 2, 3, 1, 1, 2, 3, 4, 5, 5, 5, 1]
-
-
 # Odd seeds have external ticks; each has 40 stretches of other counts.
 @pytest.mark.parametrize("seed", only(range(2), range(20)))
 def test_random_counts(seed: int) -> None:

@@ -1,80 +1,104 @@
-"""Every method that measures times keeps the promises of docs/concepts/timed.md, clock by clock."""
+"""The datapaths of the methods that measure times, in gates: to the bit those of the golden model."""
 
+from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
+import numpy as np
 import pytest
-from support.timed import FRAC_BITS, SILENCE, TICK, decay, run, silence, spec_of, speed
+from numpy.typing import NDArray
+from support.simulate import clock_by_clock
 
+from tachometry.hdl.methods import DATAPATHS
 from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
-from tachometry.spec import MTTachometer, Speed, Timing
+from tachometry.sim.golden import model
+from tachometry.sim.golden.front_end import Steps
+from tachometry.sim.signals.run import Table
+from tachometry.spec import METHODS, Encoder, Speed, Timing
+from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.methods.timed import TimedTachometer
 
-METHODS = ["t", "mt"]
+CLOCKS, TICK, MAX_TICKS = 2400, 20, 20
+OUTPUTS = ["velocity", "interval", "forced"]
 
 
-def timed(method: str, **options: Any) -> TimedTachometer:
-    """Return a measurement with each count, if they are not too close."""
-    return spec_of(method, **options, **({"min_time": 1} if method == "mt" else {}))
+def spec_of(method: str, **options: Any) -> TimedTachometer:
+    """Return ticks of 20 clocks, a little more than a division takes, and at most 20 of them."""
+    timing = Timing(100 * TICK, TICK, MAX_TICKS)
+    spec = METHODS[method](**{"encoder": Encoder(25), "timing": timing, "frac_bits": 8, **options})
+    assert isinstance(spec, TimedTachometer)
+    return spec
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("sign", [1, -1])
-def test_steady_speed(method: str, sign: int) -> None:
-    """The first count opens; from the second on every one gives a speed."""
-    at = list(range(5, 400, 45))
-    got = run(timed(method), dict.fromkeys(at, sign), 400)
-    assert got == [(clock, sign * speed(1, 45), 45, False) for clock in at[1:]]
+def counts(seed: int) -> NDArray[np.int64]:
+    """Return a step for every clock: steady and fast, in either direction, over one edge, and silence up to three
+    times.
+    """
+    rng = np.random.default_rng(seed)
+    step = np.zeros(CLOCKS, np.int64)
+    at, way = 100, 1
+    while at < CLOCKS:
+        gap, turns = [(1, 0.2), (3, 0.5), (9, 0.1), (23, 0), (41, 0.3), (60, 0.2)][rng.integers(6)]
+        for _ in range(rng.integers(1, 8)):
+            if at < CLOCKS:
+                way *= -1 if rng.random() < turns else 1
+                step[at] = way
+            at += gap + int(rng.integers(2))
+        at += int(rng.integers(250)) * (rng.random() < 0.3)
+    return step
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_reversal(method: str) -> None:
-    """An edge that is met twice adds no distance."""
-    steps = {5: 1, 45: 1, 95: -1, 125: -1, 175: -1}
-    got = run(timed(method, bound_decay=False), steps, 180)
-    ways = [(45, 1, 40), (95, 0, 50), (125, -1, 30), (175, -1, 50)]
-    assert [row[:3] for row in got] == [(clock, speed(way, time), time) for clock, way, time in ways]
+def check(spec: TimedTachometer, step: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Check all updates of steps by their clocks, and that they stay; return them: clock and outputs."""
+    n, cycles = len(step), spec.timing.tick_cycles
+    tick, m_e = np.arange(cycles - 1, n, cycles), step.reshape(-1, cycles).sum(axis=1)
+    none, at, n_clocks = np.empty(0, np.int64), np.flatnonzero(step), n + spec.latency.datapath
+    steps = Steps(at - spec.latency.tick, step[at], none, none, none)
+    golden = model(spec).updates(Table(tick, {"pulse_count": m_e}), steps, n_clocks)
+    golden = golden.rows(golden.clock < n_clocks)
+    rows = []
+    for clock in range(n_clocks):
+        row = {"coming": int(clock < n and clock % cycles == cycles - 2)}
+        if spec.form.on_lattice:
+            window = min(clock, n - 1) // cycles
+            row |= {"next_count": int(m_e[window]), "pulse_count": int(m_e[window])}
+        else:
+            row["step_before"] = int(step[clock + 1]) if clock + 1 < n else 0
+        rows.append(row)
+    names = OUTPUTS + [*BOUNDS, "bounds_valid"] * spec.bounds
+    seen = clock_by_clock(DATAPATHS[spec.method](spec), rows, ["velocity_valid", *names])
+    held = dict.fromkeys(OUTPUTS, 0)
+    for row in seen:
+        held = row if row["velocity_valid"] else held
+        assert all(row[name] == held[name] for name in OUTPUTS)
+    got = [[clock, *(row[name] for name in names)] for clock, row in enumerate(seen) if row["velocity_valid"]]
+    wanted = np.stack([golden[name].astype(np.int64) for name in ("clock", *names)], axis=1)
+    assert got == wanted.tolist()
+    return wanted
 
 
-def check_standstill(method: str, sign: int = 1) -> None:
-    """The speed decays tick by tick as 1½ counts over the silence, and is 0 when the maximum time is over."""
-    steps = {5: sign, 25: sign, 45: sign}
-    n = 45 + 3 * SILENCE
-    v = sign * speed(1, 20)
-    moving = [(25, v, 20, False), (45, v, 20, False)]
-    spec = timed(method)
-    # The 0 takes the divider from the last of them.
-    decaying = decay(45, v, 45 + SILENCE - spec.form.division_clocks + 1)
-    assert run(spec, steps, n) == moving + decaying + silence(45, n)
-    without = run(timed(method, bound_decay=False), steps, n)
-    assert without == moving + silence(45, n)
+SHORT = Timing(100 * TICK, TICK, 4)
+CASES: list[tuple[str, dict[str, Any]]] = [
+    *((method, {"timer": timer, "bounds": True}) for method in ("t", "mt") for timer in ("clock", "tick")),
+    *((method, {"paper_exact": True}) for method in ("t", "mt")),
+    *((method, {"max_speed": Speed.parse("2rev/s"), "bound_decay": False}) for method in ("t", "mt")),
+    ("mt", {"whole_cycles": True, "min_time": 50}),
+    ("mt", {"whole_cycles": True, "min_time": 30, "encoder": Encoder(50, 2), "bound_decay": False}),
+]
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("sign", [1, -1])
-def test_standstill(method: str, sign: int) -> None:
-    check_standstill(method, sign)
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(("method", "options"), CASES, ids=str)
+def test_every_update(method: str, options: dict[str, Any], seed: int) -> None:
+    spec = spec_of(method, **{"timing": SHORT, **options})
+    found = check(spec, counts(seed))
+    assert len(found) > 15
+    assert not spec.bounds or len(np.unique(found[:, -1])) == 2
+    assert (np.abs(found[:, 1]).max() == 2 << 8) or not spec.form.saturates
 
 
-def check_greatest_speed(method: str, sign: int = 1) -> None:
-    """Check that a speed that is too high is held at the limit, whichever way, and a lower one is not."""
-    spec = timed(method, bound_decay=False, max_speed=Speed.parse("2rev/s"))
-    assert spec.form.saturates
-    # As many as a window takes; two counts.
-    fast = range(5, 5 + spec.form.min_periods + 2) if isinstance(spec, MTTachometer) else {5, 9}
-    got = run(spec, dict.fromkeys([*fast, 139], sign), 180)
-    last, first = max(fast), min(fast)
-    velocities = [(last, 2 << FRAC_BITS, last - first), (139, speed(1, 139 - last), 139 - last)]
-    assert [row[:3] for row in got] == [(clock, sign * velocity, time) for clock, velocity, time in velocities]
-
-
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("sign", [1, -1])
-def test_greatest_speed(method: str, sign: int) -> None:
-    check_greatest_speed(method, sign)
-
-
-def test_too_far() -> None:
-    """A window so long and so fast that the divider does not take its distance is held there, too."""
+def test_a_distance_that_the_divider_does_not_take_is_held() -> None:
+    """A window so long and so fast is held at the greatest speed."""
     for time in (205, 400):
         spec = spec_of("mt", min_time=time - 1, bound_decay=False, max_speed=Speed.parse("2rev/s"))
         # In half counts, times the clocks in a tick. The first, less what the divider does not take, would be next to
@@ -82,86 +106,47 @@ def test_too_far() -> None:
         most, distance = 1 << (len(QuotientVelocity(spec).divider.dividend) - 2), 2 * TICK * time
         assert 0 < distance - most < TICK if time == 205 else 2 * most - distance < 2 * TICK * TICK
         for sign in (1, -1):
-            got = run(spec, dict.fromkeys(range(5, 6 + time), sign), 6 + time)
-            assert [row[1:3] for row in got] == [(sign * 2 << FRAC_BITS, time)]
+            step = np.zeros(420, np.int64)
+            step[5 : 6 + time] = sign
+            assert check(spec, step)[0, 1:3].tolist() == [sign * 2 << 8, time]
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_one_count_then_silence(method: str) -> None:
-    """One count is no speed."""
-    n = 100 + 3 * SILENCE
-    assert run(timed(method), {100: 1}, n) == silence(100, n)
-    # After reset nothing has been counted.
-    got = run(timed(method), {}, n)
-    assert got == [(clock, 0, SILENCE, True) for clock in range(SILENCE - 1, n, SILENCE)]
+def test_a_reversal_meets_an_edge_twice() -> None:
+    """The distance is half of the ends and all between; to the letter, the counts after the opening one."""
+    step, counts = np.zeros(180, np.int64), [1, 1, -1, -1, -1, 1, -1, -1, -1, 1, 1]
+    step[[5, 15, 25, 35, 45, 60, 70, 80, 115, 125, 170]] = counts
+    for options, ways in (({"bound_decay": False}, (-1, -2, 1)), ({"paper_exact": True}, (-1, -3, 2))):
+        found = check(spec_of("mt", min_time=50, **options), step)
+        assert found[:, 1].tolist() == [round(Fraction(way * TICK, 55) * 256) for way in ways]
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_counts_in_a_row(method: str) -> None:
-    """The sign of the first counts for the second, which comes in the next clock."""
-    got = run(timed(method, bound_decay=False), {5: -1, 6: -1, 60: -1}, 61)
-    expected = [(6, speed(-1, 1), 1), (60, speed(-1, 54), 54)] if method == "t" else [(60, speed(-2, 55), 55)]
-    assert [row[:3] for row in got] == expected
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (
+            {"whole_cycles": True, "timer": "tick"},
+            "whole_cycles must not be given with times in ticks, which are coarser than the errors that cancel",
+        ),
+        (
+            {"whole_cycles": True, "paper_exact": True},
+            "whole_cycles must not be given with paper_exact, which has no such windows",
+        ),
+        ({"min_time": 0}, "min_time must be from 1 to 400 clocks, the maximum time, not 0"),
+        ({"min_time": 401}, "min_time must be from 1 to 400 clocks, the maximum time, not 401"),
+        ({"min_time": 30, "timer": "tick"}, "min_time must be a multiple of 20 clocks with times in ticks, not 30"),
+        ({"timer": "x"}, "timer must be clock or tick, not 'x'"),
+    ],
+)
+def test_bad_options(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=f"^{message}$"):
+        spec_of("mt", **options)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_dithering_on_one_edge(method: str) -> None:
-    """It reads 0 for ever, in any rhythm."""
-    at = [7, 8, 9, 50, 51, 60, 100, 130, 131, 132, 133, 200, 229, 300]
-    got = run(timed(method), {clock: (-1) ** k for k, clock in enumerate(at)}, 300 + 2 * SILENCE)
-    assert len(got) > 4
-    assert {velocity for _, velocity, *_ in got} == {0}
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_burst_after_standstill(method: str) -> None:
-    """No speed exceeds one count a clock, and none is left when the maximum time is over."""
-    begin = 2 * SILENCE + 10
-    steps = {clock: 1 for clock in range(begin, begin + 60)}
-    last, n = begin + 59, begin + 59 + 3 * SILENCE
-    got = run(timed(method), steps, n)
-    assert silence(last, n) == [row for row in got if row[0] > last and not row[1]]
-    moving = [row for row in got if row[1]]
-    assert [row[1] for row in moving if not row[3]] == [speed(1, 1)] * sum(not row[3] for row in moving)
-    assert all(
-        last < clock < last + SILENCE and 0 < v <= speed(3, 2 * age) for clock, v, age, forced in moving if forced
-    )
-    assert len(moving) > 5
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_count_at_the_maximum_time(method: str) -> None:
-    """It is a count, and the silence of a clock more is one."""
-    got = run(timed(method, bound_decay=False), {5: 1, 5 + SILENCE: 1, 6 + 2 * SILENCE: 1}, 7 + 2 * SILENCE)
-    assert got == [(5 + SILENCE, speed(1, SILENCE), SILENCE, False), (5 + 2 * SILENCE, 0, SILENCE, True)]
-    # Where a second 0 would be forced, it is the first after a silence.
-    assert run(timed(method), {5: 1, 5 + 2 * SILENCE: 1}, 6 + 2 * SILENCE) == silence(5, 5 + 2 * SILENCE)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_a_measurement_takes_the_divider_from_a_decay(method: str) -> None:
-    spec = timed(method)
-    tick = 6 * TICK - 1
-    for clock in range(tick + 1, tick + 20):
-        got = run(spec, {5: 1, 25: 1, 45: 1, clock: 1}, clock + 1)
-        assert got[-1] == (clock, speed(1, clock - 45), clock - 45, False)
-        decayed = (tick, speed(3, 2 * (tick - 45)), tick - 45, True)
-        assert (decayed in got) == (clock >= tick + spec.form.division_clocks)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_turning_tail(method: str) -> None:
-    """A decay looks at the sign of the velocity, not of that before it; ticks here are shorter than a division."""
-    for late in range(20):
-        steps = {5: 1, 45: 1, 65: -1, 72 + late: -1}
-        got = run(timed(method, timing=Timing(800, 8, 50)), steps, 72 + late + 100)
-        assert all(velocity <= 0 for clock, velocity, *_ in got if clock > 65)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_only_silence_decays(method: str) -> None:
-    """Counts come late, 19 clocks after 10 that lay 10 apart, but the tick is not empty: nothing decays."""
-    steps = {clock: 1 for clock in (*range(100, 201, 10), 201 + 19 + 18)}
-    got = run(timed(method), steps, 220)
-    assert len(got) > 3
-    assert not any(forced and velocity for _, velocity, _, forced in got)
+def test_ticks_may_be_shorter_than_a_division() -> None:
+    """A velocity that decays looks at its own sign, not at that of the one before it."""
+    for late in (0, 7, 13):
+        step = np.zeros(200, np.int64)
+        step[[5, 45, 65, 72 + late]] = [1, 1, -1, -1]
+        for method in ("t", "mt"):
+            spec = spec_of(method, **({"min_time": 1} if method == "mt" else {}))
+            check(replace(spec, timing=Timing(800, 8, 50)), step)
