@@ -5,13 +5,11 @@ import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from fractions import Fraction
 from functools import partial
 from itertools import product
 from typing import NamedTuple
 
 from loops import IDEAL, KINDS, REAL, TASK, TICKS, check, setting, usable, variants
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from pages import MEASURED, ROOT, markdown, measure, stamp
 
@@ -19,7 +17,6 @@ from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.engines.loop import Observer
 from tachometry.sim.plots.style import COLOURS, save_figure
 from tachometry.sim.studies.loops.control import Outcome, Task, each_seed, mean, outcome_of
-from tachometry.spec.language.units import format_time
 
 sys.path.append(str(ROOT / "examples"))
 from papers.tsuji_loops import SOLUTIONS, Cosine, deviation, solution
@@ -30,7 +27,6 @@ SLOW = {
     "2 rad/s": "ramp:0:2rad/s:300ms+constant:2rad/s:900ms",
     "10 rad/s": "ramp:0:10rad/s:300ms+constant:10rad/s:900ms",
 }
-SHOWN_TICKS = {1e-3: "1 ms", 1e-4: "100 µs", 20e-6: "20 µs", 1e-6: "1 µs", 20e-9: "one clock, 20 ns"}
 PAGE, PICTURE = MEASURED / "control.md", MEASURED / "control.png"
 
 
@@ -44,13 +40,12 @@ class Best(NamedTuple):
     outcome: Outcome
 
 
-# The figure: label, levels and value of each row of panels, and inches.
+# The figure: label, levels and value of each row of panels.
 SHOWN: tuple[tuple[str, tuple[float, ...], Callable[[Best], float]], ...] = (
     ("usable $k_v$ (1/s)", (50, 100, 200, 400), lambda one: one.gain),
     ("dip under 0.2 Nm (rad/s)", (0.1, 0.2, 0.4, 0.8), lambda one: one.outcome.dip or 0.0),
     ("current above 50 Hz (A rms)", (0.0, 0.2, 0.4, 0.6, 0.8, 1.0), lambda one: one.outcome.sound),
 )
-WIDTH, HEIGHT, LEFT, TOP, BOTTOM, ACROSS, DOWN, PANEL = 9.0, 6.5, 0.75, 0.7, 0.65, 0.25, 0.25, 3.9
 
 
 def cell(outcome: Outcome) -> str:
@@ -73,7 +68,7 @@ def usable_gains(seeds: int, jobs: int | None) -> tuple[str, list[Best]]:
             row.append(f"{best[0]:g}: {cell(best[1])}" if best else "-")
             found += [Best(disc, kind.name, seconds, *best)] if best else []
         rows.append(row)
-    heads = ["disc", "method", *(SHOWN_TICKS[seconds] for seconds in TICKS)]
+    heads = ["disc", "method", *(head for *_, head in TICKS.values())]
     return markdown(heads, rows, left=range(len(heads))), found
 
 
@@ -86,35 +81,20 @@ def gains(seeds: int, jobs: int | None) -> str:
 
 def drawn(found: Sequence[Best]) -> Figure:
     """Return usable gain, dip and current over the tick: a column per disc, a curve per method."""
-    discs, names = list(dict.fromkeys(one.disc for one in found)), list(dict.fromkeys(one.name for one in found))
-    ticks, n_rows = sorted({one.seconds for one in found}), len(SHOWN)
-    figure = Figure(figsize=(WIDTH, HEIGHT))
-    FigureCanvasAgg(figure)
-    tall = (HEIGHT - TOP - BOTTOM - DOWN * (n_rows - 1)) / n_rows
-    for row, (label, levels, value) in enumerate(SHOWN):
-        first = None
-        for column, disc in enumerate(discs):
-            low = HEIGHT - TOP - (row + 1) * tall - row * DOWN
-            place = ((LEFT + column * (PANEL + ACROSS)) / WIDTH, low / HEIGHT, PANEL / WIDTH, tall / HEIGHT)
-            axes = figure.add_axes(place, sharey=first)
-            first = first or axes
-            for name, colour, mark in zip(names, COLOURS, "os^DvP", strict=False):
-                shown = sorted((one.seconds, value(one)) for one in found if (one.disc, one.name) == (disc, name))
-                x, y = [one[0] for one in shown], [one[1] for one in shown]
-                axes.plot(x, y, color=colour, marker=mark, markersize=4, linewidth=1, label=name)
-            axes.set_xscale("log")
-            axes.set_yscale("linear" if row == n_rows - 1 else "log")
-            axes.set_xticks(ticks, [format_time(Fraction(f"{tick:.6g}")) for tick in ticks])
-            axes.set_yticks(levels, [f"{level:g}" for level in levels])
-            axes.minorticks_off()
-            axes.tick_params(labelbottom=row == n_rows - 1, labelleft=column == 0)
-            axes.set_title(disc if row == 0 else "", loc="left", fontsize=9)
-            if column == 0:
-                axes.set_ylabel(label)
-                axes.yaxis.set_label_coords(-0.13, 0.5)
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="upper center", ncols=len(names), fontsize=8)
-    figure.text(0.5, 0.02, "control tick", ha="center", fontsize=9)
+    figure = Figure(figsize=(9, 6.5), layout="constrained")
+    panels = figure.subplots(len(SHOWN), len(DISCS), sharex=True, sharey="row")
+    for (row, (label, levels, value)), (column, disc) in product(enumerate(SHOWN), enumerate(DISCS)):
+        axes = panels[row, column]
+        for name, colour, mark in zip((kind.name for kind in KINDS), COLOURS, "os^DvP", strict=False):
+            shown = sorted((one.seconds, value(one)) for one in found if (one.disc, one.name) == (disc, name))
+            axes.plot(*zip(*shown, strict=True), color=colour, marker=mark, markersize=4, linewidth=1, label=name)
+        axes.set(xscale="log", yscale="linear" if label == SHOWN[-1][0] else "log", ylabel=label * (column == 0))
+        axes.set_xticks([*TICKS], [head.split(", ")[-1] for *_, head in TICKS.values()])
+        axes.set_yticks(levels, [f"{level:g}" for level in levels])
+        axes.minorticks_off()
+        axes.set_title(disc * (row == 0), loc="left", fontsize=9)
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=len(KINDS), fontsize=8)
+    figure.supxlabel("control tick", fontsize=9)
     return figure
 
 
@@ -167,12 +147,12 @@ def solutions(seeds: int, jobs: int | None) -> str:
     """Return the largest deviations of Fig. 14 with shorter ticks, mean of seeds: 1 s to 39 rad/s, from 2 s to 4 s."""
     motion, rows = parse_motion("ramp:0:39rad/s:1s+constant:39rad/s:3s"), []
     for seconds in (1e-3, 1e-4, 20e-6, 1e-6):
-        _, tick = TICKS[seconds]
+        _, tick, head = TICKS[seconds]
         found = []
         for _, cancel, synchronised in SOLUTIONS:
             logs = each_seed(solution(tick, motion, cancel, synchronised), range(seeds), jobs)
             found.append(sum(deviation(log, 2.0) for log in logs) / seeds)
-        rows.append((SHOWN_TICKS[seconds], *(f"{value:.2f}" for value in found)))
+        rows.append((head, *(f"{value:.2f}" for value in found)))
     return markdown(("T_s", "(a)", "(b)", "(c)"), rows)
 
 

@@ -6,14 +6,13 @@ every machine.
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 from motions import REAL, values_of
 from numpy.typing import NDArray
-from pages import MEASURED, markdown, measure, write
+from pages import MEASURED, data, markdown, measure, write
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
@@ -21,23 +20,18 @@ from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
 from tachometry.sim.golden.front_end import decode
 from tachometry.sim.signals.run import Run
 from tachometry.sim.signals.tables import HeldVelocity, held_velocity, velocity_error
-from tachometry.spec import Encoder, STachometer, Timing, TrackTachometer
-from tachometry.spec.core.compare import Compare
+from tachometry.spec import TachometerSpec, TrackTachometer, of_texts
 
 PAGE, PICTURE = MEASURED / "encoder.md", MEASURED / "encoder.svg"
 
 FloatArray = NDArray[np.float64]
 
-# The table: 500 lines, an edge in 30.6 or 326 clocks.
-CORE = STachometer(encoder=Encoder(500), timing=Timing.parse("1MHz", "100us", "10ms"))
-FAST, SLOW = 3.27, 0.307  # counts of x4 per tick
+_DATA = data("encoder")
+FAST, SLOW = _DATA["fast"], _DATA["slow"]
+EXAMPLES: Mapping[str, str] = _DATA["examples"]
+PULSES = _DATA["pulses"]
 DURATION_S, SETTLED_S = 0.5, 0.05
 SHOWN = slice(600, 616)  # ticks
-
-# Pulses at positions: every seventh is at another phase of a line.
-TIMING = {"clock": "48MHz", "tick": "100us", "max_time": "100ms"}
-PULSES = ("3:7:0:1us", "3:7:0:1us:fine")
-PULSE_MOTIONS = ("constant:10rad/s:500ms", "constant:100rad/s:500ms", "ramp:50rad/s:150rad/s:500ms")
 DISCS: Mapping[str, Mapping[str, str]] = {"ideal": {}, "real": REAL}
 
 # The picture: periods of an encoder with two in a turn, a seed that shows one lost pulse and one illegal, and pixels.
@@ -46,30 +40,14 @@ LEFT, WIDTH, TOP, ROW, LANE, GAP, COUNT = 190, 560, 32, 108, 12, 5, 2
 GREY, BLACK, BLUE, RED = "#bbb", "#222", "#2a78c8", "#b3261e"
 
 
-# Imperfections as the table has them, and the magnitudes in which they are drawn, if they are.
-EXAMPLES = {
-    "none": "",
-    "--jitter 0.05": "0.15",
-    "--nonuniformity 0.1": "0.35",
-    "--phase-error 30": "30",
-    "--phase-error 30 --decoding 1": "",
-    "--duty-error 30": "30",
-    "--duty-error 30 --decoding 1": "",
-    "--bounce 3:8us": "3:60ms",
-    "--bounce 3:8us --filter 9": "",
-    "--lost 0.01": "0.2",
-    "--illegal 0.01": "0.15",
-}
-
-
-def turn(counts_per_tick: float, encoder: VirtualEncoder, spec: STachometer) -> tuple[Encoding, Run]:
+def turn(counts_per_tick: float, encoder: VirtualEncoder, spec: TachometerSpec) -> tuple[Encoding, Run]:
     """Return an encoder at constant speed on a core's golden model."""
-    speed = counts_per_tick / (4 * encoder.pulses_per_rev * float(spec.tick.seconds(spec.timing.tick_cycles)))
+    speed = counts_per_tick / (4 * encoder.pulses_per_rev * float(spec.timing.tick_seconds))
     encoding = encoder.record(parse_motion(f"constant:{speed!r}rev/s:{DURATION_S}s"))
     return encoding, golden.run(spec, encoding.recording.place(spec.timing.clock_hz))
 
 
-def velocity_errors(spec: STachometer, encoding: Encoding, run: Run) -> str:
+def velocity_errors(spec: TachometerSpec, encoding: Encoding, run: Run) -> str:
     """Return RMS and mean error of the held velocity in per cent of the speed, once the start is forgotten."""
     held = held_velocity(spec, run)
     settled = held.time >= SETTLED_S
@@ -81,10 +59,11 @@ def velocity_errors(spec: STachometer, encoding: Encoding, run: Run) -> str:
 
 def row(example: str) -> list[str]:
     """Return a row of the table."""
-    ppr, words = CORE.encoder.pulses_per_rev, example.replace("--", "").split()[example == "none" :]
+    words = example.replace("--", "").split()[example == "none" :]
     faults = dict(zip(words[::2], words[1::2], strict=True))
-    decoding, filter_clocks = int(faults.pop("decoding", "4")), int(faults.pop("filter", "0"))
-    spec = replace(CORE, encoder=Encoder(ppr, decoding), filter_clocks=filter_clocks)
+    core = {name: faults.pop(name) for name in ("decoding", "filter") if name in faults}
+    spec = of_texts("s", _DATA["core"] | core)
+    ppr, decoding = spec.encoder.pulses_per_rev, spec.encoder.decoding
     encoder = VirtualEncoder(ppr, start_angle_rad=math.pi / (4 * ppr), **values_of(faults, SEED))
     fast, slow = (turn(counts, encoder, spec) for counts in (FAST, SLOW))
     encoding, run = fast
@@ -104,16 +83,14 @@ def row(example: str) -> list[str]:
 def table() -> str:
     """Return the table of imperfections."""
     heads = ["encoder and core", "position off (counts)", "`decode_error`", "`swallowed_edges`"]
-    heads += [
-        f"m_e at {FAST} counts per tick",
-        f"velocity error, RMS (mean), at {FAST} counts per tick",
-    ]
+    heads += [f"{what} at {FAST} counts per tick" for what in ("m_e", "velocity error, RMS (mean),")]
     return markdown([*heads, f"and at {SLOW}"], list(map(row, EXAMPLES)))
 
 
 def pulses(motion: str, disc: Mapping[str, str], fine: bool) -> str:
     """Return how far pulses of the compare output are from their places, in counts: the mean, and RMS about it."""
-    spec = TrackTachometer(encoder=Encoder(500), timing=Timing.parse(**TIMING), compare=Compare.parse("", PULSES[fine]))
+    spec = of_texts("track", PULSES["core"] | {"compare": PULSES["compare"][fine]})
+    assert isinstance(spec, TrackTachometer)
     encoder = VirtualEncoder(500, start_angle_rad=math.pi / 2000, **values_of(disc, SEED))  # amid position 0
     moved = parse_motion(motion)
     found = golden.run(spec, encoder.record(moved).recording.place(spec.timing.clock_hz)).tables["compare_valid"]
@@ -128,7 +105,7 @@ def pulse_table() -> str:
     """Return the table of pulses."""
     rows = [
         [name, f"`{motion}`", *(pulses(motion, disc, fine) for fine in (False, True))]
-        for (name, disc), motion in product(DISCS.items(), PULSE_MOTIONS)
+        for (name, disc), motion in product(DISCS.items(), PULSES["motions"])
     ]
     return markdown(["disc", "motion", "on counts", "on `position_fine`"], rows)
 

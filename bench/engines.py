@@ -5,10 +5,8 @@ of it only. Times of engines are processor time, so that what else runs on the m
 ratios mean something.
 """
 
-import ctypes
 import os
 import platform
-import resource
 import subprocess
 import sys
 import time
@@ -16,20 +14,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
-from pathlib import Path
-from typing import Any, NamedTuple
-from unittest.mock import patch
 
-import numpy as np
-from amaranth.back import cxxrtl as amaranth_cxxrtl
-from amaranth.back import rtlil
-from pages import MEASURED, filled, markdown, measure
+from pages import MEASURED, ROOT, markdown, measure
 
-from tachometry.sim import build, golden
+from tachometry.sim import golden
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines.compiled import CompiledEngine, Design, Play
-from tachometry.sim.engines.cxxrtl import headers, model_of, translate
 from tachometry.sim.engines.engine import driven_pins
 from tachometry.sim.engines.pick import pick
 from tachometry.sim.signals.recording import PinTrace
@@ -43,27 +34,11 @@ REPEATS = 2
 
 GOLDEN_COLUMNS = ["core", "golden model", "ticks/s", "clocks/s", "pysim, clocks/s", "ratio"]
 ENGINES = ("verilator", "cxxrtl-every-clock", "cxxrtl")
-_OF_CXXRTL = ("pysim", "verilator", "bare loop", "cxxrtl-every-clock")
-SPEED_COLUMNS = ["core", *_OF_CXXRTL, "cxxrtl", *(f"÷ {name}" for name in _OF_CXXRTL)]
-WHOLE_COLUMNS = ["core", "loop, every clock", "loop", "ratio", "process, every clock", "process", "ratio"]
-WHOLE_COLUMNS += ["golden model", "updates", "mismatches"]
+SPEED_COLUMNS = ["core", "pysim", *ENGINES, "÷ pysim", *(f"÷ {name}" for name in ENGINES[:-1])]
+WHOLE_COLUMNS = ["core", "every clock", "idle clocks skipped", "ratio", "golden model", "updates", "mismatches"]
+FIXED_TEST = "tests/sim/theory/test_rairan.py::test_bounds_are_never_exceeded_at_any_speed_and_phase"
 _TEXTS = {"ppr": "500", "clock": "48MHz", "tick": "20us", "max-time": "10ms"}
 CORES = {name: of_texts(name, _TEXTS) for name in METHODS}
-
-
-class Speed(NamedTuple):
-    """Clocks per second of one core."""
-
-    pysim: float
-    verilator: float
-    bare: float
-    every_clock: float
-    cxxrtl: float
-
-    @property
-    def cells(self) -> list[str]:
-        """The row of the table, but for the name."""
-        return [*(f"{rate:.3g}" for rate in self), *(f"{self.cxxrtl / rate:.3g}" for rate in self[:-1])]
 
 
 @cache
@@ -100,31 +75,6 @@ def golden_row(name: str, spec: TachometerSpec, trace: PinTrace, slow: int = SLO
     return [name, f"{took * 1e3:.0f} ms", *(f"{each:.2g}" for each in rates)]
 
 
-def loops(spec: TachometerSpec, trace: PinTrace, *options: str, debug: bool = False) -> Any:
-    """Return the library with the loops; `debug` with what Amaranth's `cxxrtl.convert` writes as it stands."""
-    design = Design(spec, driven_pins(spec, trace))
-    with patch.dict(os.environ, AMARANTH_USE_YOSYS="builtin"):
-        text = (
-            amaranth_cxxrtl.convert(design.component, name="top", emit_src=False)
-            if debug
-            else translate(rtlil.convert(design.component, name="top", emit_src=False))
-        )
-    source = design.source(text + model_of(design, text)) + filled("loops.h")
-    key = build.digest("bench", source, build.compiler(), build.version(build.compiler()), build.flags(), options)
-    made = build.cached(key, ".so", lambda folder: build.compile_library(source, folder, f"-I{headers()}", *options))
-    return ctypes.CDLL(str(made))
-
-
-def strobes(library: Any, name: str, trace: PinTrace) -> int:
-    """Run a loop of a library: clocks with a strobe."""
-    at, level = np.ascontiguousarray(trace.clock, dtype=np.int64), np.ascontiguousarray(trace.level)
-    call = getattr(library, name)
-    call.restype = ctypes.c_int64
-    pointers = (ctypes.c_void_p(at.ctypes.data), ctypes.c_void_p(level.ctypes.data))
-    found: int = call(*pointers, ctypes.c_int64(len(at)), ctypes.c_int64(trace.n_clocks))
-    return found
-
-
 def checked(expected: Run, run: Run, name: str, spec: TachometerSpec) -> None:
     """Check that an engine gave what is expected; RuntimeError if not."""
     wrong, first = compare(expected, run)
@@ -153,68 +103,35 @@ def simulated(spec: TachometerSpec, part: PinTrace) -> float:
     return part.n_clocks / took
 
 
-def speed(name: str, spec: TachometerSpec, trace: PinTrace, slow: int = SLOW, fast: int = FAST) -> Speed:
-    """Measure one core on all engines."""
-    rates = {"pysim": simulated(spec, part_of(trace, BEGIN, slow))}
+def speeds(name: str, spec: TachometerSpec, trace: PinTrace, slow: int = SLOW, fast: int = FAST) -> list[str]:
+    """Return the row of a core: clocks per second of all engines."""
     part = part_of(trace, BEGIN, fast)
     run = golden.run(spec, part)
-    rates |= {engine: fast / loop_alone(engine, spec, part, run) for engine in ENGINES}
-    clocks = [run.ticks.clock, run.updates.clock, run.index.clock, run.errors, run.tick_errors]
-    bare = []
-    for level in ("-O2", "-O3"):
-        library = loops(spec, part, level)
-        ticks = strobes(library, "bare", part) & 0xFFFFFFFF
-        if ticks != len(np.unique(np.concatenate(clocks))):
-            raise RuntimeError(f"{name}: the bare loop sees {ticks} strobes, which are not those of the golden model")
-        bare.append(fastest(lambda: strobes(library, "bare", part)))  # noqa: B023
-    return Speed(rates["pysim"], rates["verilator"], fast / min(bare), rates["cxxrtl-every-clock"], rates["cxxrtl"])
-
-
-def process(method: str, name: str) -> float:
-    """Return processor time of a process that simulates the motion and compares it with the golden model."""
-    command = [sys.executable, "-c", f"import engines; engines.alone({method!r}, {name!r})"]
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run(command, check=True, cwd=Path(__file__).parent)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+    rates = [simulated(spec, part_of(trace, BEGIN, slow))]
+    rates += [fast / loop_alone(engine, spec, part, run) for engine in ENGINES]
+    return [name, *(f"{rate:.3g}" for rate in rates), *(f"{rates[-1] / rate:.3g}" for rate in rates[:-1])]
 
 
 def whole(name: str, spec: TachometerSpec, trace: PinTrace) -> list[str]:
     """Return all of the motion on cxxrtl and on the golden model."""
     run = golden.run(spec, trace)
-    engines = ("cxxrtl-every-clock", "cxxrtl")
-    loop = [loop_alone(each, spec, trace, run, 1) for each in engines]
-    cells = [name]
-    for slow, fast in (loop, [process(name, each) for each in engines]):
-        cells += [f"{slow:.2g} s", f"{fast:.2g} s", f"{slow / fast:.3g}"]
+    slow, fast = (loop_alone(each, spec, trace, run, 1) for each in ("cxxrtl-every-clock", "cxxrtl"))
     model = fastest(lambda: golden.run(spec, trace))
-    return [*cells, f"{model * 1e3:.0f} ms", f"{len(run.updates.clock):,}", "0"]
+    cells = (f"{slow:.2g} s", f"{fast:.2g} s", f"{slow / fast:.3g}", f"{model * 1e3:.0f} ms")
+    return [name, *cells, f"{len(run.updates.clock):,}", "0"]
 
 
-def steps(spec: TachometerSpec, trace: PinTrace, n_clocks: int = FAST) -> list[list[str]]:
-    """Return the loops, from the one of the manual to the bare one of the table above."""
-    part = part_of(trace, BEGIN, n_clocks)
-    with_debug, without = loops(spec, part, debug=True), loops(spec, part)
-    rows = [
-        ("`cxxrtl.convert` as it stands, `step()` on both levels of the clock", with_debug, "twice"),
-        ("without debug information", without, "twice"),
-        ("one evaluation a clock, reset and edge as constants", without, "once"),
-        ("flip-flops copied unasked", without, "copied"),
-        ("model local to the loop, which it does not outlive", without, "bare"),
-    ]
-    if len({strobes(library, loop, part) for _, library, loop in rows}) > 1:
-        raise RuntimeError("the loops do not see the same strobes")
-    took = {name: fastest(lambda: strobes(library, loop, part)) for name, library, loop in rows}  # noqa: B023
-    run = golden.run(spec, part)
-    took["the engine, which stores rows"] = loop_alone("cxxrtl-every-clock", spec, part, run)
-    took["idle clocks skipped"] = loop_alone("cxxrtl", spec, part, run)
-    return [[name, f"{part.n_clocks / each:.3g}"] for name, each in took.items()]
+def processor_time(*words: str) -> float:
+    """Return seconds that all processes of some tests take; CalledProcessError if one fails."""
+    before = sum(os.times()[2:4])
+    subprocess.run([sys.executable, "-m", "pytest", "-q", "-m", "not nightly", *words], cwd=ROOT, check=True)
+    return sum(os.times()[2:4]) - before
 
 
-def alone(method: str, engine: str) -> None:
-    """Simulate the whole motion on an engine, in a process of which the time is taken."""
-    spec = CORES[method]
-    checked(golden.run(spec, trace()), pick(engine).run(spec, trace()), engine, spec)
+def tests() -> str:
+    """Return how long the tests take, and how much longer than one of them."""
+    one, every = processor_time(FIXED_TEST), processor_time("-n", "auto", "--dist", "worksteal")
+    return markdown(["tests", "processor time", "÷ one test"], [["all", f"{every:.0f} s", f"{every / one:.0f}"]])
 
 
 def golden_table() -> str:
@@ -231,11 +148,9 @@ def golden_table() -> str:
 
 BLOCKS = {
     "golden": golden_table,
-    "engines": lambda: markdown(
-        SPEED_COLUMNS, [[name, *speed(name, spec, trace()).cells] for name, spec in CORES.items()]
-    ),
+    "engines": lambda: markdown(SPEED_COLUMNS, [speeds(name, spec, trace()) for name, spec in CORES.items()]),
     "whole": lambda: markdown(WHOLE_COLUMNS, [whole(name, spec, trace()) for name, spec in CORES.items()]),
-    "steps": lambda: markdown(["loop", "clocks/s"], steps(CORES["s"], trace())),
+    "tests": tests,
 }
 
 if __name__ == "__main__":

@@ -3,9 +3,10 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from pages import data
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
@@ -17,14 +18,14 @@ from tachometry.sim.studies.loops.control import Load, Outcome, Setting, Task, i
 from tachometry.spec import TachometerSpec, of_texts
 from tachometry.spec.methods.track import in_loop
 
+_DATA = data("loops")
 # k_v in 1/s. Each is a fifth more than the one before.
 GAINS = tuple(round(20 * 2 ** (k / 4), 1) for k in range(21))
 SOUND = 1.0  # A rms, above 50 Hz
 DEVIATION = 0.5  # rad/s
 
-IDEAL = VirtualEncoder(500)
-REAL = VirtualEncoder(500, jitter=0.05, nonuniformity=0.1, phase_error_deg=10)
-HALF = VirtualEncoder(500, jitter=0.025, nonuniformity=0.05, phase_error_deg=5)
+DISCS = {name: VirtualEncoder(500, **faults) for name, faults in _DATA["discs"].items()}
+IDEAL, REAL, _ = DISCS.values()
 MOTOR = Motor(coulomb=0.005)
 TASK = Task(
     motion=parse_motion("ramp:0:39rad/s:300ms+constant:39rad/s:900ms"),
@@ -34,39 +35,23 @@ TASK = Task(
 
 
 class Kind(NamedTuple):
-    """How the loop is closed."""
+    """How the loop is closed; loops.toml explains the fields."""
 
     name: str
     method: str
     way: Observer
     options: Mapping[str, str] = {}  # of the method
-    shortest: float = 0.0  # s: the shortest tick of the core; with shorter control ticks it keeps this one
+    shortest: float = 0.0
     filtered: bool = True  # whether there is a low-pass filter of the velocity
 
 
-_SILENT = {"bound-decay": "no"}  # updates without a count are no measurements, and would have eq. (22)'s weight
-KINDS = (
-    Kind("S, synchronised", "s", Observer.SYNCHRONISED),
-    Kind("S, conventional", "s", Observer.CONVENTIONAL),
-    Kind("M/T, synchronised", "mt", Observer.SYNCHRONISED, _SILENT, 20e-6),
-    Kind("M/T, conventional", "mt", Observer.CONVENTIONAL, _SILENT, 20e-6),
-    Kind("tracking", "track", Observer.SYNCHRONISED, {"max-speed": "100rad/s"}, 20e-6, filtered=False),
-)
-# Control ticks in seconds, with the clock, and the tick of a core in words.
-TICKS = {
-    1e-3: ("48MHz", "1ms"),
-    1e-4: ("48MHz", "100us"),
-    20e-6: ("48MHz", "20us"),
-    1e-6: ("48MHz", "1us"),
-    20e-9: ("50MHz", "20ns"),
-}
+KINDS = tuple(Kind(**{**each, "way": Observer[each["way"]]}) for each in _DATA["kind"])
+TICKS: dict[float, list[str]] = {float(seconds): words for seconds, words in _DATA["ticks"].items()}
 
 
 def core(kind: Kind, seconds: float, decoding: int = 4, kv: float = GAINS[0]) -> TachometerSpec:
     """Return the core of a kind, whose tick is a control tick, with an LSB below 2^-6 rad/s."""
-    clock, tick = TICKS[seconds]
-    if seconds < kind.shortest:
-        clock, tick = TICKS[20e-6]
+    clock, tick, _ = TICKS[max(seconds, kind.shortest)]
     texts = {"ppr": "500", "clock": clock, "tick": tick, "max-time": "10ms", "decoding": str(decoding)}
     if tick == "20ns":
         texts["frac-bits"] = "24"
@@ -108,21 +93,11 @@ def usable(
 
 def variants(base: Setting) -> Iterator[tuple[str, Setting]]:
     """Yield what a loop depends on that the paper does not say, one thing changed at a time."""
-    gains, motor = base.gains, base.motor
-    yield "as assumed", base
-    yield "k_v on the velocity before the filter", replace(base, gains=replace(gains, on_filtered=False))
-    yield "no friction", replace(base, motor=replace(motor, coulomb=0.0))
-    yield "friction of 20 mNm", replace(base, motor=replace(motor, coulomb=0.02))
-    yield "viscous friction of 0.5 mNm/(rad/s)", replace(base, motor=replace(motor, viscous=5e-4))
-    yield "no torque noise", replace(base, task=replace(base.task, noise=0.0))
-    yield "ideal disc", replace(base, encoder=IDEAL)
-    yield "half the errors of the disc", replace(base, encoder=HALF)
-    yield "a delay of half a tick", replace(base, gains=replace(gains, delay=gains.seconds / 2))
-    yield "a delay of a tick", replace(base, gains=replace(gains, delay=gains.seconds))
-    yield "driver of 1 ms", replace(base, motor=replace(motor, driver_seconds=1e-3))
-    yield "inertia 20 % above the controller's", replace(base, motor=replace(motor, inertia=1.2 * motor.inertia))
-    yield "current limit of 20 A", replace(base, gains=replace(gains, current_limit=20.0))
-    yield "acceleration of the command fed forward", replace(base, gains=replace(gains, feed_forward=True))
+    for name, changed in _DATA["variants"].items():
+        encoder, delay = DISCS[changed.get("disc", "real")], changed.get("ticks", 0) * base.gains.seconds
+        parts: dict[str, Any] = {part: changed.get(part, {}) for part in ("gains", "motor", "task")}
+        parts["gains"] = {"delay": delay or base.gains.delay, **parts["gains"]}
+        yield name, replace(base, encoder=encoder, **{p: replace(getattr(base, p), **v) for p, v in parts.items()})
 
 
 class Checked(NamedTuple):

@@ -23,17 +23,11 @@ def trace(monkeypatch: pytest.MonkeyPatch) -> PinTrace:
     return VirtualEncoder(500).record(parse_motion("constant:300rad/s:20ms")).recording.place(48_000_000)
 
 
-# It compiles a core four times; what it measures is held against the golden models in tests/sim/engines.
-@nightly
-def test_all_engines_and_the_bare_loop_see_the_same(trace: PinTrace) -> None:
-    speed = bench.speed("m", SPEC, trace, slow=3000, fast=100_000)
-    assert min(speed) > 0
-    assert len(speed.cells) == len(bench.SPEED_COLUMNS) - 1
-
-
-@nightly  # for the same reason
-def test_every_step_sees_the_same(trace: PinTrace) -> None:
-    assert len(bench.steps(SPEC, trace, n_clocks=100_000)) == 7
+@nightly  # it compiles a core three times; what it measures is held against the golden models in tests/sim/engines
+def test_all_engines_see_the_same(trace: PinTrace) -> None:
+    _, *speeds = bench.speeds("m", SPEC, trace, slow=3000, fast=100_000)
+    assert min(map(float, speeds)) > 0
+    assert len(speeds) == len(bench.SPEED_COLUMNS) - 1
 
 
 def test_part_of_a_trace_has_the_same_levels(trace: PinTrace) -> None:
