@@ -93,7 +93,7 @@ def test_every_option_is_in_the_manifest(tmp_path: Path) -> None:
 
 def test_lsb_and_fraction_bits_are_two_words_for_one_thing(tmp_path: Path) -> None:
     for name, words in (("lsb", "--lsb 2^-8"), ("bits", "--frac-bits 8")):
-        assert run("generate", "--ppr", "500", *words.split(), "-o", tmp_path / name) == 0
+        assert run("generate", "--method", "m", "--ppr", "500", *words.split(), "-o", tmp_path / name) == 0
     verilog = [(tmp_path / name / "tachometer.v").read_text() for name in ("lsb", "bits")]
     assert verilog[0] == verilog[1]
 
@@ -103,7 +103,7 @@ BAUDS = [("", 1_000_000, 48), ("--baud 115200", 115_200, 417)]
 
 @pytest.mark.parametrize(("words", "baud", "cycles"), only_rows(BAUDS[1:], BAUDS))
 def test_baud_reaches_the_bus(words: str, baud: int, cycles: int, tmp_path: Path) -> None:
-    assert run("generate", "--ppr", "500", "--bus", "uart", *words.split(), "-o", tmp_path) == 0
+    assert run("generate", "--method", "m", "--ppr", "500", "--bus", "uart", *words.split(), "-o", tmp_path) == 0
     manifest = json.loads((tmp_path / "tachometer.json").read_text())
     assert [manifest[key] for key in ("bus", "baud", "bit_cycles")] == ["uart", baud, cycles]
     assert {"uart_rx", "uart_tx"} < {port["name"] for port in manifest["ports"]}

@@ -126,6 +126,7 @@ def test_the_worst_error_is_told_with_where_it_is(
         assert float(told_error) * rpm == pytest.approx(error, rel=0.005, abs=1.1 * lsb)
 
 
+@pytest.mark.usefixtures("mapped")
 def test_cells_and_clock_are_those_of_the_core_with_its_bus(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("plan", *OPTIONS) == 0
     alone, _, _ = tables(capsys.readouterr().out)
@@ -149,6 +150,7 @@ def test_a_clock_out_of_reach_is_warned_of() -> None:
     assert "warning" not in dict(size_rows(replace(found, wanted_hz=94_000_000)))
 
 
+@pytest.mark.usefixtures("mapped")
 def test_a_bus_that_cannot_be_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("plan", "--ppr", "500", "--bus", "uart", "--baud", "40000000") == 2
     assert "--baud must be within 2 % of" in capsys.readouterr().err
@@ -206,6 +208,7 @@ def test_csv_holds_the_dense_samples(tmp_path: Path) -> None:
         assert float(row["measurement_time_s"]) == pytest.approx(20e-6 * m_s)
 
 
+@pytest.mark.usefixtures("mapped")
 def test_equal_options_give_equal_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """In another process, too."""
 
