@@ -3,6 +3,7 @@
 import gc
 import os
 import signal
+from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,15 @@ def pytest_collection_finish() -> None:
     """Let Python look for garbage among what tests make, and no more in what was collected."""
     gc.freeze()
     gc.enable()
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Tell how long the tests of each folder took."""
+    seconds: Counter[str] = Counter()
+    for report in (report for reports in terminalreporter.stats.values() for report in reports):
+        seconds[getattr(report, "nodeid", "").removeprefix("tests/").split("/")[0]] += getattr(report, "duration", 0)
+    told = (f"{folder} {time:.0f}" for folder, time in seconds.most_common(12) if time >= 1)
+    terminalreporter.write_line(f"seconds: {', '.join(told)}")
 
 
 @pytest.fixture
