@@ -71,7 +71,7 @@ def test_ticks_of_two_clocks_have_nothing_to_skip() -> None:
 def slow_shaft(method: str, **texts: str) -> tuple[TachometerSpec, PinTrace]:
     """Return a core with long ticks, and edges with seconds between them."""
     spec = of_texts(method, {"ppr": "16", "clock": "1MHz", "tick": "1ms", **texts})
-    return spec, turning([1500, 40_000, 150, 2_500_000, 990], 40, 3_000_000)
+    return spec, turning([1500, 40_000, 150, 1_500_000, 990], 12, 1_500_000)
 
 
 def slow(method: str) -> tuple[TachometerSpec, PinTrace]:

@@ -23,7 +23,7 @@ class Stopped(Exception):
     """A signal has come."""
 
 
-@pytest.fixture(autouse=True, params=STOPS)
+@pytest.fixture(params=STOPS)
 def stop(request: pytest.FixtureRequest) -> Iterator[signal.Signals]:
     """Give each signal that stops a command, which raises `Stopped` here."""
 

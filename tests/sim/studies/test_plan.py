@@ -127,7 +127,7 @@ def test_default_range(max_speed: str | None, tick_cycles: int, low: float, high
 
 
 def test_one_count_in_the_maximum_time_is_an_alteration() -> None:
-    for max_ticks in range(2, 2001):
+    for max_ticks in (*range(2, 100), *range(100, 2001, 19)):
         spec = with_max_ticks(max_ticks)
         assert not plan_at(spec, spec.scale.unit_velocity / max_ticks).forced
 
