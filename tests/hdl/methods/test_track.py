@@ -83,15 +83,6 @@ def check(spec: TrackTachometer, steps: Steps, last: NDArray[np.int64]) -> None:
         assert found == right
 
 
-def test_speeds() -> None:
-    """Both ways, fast and slow, and a rest behind each."""
-    for speed in (0.3, -1.6):
-        steps, last = regular(SPEC, speed, 24)
-        kept = steps.clock < 11_000
-        steps = Steps(steps.clock[kept], steps.step[kept], steps.errors, steps.index, steps.swallowed)
-        check(SPEC, steps, last)
-
-
 def test_the_fine_position_wraps_as_the_position_does() -> None:
     steps, last = regular(SPEC, 3, 50)
     check(SPEC, steps, last)

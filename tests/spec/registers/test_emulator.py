@@ -17,7 +17,6 @@ from tachometry.spec.registers.emulator import (
     RANDOM_TAP,
     RANDOM_WIDTH,
     START,
-    EmulatorSettings,
     fastest,
     rad_per_s,
     rate_of,
@@ -43,11 +42,6 @@ def test_how_wrong_the_lines_can_be() -> None:
     eighth, sixteenth = (2**FINE_WIDTH // n for n in (8, 16))
     widths = [2 ** (ERROR_WIDTH - 1), 2**JITTER_WIDTH, 2**BOUNCE_WIDTH, 2**DROP_WIDTH]  # errors are signed
     assert widths == [eighth, sixteenth, 256, 256]
-
-
-def test_nothing_is_wrong_with_the_lines_unless_it_is_told() -> None:
-    nothing = dict.fromkeys(("speed", "rate", "phase_error", "duty_a", "duty_b", "jitter", "bounce", "drop"), 0)
-    assert EmulatorSettings() == EmulatorSettings(**nothing)
 
 
 def test_the_random_bits_come_again_after_the_longest_time() -> None:

@@ -65,13 +65,6 @@ def test_acceleration_and_fine_position() -> None:
         assert described["position_fine"] == {"frac_bits": 3}
 
 
-def test_full_scale() -> None:
-    """Twenty counts a tick, in LSB of 2^−5 count."""
-    velocity = manifest(of_texts("m", BASE))["velocity"]
-    assert velocity["full_scale"] == 20
-    assert velocity["frac_bits"] == 5
-
-
 @pytest.mark.parametrize("name", ["a", "_", "A9_", "a" * 64])
 def test_names_of_modules(name: str) -> None:
     check_module_name(name)

@@ -5,7 +5,6 @@ import pytest
 from tachometry.hdl.export.registers.values import captured_values, in_unit
 from tachometry.spec import of_texts
 from tachometry.spec.control import LoopSpec
-from tachometry.spec.registers import frames
 from tachometry.spec.registers.buses import bus_of
 from tachometry.spec.registers.demo import DemoMap, demo_map, demo_ports
 from tachometry.spec.registers.field import Field
@@ -157,21 +156,3 @@ def test_a_demo_shows_of_its_core_the_drive_of_the_loop_alone() -> None:
     alone, driven = ([port.name for port in each] for each in ports)
     assert alone == [port for port in driven if port != "drive"]
     assert driven == ["uart_tx", "emulated_a", "emulated_b", "drive", "leds"]
-
-
-def test_numbers_of_the_serial_lines() -> None:
-    """docs/guides/serial.md: seven bits of address and the write bit; marks; a quiet line."""
-    assert (frames.SPI_ADDRESS_WIDTH, frames.MARK, frames.ERROR) == (7, 0x80, 1)
-    assert (frames.SPI_SCK_CYCLES, frames.QUIET_BITS) == (8, 32)
-    assert (frames.SEQUENCES, frames.TYPE_LOW, frames.FROM_CORE) == (16, 4, 7)
-    assert (frames.UART_ADDRESS_WIDTH, frames.COUNT_WIDTH) == (8, 8)
-    assert frames.crc(b"") == frames.CRC_START
-    assert (frames.CRC_WIDTH, frames.CRC_POLYNOMIAL, frames.CRC_START) == (16, 0x1021, 0xFFFF)
-
-
-def test_what_is_asked_for_by_default() -> None:
-    assert frames.read_request(3) == frames.read_request(3, 1, 0) == frames.with_check(bytes([0x00, 3, 1]))
-    assert frames.write_request(3, 5) == frames.with_check(bytes([0x10, 3, 5, 0, 0, 0]))
-    for n_words in (0, 1, 255):
-        assert frames.decode_request(frames.read_request(255, n_words, 15)).value == n_words
-    assert frames.decode_request(frames.write_request(0, (1 << 32) - 1, 15)).value == (1 << 32) - 1
