@@ -6,12 +6,14 @@ an edge that comes alone.
 
 from fractions import Fraction
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
-from support.nightly import only_rows
+from support.nightly import nightly, only_rows
 from support.track_grid import PHASES, RATES, SETTLE, TICKS, clocks_of, search
 from support.tracking import core
+from support.verilog import LintingVerilator
 
 from tachometry.sim import build, golden
 from tachometry.sim.engines.cxxrtl import Cxxrtl
@@ -33,6 +35,7 @@ MORE_HALLS = [
     (1, 1, 0, 0, 0, 0),
     (0.5, -0.2, 0.3, -0.5, 0.2, 0),
 ]
+DISCS = [(0, 1), (0, 1, 0, 0), (1, 1, 0, 0), (0.5, -0.5, 0.5, -0.2)]
 
 
 def check(spec: TachometerSpec, pattern: Pattern, phases: int, drift: float = 0) -> int:
@@ -58,6 +61,14 @@ def test_no_wrong_speed_is_locked_to_in_quadrature() -> None:
 @pytest.mark.parametrize(("pattern", "phases"), only_rows(QUICK_HALLS, [*QUICK_HALLS, *product(MORE_HALLS, [PHASES])]))
 def test_no_wrong_speed_is_locked_to_with_halls(pattern: Pattern, phases: int) -> None:
     check(HALLS, pattern, phases)
+
+
+@nightly
+@pytest.mark.parametrize("drift", [0, 5e-4, -2e-3])
+@pytest.mark.parametrize("pattern", DISCS, ids=str)
+def test_no_wrong_speed_is_locked_to_on_other_discs(pattern: Pattern, drift: float) -> None:
+    check(QUADRATURE, pattern, PHASES, drift)
+    check(SLOW, pattern, PHASES // 2, drift)
 
 
 # Rates, and cells of these. The first ones once read half of the speed; the last two are the worst of all now.
@@ -98,3 +109,9 @@ def test_pins_show_the_errors_of_the_search(rate: Fraction, cell: int) -> None:
 
 def test_the_core_plays_the_cell_that_was_worst() -> None:
     assert error(*CELLS[0], Cxxrtl()) < 0.002
+
+
+@nightly
+def test_the_exported_core_plays_the_worst_cells(tmp_path: Path) -> None:
+    for rate, cell in CELLS:
+        assert error(rate, cell, LintingVerilator(tmp_path, few=False)) < 0.002
