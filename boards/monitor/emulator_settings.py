@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable
 from fractions import Fraction
 
 from tachometry.spec import ParameterError, TachometerSpec
+from tachometry.spec.language.field import WORD
 from tachometry.spec.language.units import FRACTION, SPEED, TIME, Unit, read_exactly, read_nearest, rounded
 from tachometry.spec.registers.demo import ENCODER_LINES
 from tachometry.spec.registers.emulator import (
@@ -18,7 +19,6 @@ from tachometry.spec.registers.emulator import (
     rate_of,
     speed_of,
 )
-from tachometry.spec.registers.field import WORD
 
 _ACCELERATION = {name: SPEED[speed] for name, speed in {"rad/s/s": "rad/s", "rev/s/s": "rev/s", "rpm/s": "rpm"}.items()}
 _OF_PERIOD = {"": Unit(), "%": Unit(Fraction(1, 100)), "deg": Unit(Fraction(1, 360))}

@@ -8,9 +8,9 @@ from tachometry.sim.theory.performance import REAL_DISC
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control import AnySpec
 from tachometry.spec.formats.velocity_output import NATIVE
+from tachometry.spec.language.field import WORD
 from tachometry.spec.language.units import SpeedUnit, parse_frequency, plural, short_time
 from tachometry.spec.registers.buses import Bus, registers_on
-from tachometry.spec.registers.field import WORD
 from tachometry.spec.registers.manifest import manifest
 
 

@@ -11,7 +11,7 @@ from amaranth.lib.wiring import In, Out
 from tachometry.hdl.bus.counter import SaturatingCounter
 from tachometry.hdl.bus.native import native_port
 from tachometry.hdl.wires.ports import by_name
-from tachometry.spec.registers.field import WORD, Field, Register
+from tachometry.spec.language.field import WORD, Field, Register
 from tachometry.spec.registers.map import COUNTER_WIDTH, RegisterMap
 
 _DEEPEST = 128  # terms of an expression

@@ -3,7 +3,7 @@
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.spec.registers.field import WORD
+from tachometry.spec.language.field import WORD
 
 
 def native_port(address_width: int) -> wiring.Signature:

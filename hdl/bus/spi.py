@@ -4,7 +4,7 @@ from amaranth import Cat, Module, Mux, Signal
 
 from tachometry.hdl.bus.bridge import Bridge, next_number
 from tachometry.hdl.wires.synchronizer import Synchronizer
-from tachometry.spec.registers.field import WORD
+from tachometry.spec.language.field import WORD
 from tachometry.spec.registers.frames import SPI_ADDRESS_WIDTH
 
 

@@ -5,7 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.bus.native import native_port
-from tachometry.spec.registers.field import WORD
+from tachometry.spec.language.field import WORD
 from tachometry.spec.registers.frames import CRC_POLYNOMIAL, CRC_START, CRC_WIDTH, FROM_CORE, SEQUENCES, TYPE_LOW, Type
 from tachometry.spec.registers.map import RegisterMap
 

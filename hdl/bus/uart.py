@@ -5,7 +5,7 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.bus.bridge import Bridge, next_number
 from tachometry.hdl.wires.synchronizer import Synchronizer
-from tachometry.spec.registers.field import WORD
+from tachometry.spec.language.field import WORD
 from tachometry.spec.registers.frames import (
     COUNT_WIDTH,
     CRC_POLYNOMIAL,

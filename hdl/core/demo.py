@@ -10,9 +10,9 @@ from tachometry.hdl.core.emulator import EncoderEmulator
 from tachometry.hdl.core.register_core import RegisterCore
 from tachometry.hdl.wires.ports import by_name, drive, follow, hand_through, members
 from tachometry.hdl.wires.synchronizer import Synchronizer
+from tachometry.spec.language.field import WORD
 from tachometry.spec.registers.buses import CAPTURE, Bus
 from tachometry.spec.registers.demo import ENCODER_LINES, PERIOD_WIDTH, DemoMap, demo_ports, emulated
-from tachometry.spec.registers.field import WORD
 
 
 class Demo(wiring.Component):

@@ -10,8 +10,8 @@ from tachometry.sim.golden import compare, health, probe
 from tachometry.sim.golden.front_end import decoded, homed
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec.core.stream import OVERRUNS_WIDTH
+from tachometry.spec.language.field import WORD, Field, Register
 from tachometry.spec.language.port import INDEX, MISSED, TICK, UPDATE, WIDE
-from tachometry.spec.registers.field import WORD, Field, Register
 from tachometry.spec.registers.map import COUNTER_WIDTH, RegisterMap
 
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
 
+from tachometry.spec.language.field import Draft
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import Port
 from tachometry.spec.methods.axes import AxesSpec
-from tachometry.spec.registers.field import Draft
 from tachometry.spec.registers.map import RegisterMap
 
 _WHOSE = ("axis", "index_axis")  # what is held says it by its name

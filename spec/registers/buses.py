@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from tachometry.spec.control import AnySpec
+from tachometry.spec.language.field import WORD
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import Port
-from tachometry.spec.registers.field import WORD
 from tachometry.spec.registers.frames import QUIET_BITS, SPI_ADDRESS_WIDTH, SPI_SCK_CYCLES, UART_ADDRESS_WIDTH
 from tachometry.spec.registers.loop import registers_of
 from tachometry.spec.registers.manifest import described_port, manifest

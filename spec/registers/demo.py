@@ -7,6 +7,7 @@ from typing import Any
 
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.language.field import WORD, Draft, Field
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import TICK, Port, held
 from tachometry.spec.registers.buses import Bus, manifest_on
@@ -19,7 +20,6 @@ from tachometry.spec.registers.emulator import (
     RATE_SHIFT,
     WIRES_WIDTH,
 )
-from tachometry.spec.registers.field import WORD, Draft, Field
 from tachometry.spec.registers.loop import LoopMap
 from tachometry.spec.registers.manifest import described_port
 from tachometry.spec.registers.map import RegisterMap

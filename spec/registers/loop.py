@@ -8,10 +8,10 @@ from typing import Self
 from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.control.form import GAINS
 from tachometry.spec.control.ports import CONTROL, CURRENT, GAIN_PORTS, loop_entries
+from tachometry.spec.language.field import WORD, Draft, Field
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import Port
 from tachometry.spec.registers.axes import AxesMap
-from tachometry.spec.registers.field import WORD, Draft, Field
 from tachometry.spec.registers.map import RegisterMap
 
 _MODE, _POSITION = "generator_mode", "command_position"

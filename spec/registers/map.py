@@ -23,8 +23,8 @@ from typing import Any, Self
 from tachometry.spec.control import AnySpec
 from tachometry.spec.core.probe import packed_edges
 from tachometry.spec.core.tachometer import TachometerSpec
+from tachometry.spec.language.field import WORD, Draft, Field, Register
 from tachometry.spec.language.port import INDEX, MISSED, UPDATE, WIDE, Port
-from tachometry.spec.registers.field import WORD, Draft, Field, Register
 from tachometry.spec.registers.manifest import manifest
 
 IDENTIFICATION = int.from_bytes(b"TACH", "big")

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.registers import Access
+from tachometry.spec.language.field import WORD
 from tachometry.spec.registers import frames
-from tachometry.spec.registers.field import WORD
 from tachometry.spec.registers.frames import Answer, FrameError, Request, Type
 
 Golden = Sequence[tuple[int | None, bool]]  # data and error of each access

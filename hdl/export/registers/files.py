@@ -7,7 +7,7 @@ from tachometry.hdl.export.registers import rdl
 from tachometry.hdl.export.registers.values import captured_values, in_unit, is_whole, sentences, written_values
 from tachometry.hdl.export.render import render, render_files
 from tachometry.spec.core.stream import flags_of, parts_of, size_of
-from tachometry.spec.registers.field import Field, Register
+from tachometry.spec.language.field import Field, Register
 from tachometry.spec.registers.map import RegisterMap
 
 # The files, and what --help says of them.

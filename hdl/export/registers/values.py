@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from tachometry.spec.registers.field import WORD, Field, Register
+from tachometry.spec.language.field import WORD, Field, Register
 from tachometry.spec.registers.map import RegisterMap
 
 

@@ -10,7 +10,7 @@ import pytest
 from tachometry.sim.golden.registers import Access, GoldenBank, written
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.spec import of_texts
-from tachometry.spec.registers.field import Field
+from tachometry.spec.language.field import Field
 from tachometry.spec.registers.map import RegisterMap
 
 CORE = {"ppr": "8", "clock": "1MHz", "tick": "10clk", "max-time": "40clk", "frac-bits": "4", "max-speed": "1e6rad/s"}

@@ -5,9 +5,9 @@ import pytest
 from tachometry.hdl.export.registers.values import captured_values, in_unit
 from tachometry.spec import of_texts
 from tachometry.spec.control import LoopSpec
+from tachometry.spec.language.field import Field
 from tachometry.spec.registers.buses import bus_of
 from tachometry.spec.registers.demo import DemoMap, demo_map, demo_ports
-from tachometry.spec.registers.field import Field
 from tachometry.spec.registers.loop import registers_of
 from tachometry.spec.registers.map import RegisterMap
 

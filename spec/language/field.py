@@ -9,7 +9,7 @@ WORD = 32  # bits
 
 @dataclass(frozen=True)
 class Field:
-    """Describes some bits of a register."""
+    """Bits of a register."""
 
     name: str
     width: int  # bits
@@ -46,7 +46,7 @@ class Field:
 
 @dataclass(frozen=True)
 class Register:
-    """Describes a word of 32 bits."""
+    """Word of 32 bits."""
 
     name: str
     offset: int  # bytes
