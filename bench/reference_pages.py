@@ -18,8 +18,8 @@ from tachometry.spec import METHODS, Port, TachometerSpec, of_texts
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.ports import loop_ports
 from tachometry.spec.core.stream import parts_of
+from tachometry.spec.language.field import Register
 from tachometry.spec.registers.buses import BUSES
-from tachometry.spec.registers.field import Register
 from tachometry.spec.registers.loop import LoopMap
 from tachometry.spec.registers.map import RegisterMap
 

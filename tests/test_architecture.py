@@ -30,11 +30,13 @@ ALLOWED = {
     "hdl/axes": {"hdl/arithmetic", "hdl/front_end", "hdl/methods", "hdl/output", "hdl/wires", "spec"},
     "hdl/bus": {"hdl/wires", "spec"},
     "hdl/control": {"hdl/arithmetic", "hdl/wires", "spec"},
+    "hdl/extras": {"hdl/wires", "spec"},
     "hdl/core": {
         "hdl/arithmetic",
         "hdl/axes",
         "hdl/bus",
         "hdl/control",
+        "hdl/extras",
         "hdl/front_end",
         "hdl/methods",
         "hdl/output",
@@ -204,6 +206,7 @@ def test_it_needs_only_the_standard_library(room: str) -> None:
 def test_golden_models_need_only_numpy() -> None:
     for file in files("sim/golden"):
         twin = {"ctypes", "importlib"} if file.name == "track.py" else set()  # which is in C++
+        twin |= {"importlib", "types"} if file.parent.name == "extras" else set()  # which have the names of their files
         top = {name.split(".")[0] for name in imports(file)}
         assert top <= {"tachometry", "numpy", "typing", "collections", "dataclasses", "bisect", "functools", *twin}, (
             file
@@ -299,8 +302,8 @@ def has_a_broken_docstring(node: ast.AST) -> bool:
 
 # What may only fall, with the rule by which it is counted. A change that brings a capability raises lines alone.
 CEILING: dict[str, tuple[int, Callable[[], Counter[str]]]] = {
-    "lines of Python of the product": (46930, lambda: lines(*PRODUCT)),
-    "lines of Python of the tests": (42020, lambda: lines("tests")),
+    "lines of Python of the product": (47085, lambda: lines(*PRODUCT)),
+    "lines of Python of the tests": (42200, lambda: lines("tests")),
     "lines of Python of the benchmarks": (3140, lambda: lines("bench")),
     "functions over 40 lines": (46, lambda: every(is_long, *PRODUCT)),
     "functions with more than 6 parameters": (31, lambda: every(has_many_parameters, *PRODUCT)),

@@ -24,10 +24,11 @@ from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES
 from tachometry.sim.studies.comparing.comparison import Comparison, Source, comparison
 from tachometry.sim.studies.size import CORE, SEEDS, TARGETS, Measurement, measure_core, versions
 from tachometry.spec import TachometerSpec
+from tachometry.spec.core.extras import EXTRAS
 from tachometry.spec.language.units import parse_time
 
 # Options of a core that change its size alone.
-_NO_VELOCITY = ("preset", "index-once", "position-modulo", "probe", "compare", "stream", "over-speed", "health")
+_NO_VELOCITY = ("preset", "index-once", "position-modulo", "probe", "compare", "stream", "health")
 
 
 @click.command(
@@ -135,7 +136,7 @@ def compare(
     missing = {name: one.missing for name, one in BASELINES.items() if methods.strip() == "all" and one.missing}
     named = named_methods(methods, make, [name for name in BASELINES if name not in missing])
     spec = next((spec for spec in named.specs.values() if spec is not None), None) or make("s", {})
-    for name in () if size else _NO_VELOCITY:
+    for name in () if size else (*_NO_VELOCITY, *(extra.name.replace("_", "-") for extra in EXTRAS)):
         if name in spec.options:
             raise ValueError(f"--{name} must be left out, or given together with --size: it changes no velocity")
     source = _source(record, capture, read, spec)

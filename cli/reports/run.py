@@ -155,10 +155,7 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
     if spec.stream is not None:
         shown = "numpy.fromfile reads those of a DMA, with stream.dtype of the manifest"
         rows.append(("stream", f"records are not shown here: {shown}"))
-    if spec.over_speed is not None:
-        tripped = np.flatnonzero(run.ticks.over_speed)
-        when = format_time(spec.tick.seconds(int(run.ticks.clock[tripped[0]]))) if len(tripped) else ""
-        rows.append(("over speed", f"tripped within {when}" if when else f"never beyond {spec.over_speed}"))
+    rows += filter(None, (extra.row(spec, run) for extra in spec.extras))
     if spec.external_tick:
         rows.append(("tick errors", f"{len(run.tick_errors)} (external tick too early or missing)"))
     if n_overflows := int(np.count_nonzero(run.ticks.overflow)):

@@ -1,6 +1,6 @@
 """The whole core with registers, on a native port."""
 
-from amaranth import Module, Mux, ResetInserter, Signal
+from amaranth import Cat, Module, Mux, ResetInserter, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 
@@ -10,7 +10,7 @@ from tachometry.hdl.bus.native import native_port
 from tachometry.hdl.bus.tick_position import TickPosition
 from tachometry.hdl.core.loop_core import LoopCore
 from tachometry.hdl.core.tachometer import Tachometer
-from tachometry.hdl.wires.ports import follow, members
+from tachometry.hdl.wires.ports import by_name, drive, follow, members
 from tachometry.spec.registers.loop import LoopMap
 from tachometry.spec.registers.map import RegisterMap
 
@@ -61,8 +61,8 @@ class RegisterCore(wiring.Component):
             bank.capture.eq(self.capture),
             *(
                 box.clear.eq(bank.clear)
-                for box in (core.conditioner, core.watch, core.trip, core.stream)
-                if box is not None
+                for box in (core.conditioner, core.watch, *core.extras.values(), core.stream)
+                if box is not None and "clear" in box.signature.members
             ),
             position.tick.eq(core.tick),
             position.position.eq(core.position),
@@ -80,8 +80,9 @@ class RegisterCore(wiring.Component):
             m.d.comb += [box.ticks.eq(ticks), box.stalled.eq(whole.stalled), self.irq.eq(box.irq)]
             if core.watch is not None:
                 m.d.comb += box.fault.eq(core.watch.seen)
-            if core.trip is not None:
-                m.d.comb += box.over_speed.eq(core.trip.beyond)
+            for extra in spec.extras:
+                for name, event in extra.events(spec).items():
+                    drive(m, box, {name: Cat(by_name(core.extras[extra.name], event.wires).values()).any()})
         if open_sum is not None:
             m.d.comb += [position.next.eq(core.position_counter.next), position.open_sum.eq(open_sum)]
         return m

@@ -7,6 +7,7 @@ from amaranth import Cat, Module, Signal, Value
 from amaranth.lib import stream, wiring
 
 from tachometry.hdl.arithmetic.idle import Idle, idle_of
+from tachometry.hdl.extras import gates_of, place
 from tachometry.hdl.front_end.conditioner import InputConditioner
 from tachometry.hdl.front_end.decoder import decoder_of
 from tachometry.hdl.front_end.encoder_watch import EncoderWatch
@@ -25,7 +26,6 @@ from tachometry.hdl.methods.datapath import LongTicks, OwnStandstill, OwnTicks, 
 from tachometry.hdl.output.compare_output import CompareOutput
 from tachometry.hdl.output.fine_compare_output import FineCompareOutput
 from tachometry.hdl.output.low_pass import LowPass
-from tachometry.hdl.output.over_speed import OverSpeed
 from tachometry.hdl.output.record_stream import RecordStream
 from tachometry.hdl.output.update import update_layout
 from tachometry.hdl.output.update_age import UpdateAge
@@ -137,7 +137,7 @@ class Tachometer(wiring.Component):
         self.stream: RecordStream | None = None
         if spec.stream is not None:
             self.stream = RecordStream(parts_of(spec), len(flags_of(spec.ports)) - 1, size_of(spec), spec.stream.packet)
-        self.trip = None if spec.over_speed is None else OverSpeed(spec.over_speed_lsb, spec.velocity.width)
+        self.extras = {extra.name: gates_of(extra, spec) for extra in spec.extras}
 
     @property
     def spec(self) -> TachometerSpec:
@@ -175,10 +175,7 @@ class Tachometer(wiring.Component):
         self._watch(m)
         self._compare(m)
         self._stream(m)
-        if self.trip is not None:
-            m.submodules.trip = self.trip
-            follow(m, self.trip, self, ("velocity_valid", "velocity"))
-            follow(m, self, self.trip, ("over_speed",))
+        place(m, self, self.extras)
         if isinstance(self.sampling_clock, ExternalTick):
             m.d.comb += [
                 self.sampling_clock.tick_in.eq(self.tick_in),

@@ -4,12 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from tachometry.sim.golden import compare, health, probe, stream
+from tachometry.sim.golden import compare, extras, health, probe, stream
 from tachometry.sim.golden.axes import run_axes
 from tachometry.sim.golden.front_end import Steps, count, decoded
 from tachometry.sim.golden.low_pass import filtered
 from tachometry.sim.golden.methods import MODELS
-from tachometry.sim.golden.output import in_unit, trips, with_age, with_trip
+from tachometry.sim.golden.output import in_unit, with_age
 from tachometry.sim.golden.sampling import windows
 from tachometry.sim.golden.standstill import with_stalled
 from tachometry.sim.signals.axes import AxesTrace, Trace
@@ -57,10 +57,11 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
     updates = in_unit(spec, filtered(spec, ticks, measured))
     probes = probe.latched(spec, steps, trace, updates)
     ticks = probe.with_probed(spec, ticks, probes)
-    tripped, pulses = trips(spec, updates), compare.pulses(spec, steps, trace, measured)
-    ticks = ticks.having(**compare.shown(spec, pulses, ticks.clock))
+    pulses = compare.pulses(spec, steps, trace, measured)
+    added = extras.tables(spec, ticks, updates)
+    ticks = ticks.having(**compare.shown(spec, pulses, ticks.clock), **extras.shown(spec, added, ticks.clock))
     found = {
-        "tick": with_trip(spec, with_age(spec, ticks, updates), tripped),
+        "tick": with_age(spec, ticks, updates),
         "velocity_valid": updates,
         "index_valid": index,
         WIDE: Table(steps.wide + spec.latency.tick, {}),
@@ -68,7 +69,7 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
         "decode_error": Table(steps.errors, {}),
         "tick_error": Table(tick_errors, {}),
         "fault": wrong,
-        "over_speed": tripped,
+        **added,
         **pulses,
         **probes,
     }

@@ -30,21 +30,6 @@ def in_unit(spec: TachometerSpec, updates: Table) -> Table:
     return updates.having(clock=clock, velocity=velocity, velocity_overflow=overflow, **bounds)
 
 
-def trips(spec: TachometerSpec, updates: Table) -> Table:
-    """Return the clocks from which updates beyond the limit of the speed are shown."""
-    beyond = np.zeros(len(updates), dtype=bool)
-    if spec.over_speed is not None:
-        beyond = np.abs(updates.velocity) > spec.over_speed_lsb
-    return Table(updates.clock[beyond] + 1, {})
-
-
-def with_trip(spec: TachometerSpec, ticks: Table, tripped: Table) -> Table:
-    """Return ticks that show whether there has been such an update."""
-    if spec.over_speed is None:
-        return ticks
-    return ticks.having(over_speed=np.searchsorted(tripped.clock, ticks.clock, side="right") > 0)
-
-
 def with_age(spec: TachometerSpec, ticks: Table, updates: Table) -> Table:
     """Return ticks with the age of the velocity: the ticks after the cause of its update, or from reset on."""
     if not spec.age:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tachometry.sim import golden
-from tachometry.sim.golden import compare, health, probe
+from tachometry.sim.golden import compare, extras, health, probe
 from tachometry.sim.golden.front_end import decoded, homed
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec.core.stream import OVERRUNS_WIDTH
@@ -172,7 +172,7 @@ class GoldenBank:
         }
         # They are seen in the clock before the first in which they are shown.
         found["probe"] = np.unique(np.concatenate([errors[0][:0], *self._latched]))
-        found |= {name: self._tables[name].clock - 1 for name in ("fault", "over_speed") if name in self._tables}
+        found |= {name: self._tables[name].clock - 1 for name in ("fault", *self._extra_events) if name in self._tables}
         return {event: found[event] for event in self._map.interrupts}
 
     def irq(self, accesses: Iterable[Access], n_clocks: int) -> list[bool]:
@@ -191,6 +191,10 @@ class GoldenBank:
             waits = comes[clock] | (waits & ~data if address == clearing else waits)
             enabled = data if address == enabling else enabled
         return levels
+
+    @property
+    def _extra_events(self) -> list[str]:
+        return [name for extra in self._map.spec.extras for name in extra.events(self._map.spec)]
 
     def _set(self, register: Register, data: int, clock: int) -> None:
         """Write settings; those that act once stay 0."""
@@ -230,7 +234,7 @@ class GoldenBank:
             "time": clock % (1 << WORD),
             "age": min(age, self._map.spec.timing.max_ticks),
             "swallowed_edges": 2 * min(glitches, (1 << 15) - 1),
-            "over_speed": int(self._count(self._tables["over_speed"].clock, self._cleared + 1, clock) > 0),
+            **self._shown(extras.shown(self._map.spec, self._tables, np.array([clock]), self._cleared)),
             "homed": int(homed(self._map.spec, self._steps, np.array([clock]))[0]),
             **self._shown(compare.shown(self._map.spec, self._tables, np.array([clock]))),
             **({"probed": int(probe.shown(self._tables["probed"], np.array([clock]))[0])} if self._latched else {}),

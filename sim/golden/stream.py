@@ -5,9 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.golden import compare, health, probe
+from tachometry.sim.golden import compare, extras, health, probe
 from tachometry.sim.golden.front_end import Steps, homed, positions_at
-from tachometry.sim.golden.output import with_trip
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
@@ -84,7 +83,7 @@ def records(
         for name, column in tables[strobe].columns.items()
     }
     shown = Table(clock, held).having(homed=homed(spec, steps, clock), **{LOST: np.append(False, ~free[:-1])})
-    shown = health.with_health(spec, with_trip(spec, shown, tables["over_speed"]), tables["fault"])
+    shown = health.with_health(spec, shown.having(**extras.shown(spec, tables, shown.clock)), tables["fault"])
     shown = probe.with_probed(spec, shown.having(**compare.shown(spec, dict(tables), clock)), dict(tables))
     found = np.zeros(len(clock), dtype=np.dtype(entry["dtype"]))
     bits = [shown[name].astype(np.uint32) << np.uint32(place) for place, name in enumerate(flags_of(spec.ports))]

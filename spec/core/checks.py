@@ -11,7 +11,7 @@ from tachometry.spec.core.timing import MAX_TICK_CYCLES
 from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS
 from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.language.option import ParameterError, check_options
-from tachometry.spec.language.units import PI, SpeedUnit, format_time, rounded, signed_width
+from tachometry.spec.language.units import PI, format_time, rounded, signed_width
 
 MAX_MODULUS = 1 << 24
 _LONGEST_FILTER = Fraction(10, 1000)  # s; contacts bounce for 2 ms or so
@@ -45,12 +45,8 @@ def check(spec: Core) -> None:
         if spec.max_speed is not None:
             fastest = min(spec.max_speed.counts(spec.encoder.counts_per_rev, spec.tick.seconds(1)), Fraction(1))
         spec.compare.check(spec.timing.clock_hz, spec.position_width, fastest, getattr(spec, "fine_bits", None))
-    if spec.over_speed is not None and spec.over_speed_lsb >= spec.velocity.full_scale:
-        unit = SpeedUnit(spec.over_speed.unit)
-        greatest = f"{unit.of(spec.velocity.full_scale * spec.velocity.rad_per_s_per_lsb):.6g} {unit.name}"
-        raise ParameterError(
-            "over_speed", f"must be less than {greatest}, the greatest velocity, not {spec.over_speed}"
-        )
+    for extra in spec.extras:
+        extra.check(spec)
     if spec.facts.bounds:
         _check_edge_error(spec)
     if spec.lowpass is not None:

@@ -1,11 +1,11 @@
 """A core of one axis: its measurement, and the features beside that."""
 
-import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, Literal
 
 from tachometry.spec.core.compare import Compare
+from tachometry.spec.core.extras import EXTRAS, Extra
 from tachometry.spec.core.front_end import FrontEnd
 from tachometry.spec.core.health import Health
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
@@ -14,7 +14,6 @@ from tachometry.spec.core.probe import PROBE_HELP, edges_of, parse_probes
 from tachometry.spec.core.stream import STREAM_HELP, Stream
 from tachometry.spec.core.words import Words, speed_notes
 from tachometry.spec.language.option import option
-from tachometry.spec.language.units import Speed, parse_speed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,15 +27,7 @@ class Core(Numbers):
         tacit=True,
         part=Health,
     )
-    over_speed: Speed | None = option(  # noqa: RUF009
-        None,
-        "Output over_speed trips at a velocity beyond this, in rad/s, rev/s or rpm, and stays so until a reset or "
-        "CONTROL.clear.",
-        metavar="SPEED",
-        parse=parse_speed,
-        tests=("", "30rad/s"),
-        tacit=True,
-    )
+    extras: tuple[Extra, ...] = field(default=(), metadata={"extras": EXTRAS})  # see `spec.core.extras`
     probe: str = option(
         "", PROBE_HELP, metavar="[N|EDGES]", shown="none", parse=parse_probes, tests=("", "3", "both"), tacit=True
     )
@@ -72,13 +63,6 @@ class Core(Numbers):
         """Inputs of the core; where its index and its modulus are."""
         complements = self.health is not None and self.health.complements is not None
         return FrontEnd(self, self.times.longest, len(edges_of(self.probe)), complements)
-
-    @property
-    def over_speed_lsb(self) -> int:
-        """The greatest |velocity|, in its LSB, that is not beyond `over_speed`, for a core that has it."""
-        assert self.over_speed is not None
-        counts = self.over_speed.counts(self.encoder.counts_per_rev, self.timing.tick_seconds)
-        return math.floor(counts * self.scale.per_count * 2**self.velocity.frac_bits)
 
     @property
     def latency_entries(self) -> dict[str, int]:

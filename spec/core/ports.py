@@ -62,8 +62,8 @@ def ports_of(spec: Core, own: Iterable[Port]) -> Iterator[Port]:
     yield from _probe_ports(spec)
     yield from _compare_ports(spec)
     yield from _health_ports(spec)
-    if spec.over_speed:
-        yield held(TICK, "over_speed", help=f"A velocity was beyond {spec.over_speed}, since it was cleared.")
+    for extra in spec.extras:
+        yield from extra.ports(spec)
     if spec.filter_clocks:
         text = "Edges that the glitch filter has kept out, two for each glitch; it stays at 65534. Between the ticks "
         text += "it counts on, and a capture takes what it is then."

@@ -105,6 +105,7 @@ class Option:
     field: str = ""  # name of the field; set by `options_of`
     default: Any = None  # default of the field; set by `options_of`
     within: tuple[str, ...] = ()  # the field of a part, and the one of its own in that; set by `options_of`
+    extra: type[Any] | None = None  # the class of `spec.core.extras` whose field it is; set by `options_of`
 
     @property
     def parameter(self) -> str:
@@ -137,7 +138,7 @@ class Option:
     def value_in(self, spec: Any) -> Any:
         """Return its value in a spec, or in what has some of its options."""
         if self.within:
-            part = getattr(spec, self.within[0])
+            part = self.extra.of(spec.extras) if self.extra else getattr(spec, self.within[0])
             return self.default if part is None else getattr(part, self.within[1])
         value = getattr(spec, self.field)
         return value is not None if self.part else value
@@ -192,6 +193,11 @@ def _declared(spec: Any) -> tuple[Option, ...]:
 
 
 def _of_field(spec: Any, item: Field[Any]) -> Iterator[Option]:
+    for extra in item.metadata.get("extras", ()):
+        main, *more = options_of(extra)
+        yield replace(main, field=main.parameter, default=None, within=("", main.field), extra=extra)
+        for one in more:
+            yield replace(one, needs=main.name, field=one.parameter, within=("", one.field), extra=extra)
     options = item.metadata.get("options", ())
     for about in options:
         name = about.name or item.name.replace("_", "-")
@@ -248,7 +254,7 @@ def read_options(
         given[about.field] = about
     read: dict[str, Option] = {}
     for about in options_of(spec):
-        if about.required and about.field not in given:
+        if about.required and about.field not in given and about.extra is None:
             others = (f", or --{one.name}" for one in options_of(spec) if one.field == about.field and one is not about)
             raise ParameterError(about.parameter, f"must be given{''.join(others)}")
         if about.field in given or about.text is not None:
@@ -263,6 +269,12 @@ def read_options(
         else:
             read_at = about.fit_at if about.fit_at and about.name not in texts else about.parse_at
             values[about.field] = read_at(about.parameter, text, {**known, **values})
+    extras: dict[type[Any], dict[str, Any]] = {}
+    for about in options_of(spec):
+        if about.extra and about.field in values:
+            extras.setdefault(about.extra, {})[about.within[1]] = values.pop(about.field)
+    if extras:
+        values["extras"] = tuple(extra(**given) for extra, given in extras.items())
     for part in (about for about in options_of(spec) if about.part and about.field in values):
         own = [about for about in options_of(spec) if about.within[:1] == (part.field,) and about.field in values]
         made = {about.within[1]: values.pop(about.field) for about in own}

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Literal
 
+from tachometry.spec.core.extras.extra import refuse
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 from tachometry.spec.core.tachometer import TachometerSpec, WithTachometer
 from tachometry.spec.core.tick import Tick
@@ -28,7 +29,6 @@ _LEFT_OUT: tuple[tuple[str, Any, str], ...] = (
     ("bounds", False, f"what finds them {_FOR_ONE}"),
     ("probe", "", f"what latches {_FOR_ONE}"),
     ("compare", None, f"what compares positions {_FOR_ONE}"),
-    ("over_speed", None, f"what trips {_FOR_ONE}"),
     ("stream", None, f"what sends records {_FOR_ONE}"),
     ("preset", None, f"what sets the position {_FOR_ONE}"),
     ("position_modulo", None, f"its counter {_FOR_ONE}"),
@@ -136,6 +136,7 @@ class AxesSpec(WithTachometer):
         for name, value, why in _LEFT_OUT:
             if getattr(spec, name) != value:
                 raise ParameterError(name, f"must be left out with --axes: {why}")
+        refuse(spec.extras, "axes")
         if spec.front_end.index_once:
             raise ParameterError("index_once", f"must be left out with --axes: what waits for home {_FOR_ONE}")
         if spec.encoder.sensor != "quadrature":

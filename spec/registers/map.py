@@ -112,8 +112,8 @@ class RegisterMap:
         found["error"] = f"Both lines changed at once{late}."
         if self.spec.health:
             found["fault"] = "A fault of the encoder was seen, see health."
-        if self.spec.over_speed is not None:
-            found["over_speed"] = f"A velocity was beyond {self.spec.over_speed}."
+        for extra in self.spec.extras:
+            found |= {name: event.help for name, event in extra.events(self.spec).items()}
         if self.spec.probe:
             found["probe"] = "A probe has latched a position."
         return found

@@ -5,6 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 from proofs.formal.prove import Proof
 
+from tachometry.hdl.extras import over_speed
 from tachometry.hdl.front_end import (
     encoder_watch,
     index_capture,
@@ -13,7 +14,7 @@ from tachometry.hdl.front_end import (
     position_counter,
     probe_latch,
 )
-from tachometry.hdl.output import compare_output, over_speed
+from tachometry.hdl.output import compare_output
 from tachometry.spec import Encoder, STachometer
 from tachometry.spec.core.compare import Compare
 
@@ -38,7 +39,7 @@ class Outputs(wiring.Component):
             "position": position_counter.PositionCounter(_WIDTH, preset=0),
             "home": index_capture.IndexCapture(_WIDTH, once=True),
             "probe": probe_latch.ProbeLatch(1, 1, _WIDTH, 3),
-            "trip": over_speed.OverSpeed(LIMIT, _WIDTH),
+            "trip": over_speed.Gates(LIMIT, _WIDTH),
             "open": open_circuit.OpenCircuit(OPEN),
             "watch": encoder_watch.EncoderWatch(second=6, edges=2, errors=1),
             "compare": compare_output.CompareOutput(Compare(1, APART, 2, "2clk"), PULSE, _WIDTH),

@@ -16,6 +16,7 @@ from tachometry.sim.signals.run import Run
 from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
 from tachometry.spec.control import AnySpec
 from tachometry.spec.core.compare import Compare
+from tachometry.spec.core.extras.over_speed import OverSpeed
 from tachometry.spec.core.health import Health
 from tachometry.spec.core.index import Index
 
@@ -30,7 +31,7 @@ _OPTIONS: dict[str, dict[str, Any]] = {
         "position_modulo": "7",
         "probe": "both",
         "health": Health(complements=4),
-        "over_speed": Speed.parse("1rad/s"),
+        "extras": (OverSpeed(limit=Speed.parse("1rad/s")),),
         "compare": Compare(2, 3, 0, "7clk", "both"),
     },
     "track": {"timing": Timing(5_000_000, 340, 20), "max_speed": Speed.parse("75rev/s"), "multiplier": "block"},

@@ -28,7 +28,9 @@ from tachometry.spec import (
     own_options,
 )
 from tachometry.spec.control import AnySpec
+from tachometry.spec.core.extras import EXTRAS
 from tachometry.spec.core.index import Index
+from tachometry.spec.language.option import options_of
 from tachometry.spec.language.units import PI, Speed
 from tachometry.spec.methods.axes import AxesSpec
 from tachometry.spec.registers.buses import BUSES
@@ -110,7 +112,7 @@ def test_every_option_does_what_it_says() -> None:
         "health-edges",
         "health-errors",
         "complements",
-        "over-speed",
+        *(about.name for extra in EXTRAS for about in options_of(extra)),
         "preset",
         "index-once",
         "position-modulo",

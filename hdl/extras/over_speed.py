@@ -1,37 +1,30 @@
-"""A speed that must not be."""
+"""Gates of `spec.core.extras.over_speed`."""
+
+from typing import Self
 
 from amaranth import Module, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.spec import TachometerSpec
+from tachometry.spec.core.extras.over_speed import OverSpeed
 
-class OverSpeed(wiring.Component):
-    """Trips when a velocity is beyond a limit, and stays so.
 
-    Latency: an update in clock c that is beyond trips in clock c + 1.
+class Gates(wiring.Component):
+    """An update in clock c that is beyond the limit trips in clock c + 1; `beyond` is high in clock c.
 
-    Parameters
-    ----------
-    limit : int
-        The greatest magnitude that does not trip.
-    width : int
-        Bits of the velocity.
-
-    Members
-    -------
-    velocity_valid : In(1)
-    velocity : In(signed(width))
-    clear : In(1)
-        It has not tripped in the next clock.
-    beyond : Out(1)
-        This velocity is beyond the limit.
-    over_speed : Out(1)
+    `clear` wins over an update in the same clock.
     """
 
     def __init__(self, limit: int, width: int) -> None:
         self._limit = limit
         flags = {"velocity_valid": In(1), "clear": In(1), "beyond": Out(1), "over_speed": Out(1)}
         super().__init__({"velocity": In(signed(width)), **flags})
+
+    @classmethod
+    def of(cls, extra: OverSpeed, spec: TachometerSpec) -> Self:
+        """Return the gates of this core."""
+        return cls(extra.greatest(spec), spec.velocity.width)
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

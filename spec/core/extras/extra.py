@@ -1,0 +1,56 @@
+"""An extra is one feature beside the measurement: its option, its rules, its ports, its events."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+from tachometry.spec.core.numbers import Numbers
+from tachometry.spec.language.option import ParameterError
+from tachometry.spec.language.port import Port
+
+
+@dataclass(frozen=True)
+class Event:
+    """Raises the interrupt of a core with registers."""
+
+    help: str
+    wires: tuple[str, ...]  # outputs of the gates; the event is in each clock in which one of them is high
+
+
+@dataclass(frozen=True, kw_only=True)
+class Extra:
+    """A feature of a core of one axis; a subclass is a frozen dataclass whose first field is the option that adds it.
+
+    Further fields are options that need the first. A spec holds the extras that it was asked for, in the order of
+    `EXTRAS`; `OverSpeed.of(spec.extras)` is the one of a class, or None.
+    """
+
+    name: ClassVar[str]  # of the files, and of the box in the gates
+    missing: ClassVar[Mapping[str, str]] = {}  # the refusals of cores that cannot have it: of axes, demo or rio
+
+    @classmethod
+    def of(cls, extras: "Iterable[Extra]") -> Self | None:
+        """Return the extra of this class among those of a core."""
+        return next((one for one in extras if isinstance(one, cls)), None)
+
+    def check(self, spec: Numbers) -> None:
+        """Raise ParameterError if a core cannot have it."""
+
+    def ports(self, spec: Numbers) -> Iterable[Port]:
+        """Return inputs and outputs that come with it."""
+        return ()
+
+    def events(self, spec: Numbers) -> Mapping[str, Event]:
+        """Return events that raise the interrupt, by their names."""
+        return {}
+
+    def row(self, spec: Numbers, run: Any) -> tuple[str, str] | None:
+        """Return name and value that a simulation prints of it."""
+        return None
+
+
+def refuse(extras: Iterable[Extra], kind: str) -> None:
+    """Raise ParameterError for the first extra that a kind of core, such as `axes`, does not have."""
+    for extra in extras:
+        if why := extra.missing.get(kind):
+            raise ParameterError(extra.name, why)

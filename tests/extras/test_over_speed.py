@@ -1,0 +1,36 @@
+"""Over-speed, from the rows that a core shows and the words of the command line alone; see `extras.harness`."""
+
+import math
+
+from extras.harness import Case, in_lockstep
+from support.simulate import clock_by_clock
+
+from tachometry.hdl.extras.over_speed import Gates
+
+CASES = (Case("s", "over-speed=2000rad/s"), Case("m", "over-speed=3000rpm unit=rpm"), Case("mt", "over-speed=40000rpm"))
+
+
+def rule(case: Case) -> None:
+    """From the clock after the first velocity beyond the limit on, every tick shows it."""
+    limit = float(case.texts["over-speed"].removesuffix(case.unit)) * {"rad/s": 1, "rpm": math.pi / 30}[case.unit]
+    tripped = False
+    for row in case.rows():
+        if row.tick:
+            assert row.over_speed == tripped, row
+        tripped |= row.velocity_valid and abs(row.rad_per_s) > limit + 1e-9
+
+
+test_over_speed = in_lockstep(CASES, rule)
+
+
+def test_every_velocity() -> None:
+    """Every velocity of six bits, with and without its strobe, and cleared in the same clock."""
+    rows = [
+        {"velocity": velocity, "velocity_valid": valid, "clear": clear}
+        for velocity in range(-32, 32)
+        for valid, clear in ((0, 0), (1, 0), (0, 0), (0, 1), (0, 0), (1, 1), (0, 0))
+    ]
+    tripped = False
+    for row, seen in zip(rows, clock_by_clock(Gates(20, 6), rows, ["over_speed"]), strict=True):
+        assert seen["over_speed"] == tripped, row
+        tripped = not row["clear"] and (tripped or (bool(row["velocity_valid"]) and abs(row["velocity"]) > 20))
