@@ -30,7 +30,7 @@ ALLOWED = {
     "hdl/axes": {"hdl/arithmetic", "hdl/front_end", "hdl/methods", "hdl/output", "hdl/wires", "spec"},
     "hdl/bus": {"hdl/wires", "spec"},
     "hdl/control": {"hdl/arithmetic", "hdl/wires", "spec"},
-    "hdl/extras": {"hdl/wires", "spec"},
+    "hdl/extras": {"hdl/arithmetic", "hdl/front_end", "hdl/wires", "spec"},
     "hdl/core": {
         "hdl/arithmetic",
         "hdl/axes",
@@ -302,12 +302,12 @@ def has_a_broken_docstring(node: ast.AST) -> bool:
 
 # What may only fall, with the rule by which it is counted. A change that brings a capability raises lines alone.
 CEILING: dict[str, tuple[int, Callable[[], Counter[str]]]] = {
-    "lines of Python of the product": (47085, lambda: lines(*PRODUCT)),
+    "lines of Python of the product": (47160, lambda: lines(*PRODUCT)),
     "lines of Python of the tests": (42200, lambda: lines("tests")),
     "lines of Python of the benchmarks": (3140, lambda: lines("bench")),
-    "functions over 40 lines": (46, lambda: every(is_long, *PRODUCT)),
-    "functions with more than 6 parameters": (31, lambda: every(has_many_parameters, *PRODUCT)),
-    "getattr and hasattr in hdl": (39, lambda: every(lambda node: calls(node, "getattr", "hasattr"), "hdl")),
+    "functions over 40 lines": (45, lambda: every(is_long, *PRODUCT)),
+    "functions with more than 6 parameters": (30, lambda: every(has_many_parameters, *PRODUCT)),
+    "getattr and hasattr in hdl": (38, lambda: every(lambda node: calls(node, "getattr", "hasattr"), "hdl")),
     "places that tell kinds of core apart": (22, lambda: every(tells_kinds_apart, *PRODUCT)),
     "broken docstrings": (81, lambda: every(has_a_broken_docstring, *PRODUCT, "bench", "tests")),
 }

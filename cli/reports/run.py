@@ -150,8 +150,6 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         one = 1 << getattr(spec, "fine_bits", 0) * spec.compare.fine
         last = f", the last at position {pulses.compare_position[-1] / one:.15g}" if len(pulses) else _none(axis)
         rows.append(("compare", f"{plural(len(pulses), 'pulse')}{last}"))
-    if spec.probe:
-        rows.append(("probes", _latched(run)))
     if spec.stream is not None:
         shown = "numpy.fromfile reads those of a DMA, with stream.dtype of the manifest"
         rows.append(("stream", f"records are not shown here: {shown}"))
@@ -163,17 +161,6 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
     if n_saturated := int(np.count_nonzero(run.updates.get("velocity_overflow"))):
         rows.append(("velocity overflow", f"{n_saturated} updates: beyond --velocity-width, saturated"))
     return rows + _errors(axis) + [("note", note) for note in spec.words.notes]
-
-
-def _latched(run: Run) -> str:
-    """Say how often probes have latched, and what the last one has."""
-    found = [
-        (int(clock), int(position), number)
-        for number, table in enumerate(run.tables[name] for name in run.tables if name.startswith("probe_valid_"))
-        for clock, position in zip(table.clock, table[f"probe_position_{number}"], strict=True)
-    ]
-    last = "" if not found else ", the last that of probe {2} at position {1}".format(*max(found))
-    return f"latched {plural(len(found), 'time')}{last or ': --pulse probe_0:20ms lets one see an edge'}"
 
 
 def _flagged(axis: Axis) -> str:

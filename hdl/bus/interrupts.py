@@ -3,7 +3,7 @@
 from functools import reduce
 from operator import or_
 
-from amaranth import Cat, Module, Signal, Value
+from amaranth import Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -55,8 +55,5 @@ def connect(m: Module, box: Interrupts, bank: wiring.Component, core: wiring.Com
     follow(m, bank, box, (name for name, flow in flows.items() if flow == Out))
     late = [core.tick_error] if "tick_error" in core.signature.members else []
     m.d.comb += [box.overflow.eq(core.tick & bank.overflow), box.error.eq(reduce(or_, late, core.decode_error))]
-    if "probe" in box.signature.members:
-        strobes = [name for name in core.signature.members if name.startswith("probe_valid")]
-        m.d.comb += box.probe.eq(Cat(by_name(core, strobes).values()).any())
     if "index" in box.signature.members:
         m.d.comb += box.index.eq(core.index_valid)

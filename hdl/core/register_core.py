@@ -69,8 +69,9 @@ class RegisterCore(wiring.Component):
             bank.position.eq(position.latest),
         ]
         self._place(m)
-        if core.probe_latch is not None:
-            m.d.comb += core.probe_latch.edges.eq(bank.probe_edges)
+        for extra in core.extras.values():
+            settings = written & extra.signature.members.keys() - core.signature.members.keys()
+            follow(m, extra, bank, sorted(settings))
         if self.loop is not None:
             self._keep(m, self.loop)
         if self._map.irq:
@@ -82,7 +83,8 @@ class RegisterCore(wiring.Component):
                 m.d.comb += box.fault.eq(core.watch.seen)
             for extra in spec.extras:
                 for name, event in extra.events(spec).items():
-                    drive(m, box, {name: Cat(by_name(core.extras[extra.name], event.wires).values()).any()})
+                    gates = core if event.wires[0] in core.signature.members else core.extras[extra.name]
+                    drive(m, box, {name: Cat(by_name(gates, event.wires).values()).any()})
         if open_sum is not None:
             m.d.comb += [position.next.eq(core.position_counter.next), position.open_sum.eq(open_sum)]
         return m

@@ -17,7 +17,6 @@ from tachometry.hdl.front_end.index_state import IndexState
 from tachometry.hdl.front_end.modulo_counter import ModuloCounter
 from tachometry.hdl.front_end.pin_rise import PinRise
 from tachometry.hdl.front_end.position_counter import PositionCounter
-from tachometry.hdl.front_end.probe_latch import ProbeLatch
 from tachometry.hdl.front_end.pulse_counter import PulseCounter
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.front_end.standstill import Standstill
@@ -34,9 +33,8 @@ from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import follow, members
 from tachometry.spec import TachometerSpec, TrackTachometer
 from tachometry.spec.core.compare import LIST_PINS
-from tachometry.spec.core.probe import packed_edges
 from tachometry.spec.core.stream import READY, flags_of, parts_of, size_of
-from tachometry.spec.language.port import FINE, MISSED, TICK, UPDATE, WIDE
+from tachometry.spec.language.port import MISSED, TICK, UPDATE, WIDE
 
 
 class Tachometer(wiring.Component):
@@ -60,7 +58,7 @@ class Tachometer(wiring.Component):
         self._spec = spec
         super().__init__(members(spec.ports))
         front = spec.front_end
-        self.conditioner = InputConditioner(spec.filter_clocks, (*front.lines, *front.probes), front.complemented)
+        self.conditioner = InputConditioner(spec.filter_clocks, (*front.lines, *front.sensed), front.complemented)
         self.decoder = decoder_of(spec.encoder, front.wheel)
         self.pulse_counter = PulseCounter(
             max(spec.tick.longest, spec.widths.max_pulse_count),
@@ -78,19 +76,6 @@ class Tachometer(wiring.Component):
         if front.index_state is not None:
             after = spec.encoder.kind.after(front.index_state)
             self.index_state = IndexState(front.index_state, after, spec.latency.tick)
-        self.probe_latch: ProbeLatch | None = None
-        if spec.probe:
-            fine = {port.name: port.width for port in spec.method_ports}.get(FINE, 0)
-            self.probe_latch = ProbeLatch(
-                packed_edges(spec.probe),
-                len(front.probes),
-                spec.position_width,
-                spec.times.probe_width,
-                spec.latency.tick,
-                fine_width=fine,
-                age_width=spec.times.probe_age_width if fine else 0,
-                update_latency=spec.latency.tick + spec.latency.tick_to_velocity,
-            )
         self.watch: EncoderWatch | None = None
         if spec.health:
             self.watch = EncoderWatch(
@@ -147,8 +132,9 @@ class Tachometer(wiring.Component):
     @property
     def idle(self) -> tuple[Idle, ...]:
         """Registers that a simulation may move on."""
-        names = ("conditioner", "probe_latch", "watch", "compare_output", "stream", "datapath")
+        names = ("conditioner", "watch", "compare_output", "stream", "datapath")
         boxes: dict[str, object] = {name: getattr(self, name) for name in names}
+        boxes |= {f"{name}_box": box for name, box in self.extras.items()}
         if not self._spec.facts.own_ticks:
             boxes["sampling_clock"] = self.sampling_clock
         return idle_of(boxes)
@@ -171,11 +157,10 @@ class Tachometer(wiring.Component):
         self._age(m, ticks, updates)
         self._place(m)
         self._index(m)
-        self._probe(m)
         self._watch(m)
         self._compare(m)
         self._stream(m)
-        place(m, self, self.extras)
+        place(m, self, self.extras, self._taps(m))
         if isinstance(self.sampling_clock, ExternalTick):
             m.d.comb += [
                 self.sampling_clock.tick_in.eq(self.tick_in),
@@ -344,23 +329,19 @@ class Tachometer(wiring.Component):
         if self.index_state is not None:
             follow(m, watch, self.index_state, (MISSED,))
 
-    def _probe(self, m: Module) -> None:
-        """Latch the position at edges of probe inputs, if there are any."""
-        if self.probe_latch is None:
-            return
-        m.submodules.probe_latch = latch = self.probe_latch
-        names = self._spec.front_end.probes
-        m.d.comb += [
-            *(getattr(self.conditioner, name).eq(level) for name, level in zip(names, self.probe, strict=True)),
-            latch.level.eq(Cat(getattr(self.conditioner, f"level_{name}") for name in names)),
-            latch.ready.eq(Cat(getattr(self.conditioner, f"ready_{name}") for name in names)),
-            latch.step.eq(self.decoder.step),
-            latch.position.eq(self.position_counter.next),
-            latch.arm.eq(self.probe_arm),
-        ]
-        if hasattr(latch, "fine"):
-            m.d.comb += [latch.fine.eq(getattr(self, FINE)), latch.update.eq(self.velocity_valid)]
-        follow(m, self, latch, latch.latched)
+    def _taps(self, m: Module) -> dict[str, Value]:
+        """Lead inputs of extras through the conditioner, and return what else they may be given, by name.
+
+        `level_NAME` and `ready_NAME` are those of an asynchronous input, a bit for each line; the others are of the
+        clock of the levels: `step`, and `next_position`, with the steps that are `latency.tick` clocks old in the next.
+        """
+        taps: dict[str, Value] = {"step": self.decoder.step, "next_position": self.position_counter.next}
+        for pin in (pin for pin in self._spec.front_end.pins if pin.lines):
+            name, box = pin.port.name, self.conditioner
+            m.d.comb += [getattr(box, line).eq(bit) for line, bit in zip(pin.lines, getattr(self, name), strict=True)]
+            for kind in ("level", "ready"):
+                taps[f"{kind}_{name}"] = Cat(getattr(box, f"{kind}_{line}") for line in pin.lines)
+        return taps
 
     def _compare(self, m: Module) -> None:
         """Make pulses at positions, if they are asked for."""

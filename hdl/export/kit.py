@@ -50,7 +50,7 @@ def _synchronizers(spec: AnySpec, bus: Bus | None) -> dict[str, list[str]]:
     default = ["conditioner"] if spec.axes is None else []
     tacho = spec.tachometer
     complements = [f"{line}_n" for line in tacho.front_end.complemented]
-    pins = (*tacho.front_end.lines, *complements, *tacho.front_end.probes, *["tick_in"] * tacho.external_tick)
+    pins = (*tacho.front_end.lines, *complements, *tacho.front_end.sensed, *["tick_in"] * tacho.external_tick)
     boxes = {pin: box.get(pin, default) for pin in pins}
     boxes |= {line: ["bridge"] for line in (bus.asynchronous if bus else ())}
     return {pin: [*path, f"sync_{pin}"] for pin, path in boxes.items()}

@@ -1,10 +1,16 @@
-"""The gates of extras, one file each: `hdl/extras/NAME.py` has a component `Gates`."""
+"""The gates of extras, one file each: `hdl/extras/NAME.py` has a component `Gates`.
 
+An input of it has the name of a port of the core, of one of `Tachometer.taps`, or of a field that a program writes; an
+output that of a port of the core, if it is one. `clear` is high when a program clears, and `idle` says what a
+simulation may skip.
+"""
+
+from collections.abc import Mapping
 from importlib import import_module
 
-from amaranth import Module
+from amaranth import Module, Value
 from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import In
 
 from tachometry.hdl.wires.ports import follow
 from tachometry.spec import TachometerSpec
@@ -17,10 +23,13 @@ def gates_of(extra: Extra, spec: TachometerSpec) -> wiring.Component:
     return gates
 
 
-def place(m: Module, core: wiring.Component, extras: dict[str, wiring.Component]) -> None:
-    """Put extras into a core: their ports are connected to ports of the core that have the same names."""
+def place(m: Module, core: wiring.Component, extras: Mapping[str, wiring.Component], taps: Mapping[str, Value]) -> None:
+    """Put extras into a core: their ports are connected to ports and taps of the core that have the same names."""
+    shared = core.signature.members
     for name, box in extras.items():
         m.submodules[f"{name}_box"] = box  # the core has ports by the name
-        ports = {port: member.flow for port, member in box.signature.members.items() if port in core.signature.members}
-        follow(m, box, core, (port for port, flow in ports.items() if flow == In))
-        follow(m, core, box, (port for port, flow in ports.items() if flow == Out))
+        for port, member in box.signature.members.items():
+            if member.flow == In and port in taps:
+                m.d.comb += getattr(box, port).eq(taps[port])
+            elif port in shared:
+                follow(m, *((box, core) if member.flow == In else (core, box)), [port])

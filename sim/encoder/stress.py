@@ -76,21 +76,18 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
 
 
 def _probed(spec: TachometerSpec, trace: PinTrace, seed: int) -> PinTrace:
-    """Return the trace with edges of probes in clocks of edges, beside them and anywhere, armed now and then; a stream
-    is ready now and then.
-    """
-    probes = len(spec.front_end.probes)
-    bits = {"probe": probes, "probe_arm": probes, READY: int(spec.stream is not None)}
-    if not any(bits.values()):
+    """Return the trace with edges of the inputs of extras in clocks of counts, beside them and anywhere."""
+    bits = {pin.port.name: pin.port.width for pin in spec.front_end.pins if not pin.of}
+    often = dict.fromkeys(bits, 0.4) | {pin.port.name: 0.2 for pin in spec.front_end.pins if pin.act}
+    bits |= {READY: 1} if spec.stream is not None else {}
+    if not bits:
         return trace
     rng = np.random.default_rng([seed, 2])
     near = rng.choice(trace.clock, len(trace.clock) // 2) + rng.integers(-2, 3, len(trace.clock) // 2)
     clock = merged(trace.clock, np.clip(near, 0, trace.n_clocks - 1), rng.integers(0, trace.n_clocks, 100))
     lines = trace.at(clock)
-    for name, often in (("probe", 0.4), ("probe_arm", 0.2), (READY, 0.4)):
-        if not bits[name]:
-            continue
-        row = np.maximum.accumulate(np.where(rng.random(len(clock)) < often, np.arange(len(clock)), 0))
+    for name in bits:
+        row = np.maximum.accumulate(np.where(rng.random(len(clock)) < often.get(name, 0.4), np.arange(len(clock)), 0))
         lines[name] = rng.integers(0, 1 << bits[name], len(clock)).astype(np.uint8)[row]
     return PinTrace.of_lines(clock, trace.n_clocks, lines)
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from tachometry.sim.golden import compare, extras, health, probe, stream
+from tachometry.sim.golden import compare, extras, health, stream
 from tachometry.sim.golden.axes import run_axes
 from tachometry.sim.golden.front_end import Steps, count, decoded
 from tachometry.sim.golden.low_pass import filtered
@@ -55,10 +55,9 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
     if "cause" not in measured.columns:
         measured = measured.having(cause=measured.clock - spec.latency.datapath)
     updates = in_unit(spec, filtered(spec, ticks, measured))
-    probes = probe.latched(spec, steps, trace, updates)
-    ticks = probe.with_probed(spec, ticks, probes)
     pulses = compare.pulses(spec, steps, trace, measured)
-    added = extras.tables(spec, ticks, updates)
+    without = {"tick": ticks, "velocity_valid": updates, "index_valid": index}
+    added = extras.tables(extras.View(spec, trace, steps, without))
     ticks = ticks.having(**compare.shown(spec, pulses, ticks.clock), **extras.shown(spec, added, ticks.clock))
     found = {
         "tick": with_age(spec, ticks, updates),
@@ -71,7 +70,6 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
         "fault": wrong,
         **added,
         **pulses,
-        **probes,
     }
     found = stream.with_overruns(spec, trace, steps, found)
     return {name: table.rows(slice(np.searchsorted(table.clock, trace.n_clocks))) for name, table in found.items()}

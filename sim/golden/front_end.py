@@ -118,8 +118,8 @@ def filter_line(
 
 def changes(trace: PinTrace, name: str) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
     """Change list of one line: the clocks from which its levels are sampled, and the levels."""
-    line, _, bit = name.partition("_")
-    level = trace.lines["probe"] >> np.uint8(bit) & np.uint8(1) if line == "probe" else trace.lines[name]
+    line, _, bit = name.rpartition("_")
+    level = trace.lines[name] if name in trace.lines else trace.lines[line] >> np.uint8(bit) & np.uint8(1)
     changed = np.append(True, level[1:] != level[:-1])
     return trace.clock[changed], level[changed]
 
@@ -149,8 +149,8 @@ class Steps:
     values: NDArray[np.int64] = field(default_factory=_none)
     arms: NDArray[np.int64] = field(default_factory=_none)  # clocks in which the next index is let through
     wheel: Teeth | None = None  # of a wheel with missing teeth, the teeth
-    # of each probe the clocks from which its level is seen, and the levels; the first is no edge
-    probes: tuple[tuple[NDArray[np.int64], NDArray[np.uint8]], ...] = ()
+    # of each line of an extra the clocks from which its level is seen, and the levels; the first is no edge
+    pins: Mapping[str, tuple[NDArray[np.int64], NDArray[np.uint8]]] = field(default_factory=dict)
 
     def asked(
         self, spec: TachometerSpec, presets: NDArray[np.int64], values: NDArray[np.int64], arms: NDArray[np.int64]
@@ -191,11 +191,11 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     at = clock + spec.latency.pin_to_count + (np.arange(len(clock)) == 0)
     changed = packed([line[1:] ^ line[:-1] for line in levels])
     rises = wide = missed = at[:0]
-    seen = [conditioned(name) for name in spec.front_end.probes]
-    probes = tuple((clock_of + spec.latency.pin_to_count, level) for clock_of, level in seen)
+    seen = {name: conditioned(name) for name in spec.front_end.sensed}
+    pins = {name: (clock_of + spec.latency.pin_to_count, level) for name, (clock_of, level) in seen.items()}
     if spec.front_end.wheel is not None:
         swallowed = np.sort(np.concatenate(returned)) + 3
-        return _without_gaps(spec, Steps(at[1:], step[1:], at[:0], rises, swallowed, probes=probes), trace)
+        return _without_gaps(spec, Steps(at[1:], step[1:], at[:0], rises, swallowed, pins=pins), trace)
     if spec.index:
         at_z, z = conditioned("z")
         z = z ^ np.uint8("z" in encoder.inverted)
@@ -212,7 +212,7 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
         at_pin, level = conditioned(name)
         asked[name] = at_pin[1:][level[1:] > level[:-1]] + spec.latency.pin_to_count
     swallowed = np.sort(np.concatenate(returned)) + 3
-    found = Steps(at[1:], step[1:], at[wrong], rises, swallowed, changed, wide, missed, rises, probes=probes)
+    found = Steps(at[1:], step[1:], at[wrong], rises, swallowed, changed, wide, missed, rises, pins=pins)
     return found.asked(spec, asked["preset"], np.full(len(asked["preset"]), spec.preset or 0), asked["home"])
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tachometry.sim import golden
-from tachometry.sim.golden import compare, extras, health, probe
+from tachometry.sim.golden import compare, extras, health
 from tachometry.sim.golden.front_end import decoded, homed
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec.core.stream import OVERRUNS_WIDTH
@@ -170,10 +170,9 @@ class GoldenBank:
             "stall": self._stalls,
             "error": np.unique(np.concatenate(errors)),
         }
-        # They are seen in the clock before the first in which they are shown.
-        found["probe"] = np.unique(np.concatenate([errors[0][:0], *self._latched]))
-        found |= {name: self._tables[name].clock - 1 for name in ("fault", *self._extra_events) if name in self._tables}
-        return {event: found[event] for event in self._map.interrupts}
+        if "fault" in self._map.interrupts:
+            found["fault"] = self._tables["fault"].clock - 1
+        return {event: found[event] if event in found else self._tables[event].clock for event in self._map.interrupts}
 
     def irq(self, accesses: Iterable[Access], n_clocks: int) -> list[bool]:
         """Return the level of the interrupt in each clock."""
@@ -191,10 +190,6 @@ class GoldenBank:
             waits = comes[clock] | (waits & ~data if address == clearing else waits)
             enabled = data if address == enabling else enabled
         return levels
-
-    @property
-    def _extra_events(self) -> list[str]:
-        return [name for extra in self._map.spec.extras for name in extra.events(self._map.spec)]
 
     def _set(self, register: Register, data: int, clock: int) -> None:
         """Write settings; those that act once stay 0."""
@@ -237,7 +232,6 @@ class GoldenBank:
             **self._shown(extras.shown(self._map.spec, self._tables, np.array([clock]), self._cleared)),
             "homed": int(homed(self._map.spec, self._steps, np.array([clock]))[0]),
             **self._shown(compare.shown(self._map.spec, self._tables, np.array([clock]))),
-            **({"probed": int(probe.shown(self._tables["probed"], np.array([clock]))[0])} if self._latched else {}),
             **(self._faults(clock) if self._map.spec.health else {}),
             **({"overruns": self._overruns(clock)} if self._map.spec.stream else {}),
         }
@@ -245,10 +239,6 @@ class GoldenBank:
     def _overruns(self, clock: int) -> int:
         dropped = self._count(self._tables["overruns"].clock, self._cleared + 1, clock)
         return min(dropped, (1 << OVERRUNS_WIDTH) - 1)
-
-    @property
-    def _latched(self) -> list[np.ndarray]:
-        return [table.clock for name, table in self._tables.items() if name.startswith("probe_valid")]
 
     def _clear(self, accesses: Sequence[Access]) -> None:
         """Find the faults that are there again if a program clears them."""
@@ -259,8 +249,11 @@ class GoldenBank:
             self._tables["fault"] = health.faults(*given, np.array(clears, dtype=np.int64))
 
     def _act(self, accesses: Sequence[Access]) -> None:
-        """Find what probes latch, and where pulses are, when a program writes what are inputs without a bus."""
-        fields = {field for field in self._map.settings if field.port.startswith(("probe_", "compare_"))}
+        """Find what extras show, and where pulses are, when a program writes what are inputs without a bus."""
+        spec = self._map.spec
+        added = {name for extra in spec.extras for name, *_ in extra.registers(spec)}
+        fields = {field for name in added for field in self._map[name].fields}
+        fields |= {field for field in self._map.settings if field.port.startswith("compare_")}
         if not fields:
             return
         settings = dict(self._settings)
@@ -273,16 +266,15 @@ class GoldenBank:
                 acts = {access.clock: value, access.clock + 1: 0}
                 changes[field.port] |= acts if field.single else {access.clock + 1: value}
         clock = np.unique([at for each in changes.values() for at in each])
-        low = np.zeros(len(clock), dtype=np.uint8)
-        lines = {
+        clock = np.union1d(clock, self._trace.clock)
+        lines = self._trace.at(clock) | {
             port: np.array([*each.values()])[np.searchsorted([*each], clock, side="right") - 1]
             for port, each in changes.items()
         }
-        pins = PinTrace(clock, low, low, self._trace.n_clocks, more=lines)
-        if self._map.spec.probe:
-            self._tables |= probe.latched(self._map.spec, self._steps, pins, self._tables[UPDATE])
+        pins = PinTrace.of_lines(clock, self._trace.n_clocks, lines)
+        self._tables |= extras.tables(extras.View(spec, pins, self._steps, self._tables))
         if "compare_next" in lines:
-            self._tables |= compare.listed(self._map.spec, self._steps, pins)
+            self._tables |= compare.listed(spec, self._steps, pins)
 
     @staticmethod
     def _shown(found: dict[str, np.ndarray]) -> dict[str, int]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from tachometry.sim.signals.source import Source
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.compare import LIST_PINS
+from tachometry.spec.core.front_end import OF_CONTROLS
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 from tachometry.spec.core.stream import READY
 from tachometry.spec.language.units import format_time
@@ -64,8 +65,9 @@ class _Lines:
 
     @property
     def wires(self) -> dict[str, NDArray[np.uint8]]:
-        """Lines that are one wire: all but those of probes, which have a bit for each."""
-        return {name: line for name, line in self.lines.items() if not name.startswith("probe")}
+        """Lines of the encoder with their complements, and inputs that move the position: each is one wire."""
+        names = {*LINES, *(f"{line}_n" for line in LINES), *OF_CONTROLS}
+        return {name: line for name, line in self.lines.items() if name in names}
 
     @property
     def level(self) -> NDArray[np.uint8]:
@@ -195,7 +197,7 @@ class PinTrace(_Lines):
         A third line.
     more : mapping of str to integer array, shape (n,)
         Further inputs by name, such as `preset`. `probe` and `probe_arm` have a bit for each probe, the first lowest;
-        `probe_edges` is what a program has set `ProbeLatch.edges` to. `compare_next` is the bits of a position.
+        A setting, such as `probe_edges`, is what a program has written. `compare_next` is the bits of a position.
     """
 
     clock: NDArray[np.int64]
@@ -271,8 +273,7 @@ class PinTrace(_Lines):
         if spec.external_tick and self.tick_in is None:
             return self.with_tick_in(nominal_ticks(spec, self.n_clocks)).completed(spec)
         low = {name: np.zeros_like(self.a) for name in spec.front_end.controls if name not in self.lines}
-        if probes := len(spec.front_end.probes):
-            low |= {"probe": np.zeros_like(self.a), "probe_arm": np.full_like(self.a, (1 << probes) - 1)}
+        low |= {pin.port.name: np.full_like(self.a, pin.rest) for pin in spec.front_end.pins if not pin.of}
         low |= {f"{line}_n": self.lines[line] ^ np.uint8(1) for line in spec.front_end.complemented}
         if spec.compare is not None and spec.compare.depth:
             low |= dict.fromkeys(LIST_PINS, np.zeros_like(self.a))

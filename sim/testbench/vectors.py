@@ -29,7 +29,7 @@ _BENCH = files(__package__) / "templates" / "test_NAME.py"
 # Clocks of the motion, and at most five times as many of the standstill after it: Icarus takes some 40,000 a second.
 _MOVING = 160_000
 _FEWEST_TICKS, _MOST_TICKS = 3, 1000
-_ACTS = ("probe_arm", *LIST_PINS)  # inputs, or registers on a bus, which no bench writes
+
 _MOST_BENCH_TICKS = 2_000_000  # of which each is a row of text
 
 
@@ -62,7 +62,7 @@ def cocotb_bench(core: AnySpec, name: str, recordings: Sequence[Recording] | Non
             trace = trace.with_pulses(name_of, rises, spec.filter_clocks + 1)
         traces.append(trace.completed(spec))
     # Probes latch once, as on a bus nothing arms them.
-    traces = [PinTrace.of_lines(trace.clock, trace.n_clocks, trace.lines | _unarmed(trace)) for trace in traces]
+    traces = [PinTrace.of_lines(trace.clock, trace.n_clocks, trace.lines | _unarmed(core, trace)) for trace in traces]
     text = json.dumps(_vectors(core, traces), separators=(",", ":")).replace("[[", "[\n[").replace("],", "],\n") + "\n"
     return {f"test_{name}.py": notice("#") + _BENCH.read_text(encoding="utf-8"), f"{name}_vectors.json": text}
 
@@ -70,7 +70,7 @@ def cocotb_bench(core: AnySpec, name: str, recordings: Sequence[Recording] | Non
 def _vectors(core: AnySpec, traces: Sequence[PinTrace]) -> dict[str, Any]:
     """Return the content of `NAME_vectors.json`; test_NAME.py says what stands where."""
     pins, (clock, *levels), run = _put(core, traces)
-    driven = {pin: level for pin, level in zip(pins, levels, strict=True) if pin not in _ACTS}
+    driven = {pin: level for pin, level in zip(pins, levels, strict=True) if pin not in _acts(core)}
     if not len(run.ticks.clock):
         raise ParameterError("motion", f"must last for a tick, not for {run.n_clocks} clocks")
     return {
@@ -83,8 +83,13 @@ def _vectors(core: AnySpec, traces: Sequence[PinTrace]) -> dict[str, Any]:
     }
 
 
-def _unarmed(trace: PinTrace) -> dict[str, NDArray[np.uint8]]:
-    return {name: np.zeros_like(trace.lines[name]) for name in _ACTS if name in trace.lines}
+def _acts(core: AnySpec) -> set[str]:
+    """Return inputs, or registers on a bus, which no bench writes."""
+    return {*LIST_PINS, *(pin.port.name for pin in core.tachometer.front_end.pins if pin.act)}
+
+
+def _unarmed(core: AnySpec, trace: PinTrace) -> dict[str, NDArray[np.uint8]]:
+    return {name: np.zeros_like(trace.lines[name]) for name in _acts(core) if name in trace.lines}
 
 
 def _put(core: AnySpec, traces: Sequence[PinTrace]) -> tuple[list[str], list[NDArray[Any]], Run]:

@@ -6,7 +6,6 @@ from fractions import Fraction
 from tachometry.spec.core.core import Core
 from tachometry.spec.core.front_end import OF_CONTROLS
 from tachometry.spec.core.health import COMPLEMENTS
-from tachometry.spec.core.probe import edges_of
 from tachometry.spec.core.timing import MAX_TICK_CYCLES
 from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS
 from tachometry.spec.formats.velocity_output import NATIVE
@@ -39,7 +38,6 @@ def check(spec: Core) -> None:
     if clocks is not None and not COMPLEMENTS[0] <= clocks <= COMPLEMENTS[1]:
         times = (format_time(Fraction(one) / spec.timing.clock_hz) for one in (*COMPLEMENTS, clocks))
         raise ParameterError("complements", "must be from {} to {} at this clock, not {}".format(*times))
-    edges_of(spec.probe)
     if spec.compare is not None:
         fastest = Fraction(0)
         if spec.max_speed is not None:

@@ -10,7 +10,6 @@ from tachometry.spec.core.front_end import FrontEnd
 from tachometry.spec.core.health import Health
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 from tachometry.spec.core.numbers import Numbers
-from tachometry.spec.core.probe import PROBE_HELP, edges_of, parse_probes
 from tachometry.spec.core.stream import STREAM_HELP, Stream
 from tachometry.spec.core.words import Words, speed_notes
 from tachometry.spec.language.option import option
@@ -28,9 +27,6 @@ class Core(Numbers):
         part=Health,
     )
     extras: tuple[Extra, ...] = field(default=(), metadata={"extras": EXTRAS})  # see `spec.core.extras`
-    probe: str = option(
-        "", PROBE_HELP, metavar="[N|EDGES]", shown="none", parse=parse_probes, tests=("", "3", "both"), tacit=True
-    )
     compare: Compare | None = option(  # noqa: RUF009
         None,
         "Output compare has pulses of WIDTH, a time or clocks, at COUNT positions (0: no end) from START on, STEP "
@@ -62,7 +58,8 @@ class Core(Numbers):
     def front_end(self) -> FrontEnd:
         """Inputs of the core; where its index and its modulus are."""
         complements = self.health is not None and self.health.complements is not None
-        return FrontEnd(self, self.times.longest, len(edges_of(self.probe)), complements)
+        pins = tuple(pin for extra in self.extras for pin in extra.pins(self))
+        return FrontEnd(self, self.times.longest, pins, complements)
 
     @property
     def latency_entries(self) -> dict[str, int]:
@@ -75,8 +72,8 @@ class Core(Numbers):
         }
         if self.compare is not None and not self.compare.fine:  # else it is at the place itself
             found["pin_to_compare"] = latency.pin_to_count + latency.tick + 1
-        if self.probe:
-            found["pin_to_probe"] = latency.pin_to_count + latency.tick
+        for extra in self.extras:
+            found |= extra.latency(self)
         return found | ({"tick_in_to_window_end": TICK_IN_TO_WINDOW_END} if self.external_tick else {})
 
     @cached_property

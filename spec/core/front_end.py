@@ -5,9 +5,26 @@ from dataclasses import dataclass
 from tachometry.spec.core.asked import Asked
 from tachometry.spec.core.sensors import EDGE, USUAL_STATE, Levels
 from tachometry.spec.core.tooth_wheel import ToothWheel
+from tachometry.spec.language.port import Port
 
 # The options that inputs of `controls` come with.
 OF_CONTROLS = {"preset": "preset", "home": "index_once"}
+
+
+@dataclass(frozen=True)
+class Pin:
+    """An input that comes with an extra.
+
+    With `lines`, one name for each bit, it is asynchronous, and passes the synchroniser and the glitch filter. With
+    `of` it is the asynchronous complement of that line. Else it is synchronous to clk.
+    """
+
+    port: Port
+    lines: tuple[str, ...] = ()
+    of: str = ""
+    holds: int = 0  # clocks for which a complement may equal its line
+    rest: int = 0  # its level where nobody drives it; of a complement the other level of its line
+    act: bool = False  # on a bus a register takes its place, and no bench drives it
 
 
 @dataclass(frozen=True)
@@ -16,8 +33,8 @@ class FrontEnd:
 
     asked: Asked
     longest: int  # clocks after which an update is forced
-    n_probes: int
-    complements: bool  # whether lines come with their complements
+    pins: tuple[Pin, ...] = ()  # inputs of extras
+    complements: bool = False  # whether lines come with their complements
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -45,12 +62,12 @@ class FrontEnd:
     @property
     def pulsed(self) -> tuple[str, ...]:
         """Inputs that a simulation may let rise."""
-        return (*self.controls, *self.probes)
+        return (*self.controls, *self.sensed)
 
     @property
-    def probes(self) -> tuple[str, ...]:
-        """Names of the probe inputs, each a bit of `probe`."""
-        return tuple(f"probe_{number}" for number in range(self.n_probes))
+    def sensed(self) -> tuple[str, ...]:
+        """Lines of these inputs that are asynchronous, each a bit of one of them."""
+        return tuple(line for pin in self.pins for line in pin.lines)
 
     @property
     def moves_position(self) -> bool:

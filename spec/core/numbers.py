@@ -5,6 +5,7 @@ from functools import cached_property
 from typing import Any
 
 from tachometry.spec.core.asked import Asked
+from tachometry.spec.core.front_end import FrontEnd
 from tachometry.spec.core.latency import Latency
 from tachometry.spec.core.recovery import Recovery
 from tachometry.spec.core.tick import Scale, Tick
@@ -59,6 +60,11 @@ class Numbers(Asked):
             standstill_ticks=timing.max_ticks,
             interval_unit=timing.tick_cycles,
         )
+
+    @cached_property
+    def front_end(self) -> FrontEnd:
+        """Inputs; where the index and the modulus are."""
+        return FrontEnd(self, self.times.longest)
 
     @cached_property
     def widths(self) -> Widths:

@@ -6,7 +6,7 @@ from tachometry.spec.core.compare import COUNT_WIDTH
 from tachometry.spec.core.core import Core
 from tachometry.spec.core.health import FAULT_TEXTS, FAULT_WIDTH, FAULTS_WIDTH, OPEN, Fault
 from tachometry.spec.core.stream import READY, stream_ports
-from tachometry.spec.language.port import COMPARE, FINE, INDEX, MISSED, TICK, UPDATE, WIDE, Port, held, pin, strobe
+from tachometry.spec.language.port import COMPARE, INDEX, MISSED, TICK, UPDATE, WIDE, Port, held, pin, strobe
 
 # The ends of what encloses the true speed, and which way each is rounded: outward.
 BOUNDS = {"velocity_lower": -1, "velocity_upper": 1}
@@ -59,17 +59,21 @@ def ports_of(spec: Core, own: Iterable[Port]) -> Iterator[Port]:
         text = "One clock. Together with tick: the external tick was missing, and the core made one. Alone: an "
         text += "external tick came too early and was left out."
         yield strobe("tick_error", text)
-    yield from _probe_ports(spec)
+    yield from _of_extras(spec, -1)
     yield from _compare_ports(spec)
     yield from _health_ports(spec)
-    for extra in spec.extras:
-        yield from extra.ports(spec)
+    yield from _of_extras(spec, 0)
     if spec.filter_clocks:
         text = "Edges that the glitch filter has kept out, two for each glitch; it stays at 65534. Between the ticks "
         text += "it counts on, and a capture takes what it is then."
         yield held(TICK, "swallowed_edges", 16, unit="edges", help=text)
     if spec.stream:
         yield from stream_ports(spec)
+
+
+def _of_extras(spec: Core, place: int) -> Iterator[Port]:
+    for extra in spec.extras:
+        yield from extra.ports(spec) if extra.place == place else ()
 
 
 def _inputs(spec: Core) -> Iterator[Port]:
@@ -89,10 +93,7 @@ def _inputs(spec: Core) -> Iterator[Port]:
         yield pin("preset", text)
     if front.index_once:
         yield pin("home", "Homing, asynchronous; its rising edge lets the next index be taken.")
-    if probes := len(front.probes):
-        yield pin("probe", "Probe inputs, asynchronous; their edges latch the position.", probes)
-        text = "Arms probes, each while its bit is high, for the clocks after; synchronous to clk. After reset all are."
-        yield pin("probe_arm", text, probes)
+    yield from (pin.port for pin in front.pins if not pin.of)
     yield from _list_pins(spec)
     if spec.stream:
         yield pin(READY, "The record is taken in this clock; synchronous to clk.")
@@ -122,25 +123,6 @@ def _wrong(spec: Core) -> str:
     if spec.encoder.missing:
         return "the gap was not where it had to be, as of a tooth lost or extra; the next gap is taken."
     return spec.encoder.kind.wrong
-
-
-def _probe_ports(spec: Core) -> Iterable[Port]:
-    probes = range(len(spec.front_end.probes))
-    if probes:
-        text = "Probes that have latched and are not armed again. It changes between the ticks as well."
-        yield held(TICK, "probed", len(probes), help=text)
-    for number in probes:
-        yield strobe(valid := f"probe_valid_{number}", f"One clock for every position that probe {number} latches.")
-        text = f"Position at the latched edge of probe {number}, with a count of the same clock."
-        yield held(valid, f"probe_position_{number}", spec.position_width, signed=True, unit="counts", help=text)
-        text = f"Clocks from the last count to the latched edge of probe {number}; it stays at its end."
-        yield held(valid, f"probe_time_{number}", spec.times.probe_width, unit="clocks", help=text)
-        for fine in (port for port in spec.method_ports if port.name == FINE):
-            text = f"Fine position that was shown when probe {number} latched: that of the end of a sampling period."
-            yield held(valid, f"probe_fine_{number}", fine.width, signed=True, unit=fine.unit, help=text)
-            text = f"Clocks from the end of that period to the latched edge of probe {number}; all ones: there was "
-            text += "none."
-            yield held(valid, f"probe_age_{number}", spec.times.probe_age_width, unit="clocks", help=text)
 
 
 def _list_pins(spec: Core) -> Iterable[Port]:

@@ -5,7 +5,6 @@ from fractions import Fraction
 
 from tachometry.spec.core.asked import Asked
 from tachometry.spec.core.latency import Latency
-from tachometry.spec.core.probe import TIME_WIDTH
 from tachometry.spec.core.tick import Tick
 from tachometry.spec.language.port import TICK
 from tachometry.spec.language.units import signed_width
@@ -43,16 +42,6 @@ class Times:
     def update_spacing(self) -> int:
         """Fewest clocks between two updates."""
         return self.shortest_tick if self.spacing is None else self.spacing
-
-    @property
-    def probe_width(self) -> int:
-        """Bits of the time from a count to a probe."""
-        return min(self.longest.bit_length(), TIME_WIDTH)
-
-    @property
-    def probe_age_width(self) -> int:
-        """Bits of the time from the end of a period whose update is shown to a probe."""
-        return (self.tick.longest + self.latency.tick_to_velocity + 2).bit_length()
 
     @property
     def stalled_after_ticks(self) -> int:

@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from tachometry.spec.control import LoopSpec
+from tachometry.spec.core.extras.extra import refuse
 from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.language.field import WORD, Draft, Field
 from tachometry.spec.language.option import ParameterError
@@ -50,9 +51,7 @@ class DemoMap(RegisterMap):
             raise ParameterError("compare", "must not be a list with a demo, which has no input for it")
         if not self.spec.encoder.plain:
             raise ParameterError("sensor", "must be quadrature with a demo, its lines as they come: it emulates these")
-
-        if self.spec.probe:
-            raise ParameterError("probe", "must be left out of a demo, which emulates an encoder and no probe")
+        refuse(self.spec.extras, "demo")
         if self.spec.stream:
             raise ParameterError("stream", "must be left out of a demo, whose pins lead to no DMA")
 

@@ -21,7 +21,6 @@ from functools import cached_property
 from typing import Any, Self
 
 from tachometry.spec.control import AnySpec
-from tachometry.spec.core.probe import packed_edges
 from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.language.field import WORD, Draft, Field, Register
 from tachometry.spec.language.port import INDEX, MISSED, UPDATE, WIDE, Port
@@ -60,7 +59,7 @@ class RegisterMap:
             *self._head(),
             *self._captured(),
             *self._placing(),
-            *self._probing(),
+            *(draft for extra in self.spec.extras for draft in extra.registers(self.spec)),
             *self._listing(),
             *self._added(),
             *self._interrupting(),
@@ -114,8 +113,6 @@ class RegisterMap:
             found["fault"] = "A fault of the encoder was seen, see health."
         for extra in self.spec.extras:
             found |= {name: event.help for name, event in extra.events(self.spec).items()}
-        if self.spec.probe:
-            found["probe"] = "A probe has latched a position."
         return found
 
     @property
@@ -311,18 +308,6 @@ class RegisterMap:
             for place, (name, help) in enumerate(acts.items())
         )
         yield "COMPARE_LIST", "Changes the list of compare; COMPARE_WAITING says how long it is.", tuple(fields), {}
-
-    def _probing(self) -> Iterable[Draft]:
-        """Return registers that arm probes, and choose their edges."""
-        probes = len(self.spec.front_end.probes)
-        if not probes:
-            return
-        arms = Field("arm", probes, help="A bit for each probe.", writable=True, single=True, port="probe_arm")
-        yield "PROBE_ARM", "Writing 1 arms a probe: it latches at its next edge.", (arms,), {}
-        text = "Two bits for each probe, the first lowest: 1 rises, 2 falls, 3 both, 0 none."
-        edges = packed_edges(self.spec.probe)
-        field = Field("edges", 2 * probes, help=text, writable=True, reset=edges, port="probe_edges")
-        yield "PROBE_EDGES", "Edges at which probes latch.", (field,), {}
 
     def _added(self) -> Iterable[Draft]:
         """Return what a design around the core adds."""

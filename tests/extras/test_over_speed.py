@@ -2,7 +2,7 @@
 
 import math
 
-from extras.harness import Case, in_lockstep
+from extras.harness import Case, agreeing, in_icarus, on_a_bus, refused
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.extras.over_speed import Gates
@@ -12,7 +12,9 @@ CASES = (Case("s", "over-speed=2000rad/s"), Case("m", "over-speed=3000rpm unit=r
 
 def rule(case: Case) -> None:
     """From the clock after the first velocity beyond the limit on, every tick shows it."""
-    limit = float(case.texts["over-speed"].removesuffix(case.unit)) * {"rad/s": 1, "rpm": math.pi / 30}[case.unit]
+    text = case.texts["over-speed"]
+    unit = "rpm" if text.endswith("rpm") else "rad/s"
+    limit = float(text.removesuffix(unit)) * {"rad/s": 1, "rpm": math.pi / 30}[unit]
     tripped = False
     for row in case.rows():
         if row.tick:
@@ -20,7 +22,15 @@ def rule(case: Case) -> None:
         tripped |= row.velocity_valid and abs(row.rad_per_s) > limit + 1e-9
 
 
-test_over_speed = in_lockstep(CASES, rule)
+test_cores = agreeing(CASES, rule)
+test_bus = on_a_bus(CASES[0])
+test_verilog = in_icarus(CASES[1])
+test_refusals = refused(
+    {
+        "over-speed=1e9rad/s": "over_speed must be less than .* rad/s, the greatest velocity, not 1000000000rad/s",
+        "over-speed=fast": "over_speed must be",
+    }
+)
 
 
 def test_every_velocity() -> None:

@@ -6,19 +6,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim.golden.extras import View
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.over_speed import OverSpeed
+from tachometry.spec.language.port import UPDATE
 
 
-def tables(extra: OverSpeed, spec: TachometerSpec, ticks: Table, updates: Table) -> dict[str, Table]:
-    """Return the clocks from which updates beyond the limit are shown."""
-    beyond = np.abs(updates.velocity) > extra.greatest(spec)
-    return {"over_speed": Table(updates.clock[beyond] + 1, {})}
+def tables(extra: OverSpeed, view: View) -> dict[str, Table]:
+    """Return the clocks of updates beyond the limit."""
+    updates = view.tables[UPDATE]
+    return {"over_speed": Table(updates.clock[np.abs(updates.velocity) > extra.greatest(view.spec)], {})}
 
 
-def shown(found: Mapping[str, Table], clock: NDArray[np.int64], cleared: int) -> dict[str, NDArray[Any]]:
-    """Return whether there has been such an update since the clock after `cleared`."""
-    trips = found["over_speed"].clock
-    before = np.searchsorted(trips, cleared + 1, side="right")
-    return {"over_speed": np.searchsorted(trips, clock, side="right") > before}
+def shown(
+    extra: OverSpeed, spec: TachometerSpec, found: Mapping[str, Table], clock: NDArray[np.int64], cleared: int
+) -> dict[str, NDArray[Any]]:
+    """Return whether there has been such an update after `cleared`, and before the clock."""
+    beyond = found["over_speed"].clock
+    return {"over_speed": np.searchsorted(beyond, clock) > np.searchsorted(beyond, cleared, side="right")}

@@ -1,10 +1,12 @@
-"""An extra is one feature beside the measurement: its option, its rules, its ports, its events."""
+"""An extra is one feature beside the measurement: its option, its rules, and what it adds to the core."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
+from tachometry.spec.core.front_end import Pin
 from tachometry.spec.core.numbers import Numbers
+from tachometry.spec.language.field import Draft
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import Port
 
@@ -26,7 +28,9 @@ class Extra:
     """
 
     name: ClassVar[str]  # of the files, and of the box in the gates
+    place: ClassVar[int] = 0  # its ports are behind (1) or before (-1) those of others, as drivers know them
     missing: ClassVar[Mapping[str, str]] = {}  # the refusals of cores that cannot have it: of axes, demo or rio
+    texts: ClassVar[Mapping[str, Mapping[Any, str]]] = {}  # what values of its ports mean, by the names of the ports
 
     @classmethod
     def of(cls, extras: "Iterable[Extra]") -> Self | None:
@@ -36,13 +40,29 @@ class Extra:
     def check(self, spec: Numbers) -> None:
         """Raise ParameterError if a core cannot have it."""
 
+    def pins(self, spec: Numbers) -> Iterable[Pin]:
+        """Return its inputs."""
+        return ()
+
     def ports(self, spec: Numbers) -> Iterable[Port]:
-        """Return inputs and outputs that come with it."""
+        """Return its outputs."""
+        return ()
+
+    def registers(self, spec: Numbers) -> Iterable[Draft]:
+        """Return registers that a program writes; a field sets the input of its gates that has the name of its port."""
         return ()
 
     def events(self, spec: Numbers) -> Mapping[str, Event]:
         """Return events that raise the interrupt, by their names."""
         return {}
+
+    def latency(self, spec: Numbers) -> Mapping[str, int]:
+        """Return entries of the manifest's latencies, in clocks."""
+        return {}
+
+    def entry(self, spec: Numbers) -> dict[str, Any] | None:
+        """Return the entry of the manifest that has its name; None: there is none."""
+        return None
 
     def row(self, spec: Numbers, run: Any) -> tuple[str, str] | None:
         """Return name and value that a simulation prints of it."""

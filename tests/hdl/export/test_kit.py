@@ -131,7 +131,7 @@ def test_constraints_meet_every_synchroniser_once(method: str, bus: str, more: l
     found = flip_flops(files["spindle.v"])
     spec = of_texts(method, BASE | CASES[method])
     pins = [pin.name for pin in spec.ports.pins if pin.name not in ("probe", "probe_arm", READY)] + [
-        *spec.front_end.probes,
+        *spec.front_end.sensed,
         *more,
     ]
     assert len(found) == 2 * len(pins)

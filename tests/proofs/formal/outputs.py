@@ -5,14 +5,13 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 from proofs.formal.prove import Proof
 
-from tachometry.hdl.extras import over_speed
+from tachometry.hdl.extras import over_speed, probe
 from tachometry.hdl.front_end import (
     encoder_watch,
     index_capture,
     modulo_counter,
     open_circuit,
     position_counter,
-    probe_latch,
 )
 from tachometry.hdl.output import compare_output
 from tachometry.spec import Encoder, STachometer
@@ -38,7 +37,7 @@ class Outputs(wiring.Component):
             "modulo": modulo_counter.ModuloCounter(MODULUS),
             "position": position_counter.PositionCounter(_WIDTH, preset=0),
             "home": index_capture.IndexCapture(_WIDTH, once=True),
-            "probe": probe_latch.ProbeLatch(1, 1, _WIDTH, 3),
+            "probe": probe.Gates((1,), _WIDTH, 3),
             "trip": over_speed.Gates(LIMIT, _WIDTH),
             "open": open_circuit.OpenCircuit(OPEN),
             "watch": encoder_watch.EncoderWatch(second=6, edges=2, errors=1),

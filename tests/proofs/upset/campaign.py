@@ -17,6 +17,7 @@ from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
 from tachometry.spec.control import AnySpec
 from tachometry.spec.core.compare import Compare
 from tachometry.spec.core.extras.over_speed import OverSpeed
+from tachometry.spec.core.extras.probe import Probe
 from tachometry.spec.core.health import Health
 from tachometry.spec.core.index import Index
 
@@ -29,9 +30,8 @@ _OPTIONS: dict[str, dict[str, Any]] = {
         "index": Index(once=True),
         "preset": 0,
         "position_modulo": "7",
-        "probe": "both",
         "health": Health(complements=4),
-        "extras": (OverSpeed(limit=Speed.parse("1rad/s")),),
+        "extras": (OverSpeed(limit=Speed.parse("1rad/s")), Probe(probes="both")),
         "compare": Compare(2, 3, 0, "7clk", "both"),
     },
     "track": {"timing": Timing(5_000_000, 340, 20), "max_speed": Speed.parse("75rev/s"), "multiplier": "block"},

@@ -1,55 +1,58 @@
-"""The golden probes latch the position at edges of their inputs, while they are armed."""
+"""Golden model of `spec.core.extras.probe`."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.golden.front_end import Steps, positions_at
+from tachometry.sim.golden.extras import View
+from tachometry.sim.golden.front_end import positions_at
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.probe import FALLING, RISING, packed_edges
-from tachometry.spec.language.port import FINE
+from tachometry.spec.core.extras.probe import FALLING, RISING, Probe
+from tachometry.spec.language.port import FINE, UPDATE
 
 Ints = NDArray[np.int64]
 
 
-def latched(spec: TachometerSpec, steps: Steps, trace: PinTrace, updates: Table) -> dict[str, Table]:
-    """Return what each probe latches, by strobes, and as `probed` when one of them has latched, or not any more."""
-    found, flags = {}, []
-    for number, (seen, level) in enumerate(steps.probes):
+def tables(extra: Probe, view: View) -> dict[str, Table]:
+    """Return what each probe latches, and as `probed` when one of them has latched, or not any more."""
+    spec, trace, found, flags = view.spec, view.trace, dict[str, Table](), []
+    stepped = view.steps.clock[view.steps.step != 0]
+    end = (1 << extra.time_width(spec)) - 1
+    for number, line in enumerate(extra.lines):
+        at, level = view.steps.pins[line]
         # An edge is known in a register a clock before it is shown; what has been set until then counts.
-        known = seen[1:] + spec.latency.tick - 1
+        known = at[1:] + spec.latency.tick - 1
         rows = np.searchsorted(trace.clock, known - 1, side="right") - 1
-        packed = packed_edges(spec.probe) if "probe_edges" not in trace.more else trace.more["probe_edges"][rows]
+        packed = trace.lines["probe_edges"][rows] if "probe_edges" in trace.lines else extra.packed_edges
         wanted = packed >> 2 * number & (RISING | FALLING)
         edges = known[wanted & np.where(level[1:] > level[:-1], RISING, FALLING) != 0]
         clock, flag = _while_armed(number, edges, trace)
         flags.append(flag)
-        stepped = steps.clock[steps.step != 0]
         last = np.searchsorted(stepped, clock - spec.latency.tick, side="right")
-        end = (1 << spec.times.probe_width) - 1
         since = np.where(last > 0, clock - spec.latency.tick - np.append(0, stepped)[last], end)
-        found[f"probe_valid_{number}"] = Table(
-            clock,
-            {
-                f"probe_position_{number}": positions_at(spec, steps, clock - spec.latency.tick),
-                f"probe_time_{number}": np.minimum(since, end),
-                **_fine(spec, number, clock, updates),
-            },
-        )
-    return found | {"probed": _together(flags)} if spec.probe else {}
+        columns = {
+            f"probe_position_{number}": positions_at(spec, view.steps, clock - spec.latency.tick),
+            f"probe_time_{number}": np.minimum(since, end),
+        }
+        if FINE in (updates := view.tables[UPDATE]).columns:  # the latest before these clocks
+            row = np.searchsorted(updates.clock, clock)
+            age = np.where(row > 0, clock - np.append(0, updates["cause"])[row], (1 << extra.age_width(spec)) - 1)
+            columns |= {f"probe_fine_{number}": np.append(0, updates[FINE])[row], f"probe_age_{number}": age}
+        found[f"probe_valid_{number}"] = Table(clock, columns)
+    latched = np.unique(np.concatenate([table.clock for table in found.values()]))
+    return found | {"probe": Table(latched, {}), "probed": _together(flags)}
 
 
-def _fine(spec: TachometerSpec, number: int, clock: Ints, updates: Table) -> dict[str, Ints]:
-    """Return the fine position of the latest update before these clocks, and its age, if there is one."""
-    if FINE not in updates.columns:
-        return {}
-    row = np.searchsorted(updates.clock, clock)
-    fine, cause = np.append(0, updates[FINE])[row], np.append(0, updates["cause"])[row]
-    age = np.where(row > 0, clock - cause, (1 << spec.times.probe_age_width) - 1)
-    return {f"probe_fine_{number}": fine, f"probe_age_{number}": age}
+def shown(
+    extra: Probe, spec: TachometerSpec, found: Mapping[str, Table], clock: Ints, cleared: int
+) -> dict[str, NDArray[Any]]:
+    """Return `probed`; a program that clears leaves it as it is."""
+    probed = found["probed"]["probed"][np.searchsorted(found["probed"].clock, clock, side="right") - 1]
+    return {"probed": probed if len(extra.lines) > 1 else probed != 0}
 
 
 def _while_armed(number: int, edges: Ints, trace: PinTrace) -> tuple[Ints, list[tuple[int, int]]]:
@@ -86,17 +89,3 @@ def _together(flags: list[list[tuple[int, int]]]) -> Table:
         clocks.append(clock)
         values.append(value)
     return Table(np.array(clocks, dtype=np.int64), {"probed": np.array(values, dtype=np.int64)})
-
-
-def shown(found: Table, clock: Ints) -> NDArray[Any]:
-    """Return `probed` in these clocks."""
-    value: NDArray[Any] = found["probed"][np.searchsorted(found.clock, clock, side="right") - 1]
-    return value
-
-
-def with_probed(spec: TachometerSpec, ticks: Table, found: dict[str, Table]) -> Table:
-    """Return ticks with the probes that have latched."""
-    if not spec.probe:
-        return ticks
-    probed = shown(found["probed"], ticks.clock)
-    return ticks.having(probed=probed if len(spec.front_end.probes) > 1 else probed != 0)
