@@ -17,7 +17,7 @@ from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.recording import PinTrace, Recording
 from tachometry.spec import TachometerSpec, of_texts
-from tachometry.spec.core.health import Fault
+from tachometry.spec.core.extras.health import Fault
 
 PAGE = MEASURED / "health.md"
 _DATA = data("health")

@@ -14,7 +14,6 @@ from rich.text import Text
 from tachometry.boards.monitor.selftest import Result
 from tachometry.boards.monitor.watch import HISTORY, Display, State
 from tachometry.cli.reports.standard_streams import printable
-from tachometry.spec.core.health import FAULT_TEXTS, Fault
 from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.language.port import MISSED, WIDE
 from tachometry.spec.language.units import plural
@@ -191,9 +190,9 @@ def wrong_rows(state: State) -> list[tuple[str, str]]:
             rows.append((text, "-" if number is None else f"{number}{' or more' * (number == _SATURATED)}"))
     if state.spec.front_end.index_state is not None:
         rows += [(name.replace("_", " "), str(state.told[name])) for name in (WIDE, MISSED)]
-    if "health" in state.columns:
-        code = state.value("health")
-        rows.append(("health", "-" if code is None else f"{code}: {FAULT_TEXTS[Fault(int(code))]}" if code else "0"))
+    for name, texts in (item for extra in state.spec.extras for item in extra.texts.items()):
+        code = state.value(name)
+        rows.append((name, "-" if code is None else f"{code}: {texts[int(code)]}" if code else "0"))
     if "swallowed_edges" in state.columns:
         edges = state.value("swallowed_edges")
         rows.append(("swallowed edges", "-" if edges is None else str(edges)))

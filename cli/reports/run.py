@@ -15,7 +15,6 @@ from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.simulation import Axis, Simulation
 from tachometry.spec import AxesSpec, CoreSpec
 from tachometry.spec.core.compare import BOTH
-from tachometry.spec.core.health import FAULT_TEXTS, FAULTS_WIDTH
 from tachometry.spec.language.port import COMPARE, MISSED, WIDE
 from tachometry.spec.language.units import format_time, plural
 
@@ -141,10 +140,6 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         rows.append(("position", f"{run.ticks.position[-1]} at the end; counts out are without presets"))
     if spec.front_end.modulus is not None:
         rows.append(("position modulo", f"{run.ticks.position_modulo[-1]} of {spec.front_end.modulus} at the end"))
-    if spec.health:
-        code, number = run.ticks.health[-1], int(run.ticks.faults[-1])
-        faults = plural(number, "fault") + " or more" * (number == (1 << FAULTS_WIDTH) - 1)
-        rows.append(("health", f"{faults}, first: {FAULT_TEXTS[code]}" if code else "no fault"))
     if spec.compare is not None:
         pulses = run.tables[COMPARE]
         one = 1 << getattr(spec, "fine_bits", 0) * spec.compare.fine

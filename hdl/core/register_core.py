@@ -61,7 +61,7 @@ class RegisterCore(wiring.Component):
             bank.capture.eq(self.capture),
             *(
                 box.clear.eq(bank.clear)
-                for box in (core.conditioner, core.watch, *core.extras.values(), core.stream)
+                for box in (core.conditioner, *core.extras.values(), core.stream)
                 if box is not None and "clear" in box.signature.members
             ),
             position.tick.eq(core.tick),
@@ -79,8 +79,6 @@ class RegisterCore(wiring.Component):
             connect(m, box, bank, whole)
             ticks = getattr(whole, spec.facts.stalls_with)
             m.d.comb += [box.ticks.eq(ticks), box.stalled.eq(whole.stalled), self.irq.eq(box.irq)]
-            if core.watch is not None:
-                m.d.comb += box.fault.eq(core.watch.seen)
             for extra in spec.extras:
                 for name, event in extra.events(spec).items():
                     gates = core if event.wires[0] in core.signature.members else core.extras[extra.name]

@@ -10,7 +10,6 @@ from tachometry.hdl.arithmetic.idle import Idle, idle_of
 from tachometry.hdl.extras import gates_of, place
 from tachometry.hdl.front_end.conditioner import InputConditioner
 from tachometry.hdl.front_end.decoder import decoder_of
-from tachometry.hdl.front_end.encoder_watch import EncoderWatch
 from tachometry.hdl.front_end.external_tick import ExternalTick
 from tachometry.hdl.front_end.index_capture import IndexCapture
 from tachometry.hdl.front_end.index_state import IndexState
@@ -76,19 +75,6 @@ class Tachometer(wiring.Component):
         if front.index_state is not None:
             after = spec.encoder.kind.after(front.index_state)
             self.index_state = IndexState(front.index_state, after, spec.latency.tick)
-        self.watch: EncoderWatch | None = None
-        if spec.health:
-            self.watch = EncoderWatch(
-                second=spec.timing.clock_hz,
-                edges=spec.health.edges,
-                errors=spec.health.errors,
-                counts_per_rev=spec.encoder.counts_per_rev if front.index_watched else 0,
-                position_width=spec.position_width if front.index_watched else 0,
-                index_reset=front.index_resets,
-                presets=front.index_watched and spec.preset is not None,
-                complements=dict.fromkeys(front.complemented, spec.health.complements or 0),
-                misses=front.index_state is not None,
-            )
         self.datapath = DATAPATHS[spec.method](spec)
         self.sampling_clock: TickSource
         if isinstance(self.datapath, OwnTicks):
@@ -132,7 +118,7 @@ class Tachometer(wiring.Component):
     @property
     def idle(self) -> tuple[Idle, ...]:
         """Registers that a simulation may move on."""
-        names = ("conditioner", "watch", "compare_output", "stream", "datapath")
+        names = ("conditioner", "compare_output", "stream", "datapath")
         boxes: dict[str, object] = {name: getattr(self, name) for name in names}
         boxes |= {f"{name}_box": box for name, box in self.extras.items()}
         if not self._spec.facts.own_ticks:
@@ -157,7 +143,6 @@ class Tachometer(wiring.Component):
         self._age(m, ticks, updates)
         self._place(m)
         self._index(m)
-        self._watch(m)
         self._compare(m)
         self._stream(m)
         place(m, self, self.extras, self._taps(m))
@@ -311,33 +296,26 @@ class Tachometer(wiring.Component):
             level, ready = state.index, state.ready
         return level, ready
 
-    def _watch(self, m: Module) -> None:
-        """Add the encoder watch and drive its outputs, if the core has one."""
-        if self.watch is None:
-            return
-        m.submodules.watch = watch = self.watch
-        follow(m, watch, self.decoder, ("level_a", "level_b", "ready", "step", "decode_error"))
-        follow(m, self, watch, ("health", "faults"))
-        follow(m, self.conditioner, self, (f"{line}_n" for line in self._spec.front_end.complemented))
-        follow(m, watch, self.conditioner, (f"equal_{line}" for line in self._spec.front_end.complemented))
-        m.d.comb += self.fault.eq(watch.health.any())
-        if self.index_capture is not None and self._spec.front_end.index_watched:
-            if self._spec.preset is not None:
-                m.d.comb += watch.preset.eq(self.controls["preset"].rises)
-            follow(m, watch, self.index_capture, ("index_valid", "index_position"))
-            follow(m, self, watch, ("index_error",))
-        if self.index_state is not None:
-            follow(m, watch, self.index_state, (MISSED,))
-
     def _taps(self, m: Module) -> dict[str, Value]:
         """Lead inputs of extras through the conditioner, and return what else they may be given, by name.
 
-        `level_NAME` and `ready_NAME` are those of an asynchronous input, a bit for each line; the others are of the
-        clock of the levels: `step`, and `next_position`, with the steps that are `latency.tick` clocks old in the next.
+        `level_a`, `ready` and `step` are of the decoder; `level_NAME` and `ready_NAME` of an asynchronous input, a bit
+        for each line; `equal_a` says that a line equals its complement; `preset_rises` sets the position, and
+        `next_position` is `position` of the next clock.
         """
-        taps: dict[str, Value] = {"step": self.decoder.step, "next_position": self.position_counter.next}
-        for pin in (pin for pin in self._spec.front_end.pins if pin.lines):
-            name, box = pin.port.name, self.conditioner
+        decoder, box = self.decoder, self.conditioner
+        taps: dict[str, Value] = {"next_position": self.position_counter.next}
+        taps |= {
+            name: getattr(decoder, name) for name in decoder.signature.members if name[:5] in ("level", "ready", "step")
+        }
+        taps |= {f"{name}_rises": control.rises for name, control in self.controls.items()}
+        for pin in self._spec.front_end.pins:
+            name = pin.port.name
+            if pin.of:
+                follow(m, box, self, [name])
+                taps[f"equal_{pin.of}"] = getattr(box, f"equal_{pin.of}")
+            if not pin.lines:
+                continue
             m.d.comb += [getattr(box, line).eq(bit) for line, bit in zip(pin.lines, getattr(self, name), strict=True)]
             for kind in ("level", "ready"):
                 taps[f"{kind}_{name}"] = Cat(getattr(box, f"{kind}_{line}") for line in pin.lines)

@@ -95,8 +95,7 @@ def _probed(spec: TachometerSpec, trace: PinTrace, seed: int) -> PinTrace:
 def _open(spec: TachometerSpec, trace: PinTrace, seed: int) -> PinTrace:
     """Return the trace with complements that equal their lines for a while."""
     rng = np.random.default_rng([seed, 3])
-    for line in spec.front_end.complemented:
-        most = (spec.health and spec.health.complements) or 0
+    for line, most in ((pin.of, pin.holds) for pin in spec.front_end.pins if pin.of):
         begin = np.append(0, rng.integers(0, trace.n_clocks, 20))
         end = np.minimum(begin + np.append(most, rng.choice([1, most, most + 1, 3 * most], 20)), trace.n_clocks - 1)
         clock = merged(trace.clock, begin, end)

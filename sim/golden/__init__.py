@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from tachometry.sim.golden import compare, extras, health, stream
+from tachometry.sim.golden import compare, extras, stream
 from tachometry.sim.golden.axes import run_axes
 from tachometry.sim.golden.front_end import Steps, count, decoded
 from tachometry.sim.golden.low_pass import filtered
@@ -47,10 +47,8 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
         beyond, nominal = None, np.broadcast_to(np.int64(1), last.shape)
     ticks, index = count(spec, steps, last, beyond)
     del last  # as long as all ticks
-    wrong = health.faults(spec, trace, steps, index)
     if spec.facts.stalls_with == TICK:
         ticks = with_stalled(spec, ticks, nominal)
-    ticks = health.with_health(spec, ticks, wrong)
     measured = golden.updates(ticks, steps, trace.n_clocks)
     if "cause" not in measured.columns:
         measured = measured.having(cause=measured.clock - spec.latency.datapath)
@@ -67,7 +65,6 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
         MISSED: Table(steps.missed + spec.latency.tick, {}),
         "decode_error": Table(steps.errors, {}),
         "tick_error": Table(tick_errors, {}),
-        "fault": wrong,
         **added,
         **pulses,
     }

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tachometry.sim import golden
-from tachometry.sim.golden import compare, extras, health
+from tachometry.sim.golden import compare, extras
 from tachometry.sim.golden.front_end import decoded, homed
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec.core.stream import OVERRUNS_WIDTH
@@ -99,7 +99,6 @@ class GoldenBank:
         left = sorted(captures)
         self._ask(accesses)
         self._act(accesses)
-        self._clear(accesses)
         found: list[tuple[int | None, bool]] = []
         for access in accesses:
             while left and left[0] <= access.clock:
@@ -170,8 +169,6 @@ class GoldenBank:
             "stall": self._stalls,
             "error": np.unique(np.concatenate(errors)),
         }
-        if "fault" in self._map.interrupts:
-            found["fault"] = self._tables["fault"].clock - 1
         return {event: found[event] if event in found else self._tables[event].clock for event in self._map.interrupts}
 
     def irq(self, accesses: Iterable[Access], n_clocks: int) -> list[bool]:
@@ -232,7 +229,6 @@ class GoldenBank:
             **self._shown(extras.shown(self._map.spec, self._tables, np.array([clock]), self._cleared)),
             "homed": int(homed(self._map.spec, self._steps, np.array([clock]))[0]),
             **self._shown(compare.shown(self._map.spec, self._tables, np.array([clock]))),
-            **(self._faults(clock) if self._map.spec.health else {}),
             **({"overruns": self._overruns(clock)} if self._map.spec.stream else {}),
         }
 
@@ -240,22 +236,16 @@ class GoldenBank:
         dropped = self._count(self._tables["overruns"].clock, self._cleared + 1, clock)
         return min(dropped, (1 << OVERRUNS_WIDTH) - 1)
 
-    def _clear(self, accesses: Sequence[Access]) -> None:
-        """Find the faults that are there again if a program clears them."""
-        if self._map.spec.front_end.complemented:
-            number = self._map.registers.index(self._map["CONTROL"])
-            clears = [one.clock for one in accesses if one.address == number and (one.data or 0) & 1]
-            given = self._map.spec, self._trace, self._steps, self._tables[INDEX]
-            self._tables["fault"] = health.faults(*given, np.array(clears, dtype=np.int64))
-
     def _act(self, accesses: Sequence[Access]) -> None:
         """Find what extras show, and where pulses are, when a program writes what are inputs without a bus."""
         spec = self._map.spec
         added = {name for extra in spec.extras for name, *_ in extra.registers(spec)}
         fields = {field for name in added for field in self._map[name].fields}
         fields |= {field for field in self._map.settings if field.port.startswith("compare_")}
-        if not fields:
+        if not fields and not spec.extras:
             return
+        control = self._map.registers.index(self._map["CONTROL"])
+        clears = np.array([one.clock for one in accesses if one.address == control and (one.data or 0) & 1], np.int64)
         settings = dict(self._settings)
         changes = {field.port: {0: settings[field.port]} for field in fields}
         for access in accesses:
@@ -265,25 +255,19 @@ class GoldenBank:
                 value = settings[field.port] = written(field, access.data, settings[field.port])
                 acts = {access.clock: value, access.clock + 1: 0}
                 changes[field.port] |= acts if field.single else {access.clock + 1: value}
-        clock = np.unique([at for each in changes.values() for at in each])
-        clock = np.union1d(clock, self._trace.clock)
+        clock = np.union1d(self._trace.clock, [at for each in changes.values() for at in each]).astype(np.int64)
         lines = self._trace.at(clock) | {
             port: np.array([*each.values()])[np.searchsorted([*each], clock, side="right") - 1]
             for port, each in changes.items()
         }
         pins = PinTrace.of_lines(clock, self._trace.n_clocks, lines)
-        self._tables |= extras.tables(extras.View(spec, pins, self._steps, self._tables))
+        self._tables |= extras.tables(extras.View(spec, pins, self._steps, self._tables, clears))
         if "compare_next" in lines:
             self._tables |= compare.listed(spec, self._steps, pins)
 
     @staticmethod
     def _shown(found: dict[str, np.ndarray]) -> dict[str, int]:
         return {name: int(column[0]) for name, column in found.items()}
-
-    def _faults(self, clock: int) -> dict[str, int]:
-        found = self._tables["fault"]
-        first, end = np.searchsorted(found.clock, [self._cleared + 1, clock], side="right")[:, None]
-        return self._shown(health.shown(found, first, end))
 
     @staticmethod
     def _count(clocks: np.ndarray, after: int, until: int) -> int:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.golden import compare, extras, health
+from tachometry.sim.golden import compare, extras
 from tachometry.sim.golden.front_end import Steps, homed, positions_at
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
@@ -83,8 +83,7 @@ def records(
         for name, column in tables[strobe].columns.items()
     }
     shown = Table(clock, held).having(homed=homed(spec, steps, clock), **{LOST: np.append(False, ~free[:-1])})
-    shown = health.with_health(spec, shown.having(**extras.shown(spec, tables, shown.clock)), tables["fault"])
-    shown = shown.having(**compare.shown(spec, dict(tables), clock))
+    shown = shown.having(**extras.shown(spec, tables, clock), **compare.shown(spec, dict(tables), clock))
     found = np.zeros(len(clock), dtype=np.dtype(entry["dtype"]))
     bits = [shown[name].astype(np.uint32) << np.uint32(place) for place, name in enumerate(flags_of(spec.ports))]
     position = positions_at(spec, steps, clock - spec.latency.tick, reset=True)

@@ -5,7 +5,6 @@ from fractions import Fraction
 
 from tachometry.spec.core.core import Core
 from tachometry.spec.core.front_end import OF_CONTROLS
-from tachometry.spec.core.health import COMPLEMENTS
 from tachometry.spec.core.timing import MAX_TICK_CYCLES
 from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS
 from tachometry.spec.formats.velocity_output import NATIVE
@@ -31,13 +30,6 @@ def check(spec: Core) -> None:
         raise ParameterError("bounds", "must not be given with --missing-teeth: teeth that are not there have no edges")
     _check_index_state(spec)
     _check_place(spec)
-    if spec.health and spec.encoder.sensor != "quadrature":
-        rest = f"must be left out for {spec.encoder.sensor}: it watches two lines in quadrature"
-        raise ParameterError("health", rest)
-    clocks = spec.health.complements if spec.health else None
-    if clocks is not None and not COMPLEMENTS[0] <= clocks <= COMPLEMENTS[1]:
-        times = (format_time(Fraction(one) / spec.timing.clock_hz) for one in (*COMPLEMENTS, clocks))
-        raise ParameterError("complements", "must be from {} to {} at this clock, not {}".format(*times))
     if spec.compare is not None:
         fastest = Fraction(0)
         if spec.max_speed is not None:

@@ -7,7 +7,6 @@ from typing import ClassVar, Literal
 from tachometry.spec.core.compare import Compare
 from tachometry.spec.core.extras import EXTRAS, Extra
 from tachometry.spec.core.front_end import FrontEnd
-from tachometry.spec.core.health import Health
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 from tachometry.spec.core.numbers import Numbers
 from tachometry.spec.core.stream import STREAM_HELP, Stream
@@ -19,13 +18,6 @@ from tachometry.spec.language.option import option
 class Core(Numbers):
     """Features beside the measurement, and the inputs of a core."""
 
-    health: Health | None = option(  # noqa: RUF009
-        None,
-        "Watch the encoder: outputs health (the first fault), faults (how many) and fault (there is one), and with "
-        "--index index_error. A reset clears them, and CONTROL.clear.",
-        tacit=True,
-        part=Health,
-    )
     extras: tuple[Extra, ...] = field(default=(), metadata={"extras": EXTRAS})  # see `spec.core.extras`
     compare: Compare | None = option(  # noqa: RUF009
         None,
@@ -57,9 +49,8 @@ class Core(Numbers):
     @cached_property
     def front_end(self) -> FrontEnd:
         """Inputs of the core; where its index and its modulus are."""
-        complements = self.health is not None and self.health.complements is not None
         pins = tuple(pin for extra in self.extras for pin in extra.pins(self))
-        return FrontEnd(self, self.times.longest, pins, complements)
+        return FrontEnd(self, self.times.longest, pins)
 
     @property
     def latency_entries(self) -> dict[str, int]:

@@ -34,7 +34,6 @@ class FrontEnd:
     asked: Asked
     longest: int  # clocks after which an update is forced
     pins: tuple[Pin, ...] = ()  # inputs of extras
-    complements: bool = False  # whether lines come with their complements
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -45,7 +44,7 @@ class FrontEnd:
     @property
     def complemented(self) -> tuple[str, ...]:
         """Lines that come with their complements, which are inputs as well: `a_n` of `a`."""
-        return (*self.asked.encoder.kind.lines, *("z",) * (self.asked.index is not None)) if self.complements else ()
+        return tuple(pin.of for pin in self.pins if pin.of)
 
     @property
     def wheel(self) -> ToothWheel | None:

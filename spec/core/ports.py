@@ -4,7 +4,6 @@ from collections.abc import Iterable, Iterator
 
 from tachometry.spec.core.compare import COUNT_WIDTH
 from tachometry.spec.core.core import Core
-from tachometry.spec.core.health import FAULT_TEXTS, FAULT_WIDTH, FAULTS_WIDTH, OPEN, Fault
 from tachometry.spec.core.stream import READY, stream_ports
 from tachometry.spec.language.port import COMPARE, INDEX, MISSED, TICK, UPDATE, WIDE, Port, held, pin, strobe
 
@@ -61,7 +60,6 @@ def ports_of(spec: Core, own: Iterable[Port]) -> Iterator[Port]:
         yield strobe("tick_error", text)
     yield from _of_extras(spec, -1)
     yield from _compare_ports(spec)
-    yield from _health_ports(spec)
     yield from _of_extras(spec, 0)
     if spec.filter_clocks:
         text = "Edges that the glitch filter has kept out, two for each glitch; it stays at 65534. Between the ticks "
@@ -84,8 +82,7 @@ def _inputs(spec: Core) -> Iterator[Port]:
         yield pin(line, help)
     if "z" in front.lines:
         yield pin("z", "Index line, asynchronous; the index captures the position.")
-    for line in front.complemented:
-        yield pin(f"{line}_n", f"Complement of line {line.upper()}, asynchronous.")
+    yield from (pin.port for pin in front.pins if pin.of)
     if spec.external_tick:
         yield pin("tick_in", "External tick, asynchronous; its rising edge ends a sampling period.")
     if spec.preset is not None:
@@ -151,21 +148,6 @@ def _compare_ports(spec: Core) -> Iterable[Port]:
     fine = getattr(spec, "fine_bits", 0) * spec.compare.fine
     unit = f"2^-{fine} counts" if fine else "counts"
     yield held(COMPARE, "compare_position", spec.position_width + fine, signed=True, unit=unit, help=text)
-
-
-def _health_ports(spec: Core) -> Iterable[Port]:
-    if not spec.health:
-        return
-    absent = {fault for line, fault in OPEN.items() if line not in spec.front_end.complemented}
-    absent |= {Fault.INDEX_MISSED} if spec.front_end.index_state is None else set()
-    codes = "; ".join(f"{code}: {text}" for code, text in FAULT_TEXTS.items() if code not in absent)
-    now = "It changes between the ticks as well, and a capture takes what it is then."
-    yield held(TICK, "health", FAULT_WIDTH, help=f"The first fault of the encoder since it was cleared; {codes}. {now}")
-    yield held(TICK, "faults", FAULTS_WIDTH, help="Faults of the encoder since they were cleared; it stays at 255.")
-    yield held(TICK, "fault", help="There has been a fault of the encoder: health is not 0.")
-    if spec.front_end.index_watched:
-        text = "Counts by which the latest wrong turn from index to index went too far forward: lost, or extra."
-        yield held(TICK, "index_error", spec.position_width, signed=True, unit="counts", help=text)
 
 
 def bound_ports(spec: Core) -> Iterator[Port]:

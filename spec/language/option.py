@@ -195,7 +195,9 @@ def _declared(spec: Any) -> tuple[Option, ...]:
 def _of_field(spec: Any, item: Field[Any]) -> Iterator[Option]:
     for extra in item.metadata.get("extras", ()):
         main, *more = options_of(extra)
-        yield replace(main, field=main.parameter, default=None, within=("", main.field), extra=extra)
+        yield replace(
+            main, field=main.parameter, default=False if main.flag else None, within=("", main.field), extra=extra
+        )
         for one in more:
             yield replace(one, needs=main.name, field=one.parameter, within=("", one.field), extra=extra)
     options = item.metadata.get("options", ())
@@ -272,7 +274,9 @@ def read_options(
     extras: dict[type[Any], dict[str, Any]] = {}
     for about in options_of(spec):
         if about.extra and about.field in values:
-            extras.setdefault(about.extra, {})[about.within[1]] = values.pop(about.field)
+            value = values.pop(about.field)
+            if not (about.flag and not about.needs and value is False):  # which asks for none
+                extras.setdefault(about.extra, {})[about.within[1]] = value
     if extras:
         values["extras"] = tuple(extra(**given) for extra, given in extras.items())
     for part in (about for about in options_of(spec) if about.part and about.field in values):

@@ -31,7 +31,6 @@ _LEFT_OUT: tuple[tuple[str, Any, str], ...] = (
     ("stream", None, f"what sends records {_FOR_ONE}"),
     ("preset", None, f"what sets the position {_FOR_ONE}"),
     ("position_modulo", None, f"its counter {_FOR_ONE}"),
-    ("health", None, f"what watches the lines {_FOR_ONE}"),
     ("lowpass", None, f"the filter {_FOR_ONE}"),
 )
 _STROBES = {

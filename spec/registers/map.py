@@ -109,8 +109,6 @@ class RegisterMap:
         found["stall"] = "The shaft has come to rest: stalled rises."
         late = ", or an external tick was missing or came too early" if self.spec.external_tick else ""
         found["error"] = f"Both lines changed at once{late}."
-        if self.spec.health:
-            found["fault"] = "A fault of the encoder was seen, see health."
         for extra in self.spec.extras:
             found |= {name: event.help for name, event in extra.events(self.spec).items()}
         return found

@@ -27,8 +27,8 @@ from tachometry.spec import (
     Timing,
 )
 from tachometry.spec.core.compare import DIRECTIONS, Compare
+from tachometry.spec.core.extras.health import Health
 from tachometry.spec.core.extras.over_speed import OverSpeed
-from tachometry.spec.core.health import Health
 from tachometry.spec.core.index import Index
 from tachometry.spec.methods.timed import TimedTachometer
 
@@ -143,7 +143,7 @@ def watched(spec: TachometerSpec, rng: np.random.Generator) -> TachometerSpec:
     compare = Compare(int(rng.integers(-3, 4)), int(rng.integers(3, 6)), int(rng.choice([0, 3, 25])), "2clk")
     compare = replace(compare, direction=str(rng.choice(DIRECTIONS)))
     limit = Speed(Fraction(str(round(spec.velocity.greatest_speed * rng.uniform(0.02, 0.5), 3) or 0.001)))
-    return replace(spec, health=Health(edges, errors), extras=(OverSpeed(limit=limit),), compare=compare)
+    return replace(spec, extras=(Health(edges=edges, errors=errors), OverSpeed(limit=limit)), compare=compare)
 
 
 def filter_of(method: str, clocks: int, tick_cycles: int) -> int:

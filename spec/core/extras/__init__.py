@@ -1,14 +1,15 @@
 """Extras: features of a core beside its measurement, one file each; no other file of the product names them.
 
 `spec/core/extras/NAME.py` states its options and ports, `hdl/extras/NAME.py` builds it, `sim/golden/extras/NAME.py`
-predicts it, and `tests/extras/test_NAME.py` checks it. The order is that of options
-and events and, but for `place`, of ports and registers.
+predicts it, and `tests/extras/test_NAME.py` checks it. The order is that of options and events and, but for `place`, of
+ports and registers.
 """
 
 from tachometry.spec.core.extras.extra import Extra
+from tachometry.spec.core.extras.health import Health
 from tachometry.spec.core.extras.over_speed import OverSpeed
 from tachometry.spec.core.extras.probe import Probe
 
-EXTRAS: tuple[type[Extra], ...] = (OverSpeed, Probe)
+EXTRAS: tuple[type[Extra], ...] = (Health, OverSpeed, Probe)
 
 __all__ = ["EXTRAS", "Extra"]

@@ -10,7 +10,7 @@ from tachometry.hdl.core import emulator
 from tachometry.sim.golden import tables
 from tachometry.sim.golden.emulator import Change, GoldenEmulator
 from tachometry.spec import of_texts
-from tachometry.spec.core.health import Fault
+from tachometry.spec.core.extras.health import Fault
 from tachometry.spec.registers.emulator import LATENCY, EmulatorSettings
 
 CLOCKS, SEEDS = 3000, range(8)

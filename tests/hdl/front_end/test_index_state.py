@@ -14,7 +14,7 @@ from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.sim.signals.run import compare
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import TachometerSpec, of_texts, with_axes
-from tachometry.spec.core.health import Fault
+from tachometry.spec.core.extras.health import Fault
 from tachometry.spec.core.sensors import SENSORS
 
 BASE = {"ppr": "8", "clock": "1MHz", "tick": "40us", "max-time": "400us", "index": "yes"}

@@ -5,9 +5,8 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 from proofs.formal.prove import Proof
 
-from tachometry.hdl.extras import over_speed, probe
+from tachometry.hdl.extras import health, over_speed, probe
 from tachometry.hdl.front_end import (
-    encoder_watch,
     index_capture,
     modulo_counter,
     open_circuit,
@@ -40,7 +39,7 @@ class Outputs(wiring.Component):
             "probe": probe.Gates((1,), _WIDTH, 3),
             "trip": over_speed.Gates(LIMIT, _WIDTH),
             "open": open_circuit.OpenCircuit(OPEN),
-            "watch": encoder_watch.EncoderWatch(second=6, edges=2, errors=1),
+            "watch": health.Gates(second=6, edges=2, errors=1),
             "compare": compare_output.CompareOutput(Compare(1, APART, 2, "2clk"), PULSE, _WIDTH),
             "both": compare_output.CompareOutput(Compare(1, APART, 2, "2clk", "both"), PULSE, _WIDTH, aims=True),
         }

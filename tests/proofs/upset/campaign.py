@@ -16,9 +16,9 @@ from tachometry.sim.signals.run import Run
 from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
 from tachometry.spec.control import AnySpec
 from tachometry.spec.core.compare import Compare
+from tachometry.spec.core.extras.health import Health
 from tachometry.spec.core.extras.over_speed import OverSpeed
 from tachometry.spec.core.extras.probe import Probe
-from tachometry.spec.core.health import Health
 from tachometry.spec.core.index import Index
 
 TICK_CYCLES, MAX_TICKS = 100, 20
@@ -30,8 +30,7 @@ _OPTIONS: dict[str, dict[str, Any]] = {
         "index": Index(once=True),
         "preset": 0,
         "position_modulo": "7",
-        "health": Health(complements=4),
-        "extras": (OverSpeed(limit=Speed.parse("1rad/s")), Probe(probes="both")),
+        "extras": (Health(complements=4), OverSpeed(limit=Speed.parse("1rad/s")), Probe(probes="both")),
         "compare": Compare(2, 3, 0, "7clk", "both"),
     },
     "track": {"timing": Timing(5_000_000, 340, 20), "max_speed": Speed.parse("75rev/s"), "multiplier": "block"},

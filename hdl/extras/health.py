@@ -1,106 +1,94 @@
-"""The watch of the encoder, for what is wrong with it."""
+"""Gates of `spec.core.extras.health`."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Self
 
 from amaranth import Cat, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import In, Member, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, idle_of
 from tachometry.hdl.front_end.open_circuit import OpenCircuit
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
-from tachometry.spec.core.health import FAULT_WIDTH, FAULTS_WIDTH, OPEN, Fault
+from tachometry.spec import TachometerSpec
+from tachometry.spec.core.extras.health import FAULT_WIDTH, FAULTS_WIDTH, OPEN, Fault, Health
 
 
-class EncoderWatch(wiring.Component):
-    """Watches the lines of the encoder, and keeps the first fault.
+@dataclass(frozen=True)
+class Turn:
+    """A turn from index to index."""
 
-    Latency: a fault that is seen in clock c is at the outputs in clock c + 1; counts that are wrong between two indices
-    are seen in the clock after `index_valid`.
+    counts: int
+    position_width: int  # bits
+    resets: bool = False  # the index sets the position to 0
+    presets: bool = False  # an input sets the position
+
+
+class Gates(wiring.Component):
+    """A fault in clock c makes `seen` high in clock c, and is at the outputs in clock c + 1, until `clear`.
+
+    Counts that are wrong between two indices are seen in the clock after `index_valid`. Edges and errors are counted
+    for a second, then anew. A turn in which the position is preset is not checked.
 
     Parameters
     ----------
     second : int
-        Clocks within which edges and errors are counted; then they are counted anew.
+        Clocks.
     edges : int
-        So many edges of a line without one of the other, and none of both at once, are a fault of the other.
+        Edges of a line without one of the other that are a fault of the other.
     errors : int
-        So many illegal transitions are none yet; one more is.
-    counts_per_rev, position_width : int
-        Counts from index to index, and bits of a position; 0: there is no index.
-    index_reset : bool
-        The index sets the position to 0.
-    presets : bool
-        Something else sets the position.
+        The greatest number of illegal transitions that is no fault.
+    turn : Turn or None
+        None: there is no index, or no number of counts between two.
     complements : mapping of str to int
         Lines that come with their complements, and for how many clocks a line may equal it.
     misses : bool
         The index is taken in a state, which it may miss.
-
-    Members
-    -------
-    level_a, level_b : In(1)
-    ready : In(1)
-        The levels before these are real.
-    step : In(signed(2))
-    decode_error : In(1)
-    index_valid : In(1)
-    index_position : In(signed(position_width))
-        Only with an index.
-    index_missed : In(1)
-        Only if it may.
-    preset : In(1)
-        The position is being set; a turn in which it is, is not checked. Only if there are presets.
-    equal_a, equal_b, equal_z : In(1)
-        The line equals its complement; of `complements`.
-    clear : In(1)
-        All that is kept is 0 in the next clock.
-    seen : Out(1)
-        There is a fault in this clock.
-    health : Out(FAULT_WIDTH)
-        The first fault since `clear`, as `spec.core.health.Fault` numbers them.
-    faults : Out(FAULTS_WIDTH)
-        Clocks with a fault since then; stays at its end.
-    index_error : Out(signed(position_width))
-        Counts by which the latest turn that was wrong went too far forward, which wrap; only with an index.
     """
 
     def __init__(
         self,
-        *,
         second: int,
         edges: int,
         errors: int,
-        counts_per_rev: int = 0,
-        position_width: int = 0,
-        index_reset: bool = False,
-        presets: bool = False,
+        turn: Turn | None = None,
         complements: Mapping[str, int] = MappingProxyType({}),
         misses: bool = False,
     ) -> None:
-        self._edges = edges
-        self._errors = errors
-        self._turn = counts_per_rev
-        self._index_reset = index_reset
-        self._presets = presets
+        self._edges, self._errors, self._turn, self._misses = edges, errors, turn, misses
         self.window = SamplingClock(second)
         self.open = {line: OpenCircuit(clocks) for line, clocks in complements.items()}
-        position = signed(max(position_width, 1))
-        index = {"index_valid": In(1), "index_position": In(position), "index_error": Out(position)}
+        index: dict[str, Member] = {}
+        if turn is not None:
+            position = signed(turn.position_width)
+            index = {"index_valid": In(1), "index_position": In(position), "index_error": Out(position)}
+            index |= {"preset_rises": In(1)} if turn.presets else {}
         super().__init__(
             {
                 **dict.fromkeys(("level_a", "level_b", "ready", "decode_error", "clear"), In(1)),
                 **{f"equal_{line}": In(1) for line in complements},
                 "step": In(signed(2)),
-                **(index if position_width else {}),
-                "seen": Out(1),
-                **({"preset": In(1)} if presets else {}),
+                **index,
                 **({"index_missed": In(1)} if misses else {}),
+                "seen": Out(1),
                 "health": Out(FAULT_WIDTH),
                 "faults": Out(FAULTS_WIDTH),
+                "fault": Out(1),
             }
         )
+
+    @classmethod
+    def of(cls, extra: Health, spec: TachometerSpec) -> Self:
+        """Return the gates of this core."""
+        front, turn = spec.front_end, None
+        if front.index_watched:
+            presets = spec.preset is not None
+            turn = Turn(spec.encoder.counts_per_rev, spec.position_width, front.index_resets, presets)
+        complements = {pin.of: pin.holds for pin in extra.pins(spec)}
+        misses = front.index_state is not None
+        return cls(spec.timing.clock_hz, extra.edges, extra.errors, turn, complements, misses)
 
     @property
     def idle(self) -> tuple[Idle, ...]:
@@ -112,18 +100,18 @@ class EncoderWatch(wiring.Component):
         m.submodules.window = self.window
         a_stands, b_stands = self._standing(m)
         seen = {Fault.A_STANDS: a_stands, Fault.B_STANDS: b_stands, Fault.ILLEGAL: self._illegal(m)}
-        if self._turn:
-            seen[Fault.INDEX_COUNTS] = self._index(m)
+        if self._turn is not None:
+            seen[Fault.INDEX_COUNTS] = self._index(m, self._turn)
         for line, box in self.open.items():
             m.submodules[f"open_{line}"] = box
             m.d.comb += [box.equal.eq(getattr(self, f"equal_{line}")), box.clear.eq(self.clear)]
             seen[OPEN[line]] = box.open
-        if hasattr(self, "index_missed"):
+        if self._misses:
             seen[Fault.INDEX_MISSED] = self.index_missed
         code: Value = Value.cast(0)
         for fault in sorted(seen, reverse=True):
             code = Mux(seen[fault], fault, code)
-        m.d.comb += self.seen.eq(Cat(seen.values()).any())
+        m.d.comb += [self.seen.eq(Cat(seen.values()).any()), self.fault.eq(self.health.any())]
         with m.If(self.seen):
             with m.If(self.health == 0):
                 m.d.sync += self.health.eq(code)
@@ -134,7 +122,7 @@ class EncoderWatch(wiring.Component):
         return m
 
     def _standing(self, m: Module) -> tuple[Value, Value]:
-        """Detect that a line has had so many edges without one of the other: A stands, B stands."""
+        """Return whether A stands, and whether B stands: the other line has had the edges of a fault alone."""
         past_a = Signal()
         past_b = Signal()
         of_b = Signal()
@@ -154,7 +142,7 @@ class EncoderWatch(wiring.Component):
         return last & change_b, last & change_a
 
     def _illegal(self, m: Module) -> Value:
-        """Detect that there is one illegal transition too many."""
+        """Return whether there is one illegal transition too many."""
         errors = Signal(range(self._errors + 2))
         with m.If(self.decode_error & (errors <= self._errors)):
             m.d.sync += errors.eq(errors + 1)
@@ -162,32 +150,32 @@ class EncoderWatch(wiring.Component):
             m.d.sync += errors.eq(0)
         return self.decode_error & (errors == self._errors)
 
-    def _index(self, m: Module) -> Value:
-        """Detect that from an index to the next in the same direction there was neither a turn nor the way back."""
+    def _index(self, m: Module, turn: Turn) -> Value:
+        """Return whether from one index to the next in the same direction there was neither a turn nor the way back."""
         position = self.index_position
         backward, was_backward, known, checks, same = (Signal(name=f"index_{k}") for k in ("back", "was", *"kcs"))
         origin = Signal.like(position)
         way = Signal.like(position)
         m.d.sync += checks.eq(self.index_valid)
         since = known
-        if self._presets:
+        if turn.presets:
             moved = Signal()  # in the clock of what is taken at the same time as `index_valid`
-            m.d.sync += moved.eq(self.preset)
+            m.d.sync += moved.eq(self.preset_rises)
             since = known & ~moved
             m.d.sync += known.eq(since)
         with m.If(self.step[0]):
             m.d.sync += backward.eq(self.step[1])
         with m.If(self.index_valid):
             m.d.sync += [
-                way.eq(position - (0 if self._index_reset else origin)),
+                way.eq(position - (0 if turn.resets else origin)),
                 same.eq(since & (backward == was_backward)),
                 was_backward.eq(backward),
                 known.eq(1),
             ]
-            if not self._index_reset:
+            if not turn.resets:
                 m.d.sync += origin.eq(position)
         off = Signal.like(position)
-        m.d.comb += off.eq(way + Mux(was_backward, self._turn, -self._turn))
+        m.d.comb += off.eq(way + Mux(was_backward, turn.counts, -turn.counts))
         wrong = checks & same & way.any() & off.any()
         with m.If(wrong):
             m.d.sync += self.index_error.eq(off)

@@ -1,14 +1,19 @@
-"""The golden watch finds what is wrong with the encoder."""
+"""Golden model of `spec.core.extras.health`."""
+
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim.golden.extras import View
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.sorted_lookup import places
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.health import FAULTS_WIDTH, OPEN, Fault, Health
+from tachometry.spec.core.extras.health import FAULTS_WIDTH, OPEN, Fault, Health
+from tachometry.spec.language.port import INDEX
 
 Ints = NDArray[np.int64]
 _NONE = np.empty(0, dtype=np.int64)
@@ -64,16 +69,13 @@ def _open(spec: TachometerSpec, health: Health, trace: PinTrace, clears: Ints) -
     return np.concatenate(found), np.concatenate(codes)
 
 
-def faults(spec: TachometerSpec, trace: PinTrace, steps: Steps, index: Table, clears: Ints = _NONE) -> Table:
-    """Return the clocks from which faults are shown, each with its code, and with the error of a wrong turn; `clears`
-    are clocks in which a program clears them.
-    """
-    if (health := spec.health) is None:
-        return Table(_NONE, {})
-    standing, codes = _standing(spec, health, steps)
-    illegal = _illegal(spec, health, steps.errors)
-    wrong, off = _index(spec, steps, index) if spec.front_end.index_watched else (_NONE, _NONE)
-    opened, lines = _open(spec, health, trace, clears)
+def tables(extra: Health, view: View) -> dict[str, Table]:
+    """Return the clocks in which faults are seen, each with its code, and with the error of a wrong turn."""
+    spec, steps = view.spec, view.steps
+    standing, codes = _standing(spec, extra, steps)
+    illegal = _illegal(spec, extra, steps.errors)
+    wrong, off = _index(spec, steps, view.tables[INDEX]) if spec.front_end.index_watched else (_NONE, _NONE)
+    opened, lines = _open(spec, extra, view.trace, view.clears)
     missed = steps.missed + spec.latency.tick
     others = {Fault.ILLEGAL: illegal, Fault.INDEX_MISSED: missed, Fault.INDEX_COUNTS: wrong}
     clock = np.concatenate([standing, opened, *others.values()])
@@ -83,27 +85,21 @@ def faults(spec: TachometerSpec, trace: PinTrace, steps: Steps, index: Table, cl
     least, errors = np.full(len(clock), 1 << 62), np.zeros(len(clock), dtype=np.int64)
     np.minimum.at(least, which, code)
     np.add.at(errors, which, error)
-    return Table(clock + 1, {"code": least, "error": errors})
+    return {"fault": Table(clock, {"code": least, "error": errors})}
 
 
-def shown(found: Table, first: Ints, end: Ints) -> dict[str, NDArray[np.int64]]:
-    """Return what is shown of the faults of rows from `first` on, below `end`, for each pair of these."""
-    some = end > first
-    turns = np.flatnonzero(found["error"])
+def shown(
+    extra: Health, spec: TachometerSpec, found: Mapping[str, Table], clock: Ints, cleared: int
+) -> dict[str, NDArray[Any]]:
+    """Return the first fault after `cleared` and before each clock, how many there are, and the latest wrong turn."""
+    faults = found["fault"]
+    end = places(faults.clock, clock, "left")
+    first = np.minimum(np.searchsorted(faults.clock, cleared, side="right"), end)
+    turns = np.flatnonzero(faults["error"])
     latest = np.append(-1, turns)[np.searchsorted(turns, end)]
-    code, error = np.append(found["code"], 0), np.append(found["error"], 0)
-    health = np.where(some, code[np.where(some, first, -1)], 0)
-    return {
-        "health": health,
-        "faults": np.minimum(end - first, (1 << FAULTS_WIDTH) - 1),
-        "fault": health != 0,
-        "index_error": np.where(latest >= first, error[latest], 0),
-    }
-
-
-def with_health(spec: TachometerSpec, ticks: Table, found: Table) -> Table:
-    """Return ticks with what is shown of faults."""
-    if not spec.health:
-        return ticks
-    end = places(found.clock, ticks.clock, "right")
-    return ticks.having(**shown(found, np.zeros_like(end), end))
+    code, error = np.append(faults["code"], 0), np.append(faults["error"], 0)
+    health = np.where(end > first, code[np.where(end > first, first, -1)], 0)
+    columns = {"health": health, "faults": np.minimum(end - first, (1 << FAULTS_WIDTH) - 1), "fault": health != 0}
+    return columns | (
+        {"index_error": np.where(latest >= first, error[latest], 0)} if spec.front_end.index_watched else {}
+    )

@@ -1,0 +1,139 @@
+"""Health: a watch of the encoder finds what is wrong with it."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from fractions import Fraction
+from typing import Any
+
+from tachometry.spec.core.extras.extra import Event, Extra
+from tachometry.spec.core.front_end import Pin
+from tachometry.spec.core.numbers import Numbers
+from tachometry.spec.core.timing import parse_filter
+from tachometry.spec.language.option import ParameterError, check_options, option, parse_flag
+from tachometry.spec.language.port import TICK, Port, held, pin
+from tachometry.spec.language.units import format_time, plural
+
+
+class Fault(IntEnum):
+    """Names a fault; 0 is none. Of faults in one clock the lowest is shown."""
+
+    A_STANDS = 1
+    B_STANDS = 2
+    INDEX_COUNTS = 3
+    ILLEGAL = 4
+    A_OPEN = 5
+    B_OPEN = 6
+    Z_OPEN = 7
+    INDEX_MISSED = 8
+
+
+FAULT_WIDTH = 4  # bits of a code
+FAULTS_WIDTH = 8  # bits of the number of faults, which stays at its end
+FAULT_TEXTS = {
+    Fault.A_STANDS: "line a stands while b has edges: broken or shorted",
+    Fault.B_STANDS: "line b stands while a has edges: broken or shorted",
+    Fault.INDEX_COUNTS: "counts are lost or extra between two indices",
+    Fault.ILLEGAL: "too many illegal transitions in a second",
+    Fault.A_OPEN: "line a equals its complement a_n: an open circuit",
+    Fault.B_OPEN: "line b equals its complement b_n: an open circuit",
+    Fault.Z_OPEN: "line z equals its complement z_n: an open circuit",
+    Fault.INDEX_MISSED: "z comes and goes without the state of --index-at",
+}
+COMPLEMENTS = (2, 1 << 20)  # the least and the most clocks
+OPEN = {"a": Fault.A_OPEN, "b": Fault.B_OPEN, "z": Fault.Z_OPEN}  # of lines that have a complement
+
+
+@dataclass(frozen=True, kw_only=True)
+class Health(Extra):
+    """Outputs `health`, the first fault, `faults`, how many, and `fault`; a reset or CONTROL.clear clears them."""
+
+    name = "health"
+    missing = {"axes": "must be left out with --axes: what watches the lines is for one axis"}  # noqa: RUF012
+    texts = {"health": FAULT_TEXTS}  # noqa: RUF012
+
+    on: bool = option(
+        True,
+        "Watch the encoder: outputs health (the first fault), faults (how many) and fault (there is one), and with "
+        "--index index_error. A reset clears them, and CONTROL.clear.",
+        name="health",
+        flag=True,
+        parse=parse_flag,
+        tacit=True,
+    )
+    edges: int = option(
+        256,
+        "N edges of a line in a second, 2 to 65536, and none of the other, are a fault of the other. A shaft that "
+        "swings about one edge has such edges as well (with --health).",
+        name="health-edges",
+        metavar="N",
+        limits=(2, 1 << 16),
+        tests=("5",),
+        tacit=True,
+    )
+    errors: int = option(
+        10,
+        "More than N illegal transitions in a second, 0 to 65535, are a fault (with --health).",
+        name="health-errors",
+        metavar="N",
+        limits=(0, (1 << 16) - 1),
+        tests=("0",),
+        tacit=True,
+    )
+    complements: int | None = option(
+        None,
+        "Inputs a_n and b_n, and z_n with --index, of a differential encoder (with --health): a line that equals its "
+        "complement for longer than TIME is an open circuit, a fault. In s, ms, us or ns, rounded up to clocks; a "
+        "plain number is clocks. 1us is more than receivers and cables skew.",
+        name="complements",
+        metavar="TIME",
+        parse_at=parse_filter,
+        tests=("2", "40"),
+        tacit=True,
+    )
+
+    def __post_init__(self) -> None:
+        check_options(self)
+
+    def check(self, spec: Numbers) -> None:
+        if not self.on:
+            raise ParameterError("health", "must not be no among extras: leave it out")
+        if spec.encoder.sensor != "quadrature":
+            rest = f"must be left out for {spec.encoder.sensor}: it watches two lines in quadrature"
+            raise ParameterError("health", rest)
+        if self.complements is not None and not COMPLEMENTS[0] <= self.complements <= COMPLEMENTS[1]:
+            times = (format_time(Fraction(one) / spec.timing.clock_hz) for one in (*COMPLEMENTS, self.complements))
+            raise ParameterError("complements", "must be from {} to {} at this clock, not {}".format(*times))
+
+    def pins(self, spec: Numbers) -> Iterable[Pin]:
+        if self.complements is None:
+            return
+        for line in (*spec.encoder.kind.lines, *("z",) * (spec.index is not None)):
+            port = pin(f"{line}_n", f"Complement of line {line.upper()}, asynchronous.")
+            yield Pin(port, of=line, holds=self.complements)
+
+    def faults(self, spec: Numbers) -> tuple[Fault, ...]:
+        """Return the faults that can be seen."""
+        lines = spec.front_end.complemented
+        absent = {fault for line, fault in OPEN.items() if line not in lines}
+        absent |= {Fault.INDEX_MISSED} if spec.front_end.index_state is None else set()
+        return tuple(fault for fault in Fault if fault not in absent)
+
+    def ports(self, spec: Numbers) -> Iterable[Port]:
+        codes = "; ".join(f"{code}: {FAULT_TEXTS[code]}" for code in self.faults(spec))
+        now = "It changes between the ticks as well, and a capture takes what it is then."
+        help = f"The first fault of the encoder since it was cleared; {codes}. {now}"
+        yield held(TICK, "health", FAULT_WIDTH, help=help)
+        yield held(TICK, "faults", FAULTS_WIDTH, help="Faults of the encoder since they were cleared; it stays at 255.")
+        yield held(TICK, "fault", help="There has been a fault of the encoder: health is not 0.")
+        if spec.front_end.index_watched:
+            text = "Counts by which the latest wrong turn from index to index went too far forward: lost, or extra."
+            yield held(TICK, "index_error", spec.position_width, signed=True, unit="counts", help=text)
+
+    def events(self, spec: Numbers) -> Mapping[str, Event]:
+        return {"fault": Event("A fault of the encoder was seen, see health.", wires=("seen",))}
+
+    def row(self, spec: Numbers, run: Any) -> tuple[str, str]:
+        code, number = run.ticks.health[-1], int(run.ticks.faults[-1])
+        faults = plural(number, "fault") + " or more" * (number == (1 << FAULTS_WIDTH) - 1)
+        return "health", f"{faults}, first: {FAULT_TEXTS[code]}" if code else "no fault"
