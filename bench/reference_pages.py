@@ -17,7 +17,7 @@ from tachometry.sim.studies.sweeping.sweep import COLUMNS
 from tachometry.spec import METHODS, Port, TachometerSpec, of_texts
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.ports import loop_ports
-from tachometry.spec.core.stream import parts_of
+from tachometry.spec.core.extras.stream import Stream
 from tachometry.spec.language.field import Register
 from tachometry.spec.registers.buses import BUSES
 from tachometry.spec.registers.loop import LoopMap
@@ -65,9 +65,10 @@ def ports() -> str:
         only = "" if len(has[name]) == len(METHODS) else f" Methods: {', '.join(has[name])}."
         *cells, meaning = _described(port)
         rows.append([*cells, meaning + only + ("" if name in always else " Only with its option.")])
-    alone = {port.name for port in _STREAM.ports} - {port.name for port in replace(_STREAM, stream=None).ports}
-    kinds = ("unsigned", "signed")
-    record = [[f"`{one.name}`", str(one.offset), str(one.size), kinds[one.signed]] for one in parts_of(_STREAM)]
+    alone = {port.name for port in _STREAM.ports} - {port.name for port in replace(_STREAM, extras=()).ports}
+    kinds, stream = ("unsigned", "signed"), Stream.of(_STREAM.extras)
+    assert stream is not None
+    record = [[f"`{one.name}`", str(one.offset), str(one.size), kinds[one.signed]] for one in stream.parts(_STREAM)]
     return filled(
         "ports.md",
         ports=_table(rows),

@@ -145,9 +145,6 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         one = 1 << getattr(spec, "fine_bits", 0) * spec.compare.fine
         last = f", the last at position {pulses.compare_position[-1] / one:.15g}" if len(pulses) else _none(axis)
         rows.append(("compare", f"{plural(len(pulses), 'pulse')}{last}"))
-    if spec.stream is not None:
-        shown = "numpy.fromfile reads those of a DMA, with stream.dtype of the manifest"
-        rows.append(("stream", f"records are not shown here: {shown}"))
     rows += filter(None, (extra.row(spec, run) for extra in spec.extras))
     if spec.external_tick:
         rows.append(("tick errors", f"{len(run.tick_errors)} (external tick too early or missing)"))

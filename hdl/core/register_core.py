@@ -61,8 +61,8 @@ class RegisterCore(wiring.Component):
             bank.capture.eq(self.capture),
             *(
                 box.clear.eq(bank.clear)
-                for box in (core.conditioner, *core.extras.values(), core.stream)
-                if box is not None and "clear" in box.signature.members
+                for box in (core.conditioner, *core.extras.values())
+                if "clear" in box.signature.members
             ),
             position.tick.eq(core.tick),
             position.position.eq(core.position),

@@ -24,7 +24,6 @@ from tachometry.hdl.methods.datapath import LongTicks, OwnStandstill, OwnTicks, 
 from tachometry.hdl.output.compare_output import CompareOutput
 from tachometry.hdl.output.fine_compare_output import FineCompareOutput
 from tachometry.hdl.output.low_pass import LowPass
-from tachometry.hdl.output.record_stream import RecordStream
 from tachometry.hdl.output.update import update_layout
 from tachometry.hdl.output.update_age import UpdateAge
 from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput, SerialVelocityOutput
@@ -32,7 +31,6 @@ from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import follow, members
 from tachometry.spec import TachometerSpec, TrackTachometer
 from tachometry.spec.core.compare import LIST_PINS
-from tachometry.spec.core.stream import READY, flags_of, parts_of, size_of
 from tachometry.spec.language.port import MISSED, TICK, UPDATE, WIDE
 
 
@@ -105,9 +103,6 @@ class Tachometer(wiring.Component):
             else:
                 aims = spec.compare.both and spec.front_end.moves_position
                 self.compare_output = CompareOutput(spec.compare, clocks, spec.position_width, aims=aims)
-        self.stream: RecordStream | None = None
-        if spec.stream is not None:
-            self.stream = RecordStream(parts_of(spec), len(flags_of(spec.ports)) - 1, size_of(spec), spec.stream.packet)
         self.extras = {extra.name: gates_of(extra, spec) for extra in spec.extras}
 
     @property
@@ -118,7 +113,7 @@ class Tachometer(wiring.Component):
     @property
     def idle(self) -> tuple[Idle, ...]:
         """Registers that a simulation may move on."""
-        names = ("conditioner", "compare_output", "stream", "datapath")
+        names = ("conditioner", "compare_output", "datapath")
         boxes: dict[str, object] = {name: getattr(self, name) for name in names}
         boxes |= {f"{name}_box": box for name, box in self.extras.items()}
         if not self._spec.facts.own_ticks:
@@ -144,7 +139,6 @@ class Tachometer(wiring.Component):
         self._place(m)
         self._index(m)
         self._compare(m)
-        self._stream(m)
         place(m, self, self.extras, self._taps(m))
         if isinstance(self.sampling_clock, ExternalTick):
             m.d.comb += [
@@ -339,17 +333,3 @@ class Tachometer(wiring.Component):
         if "compare_waiting" in box.signature.members:
             follow(m, box, self, LIST_PINS)
             follow(m, self, box, ("compare_waiting",))
-
-    def _stream(self, m: Module) -> None:
-        """Send records, if they are asked for."""
-        if self.stream is None or self._spec.stream is None:
-            return
-        m.submodules.stream = box = self.stream
-        when = self._spec.stream.when
-        event: Value = self.tick if when == "tick" else self.velocity_valid
-        if when == "edge":
-            (event,) = delay(m, self.decoder.step[0], clocks=self._spec.latency.tick)
-        flags = flags_of(self._spec.ports)[1:]
-        m.d.comb += [box.event.eq(event), box.flags.eq(Cat(getattr(self, name) for name in flags))]
-        follow(m, box, self, (READY, *(part.name for part in parts_of(self._spec)[2:])))
-        follow(m, self, box, ("overruns", *(port.name for port in self._spec.ports.streamed)))

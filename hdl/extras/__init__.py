@@ -12,7 +12,7 @@ from amaranth import Module, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 
-from tachometry.hdl.wires.ports import follow
+from tachometry.hdl.wires.ports import drive, follow
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.extra import Extra
 
@@ -30,6 +30,6 @@ def place(m: Module, core: wiring.Component, extras: Mapping[str, wiring.Compone
         m.submodules[f"{name}_box"] = box  # the core has ports by the name
         for port, member in box.signature.members.items():
             if member.flow == In and port in taps:
-                m.d.comb += getattr(box, port).eq(taps[port])
+                drive(m, box, {port: taps[port]})
             elif port in shared:
                 follow(m, *((box, core) if member.flow == In else (core, box)), [port])

@@ -11,7 +11,6 @@ from tachometry.sim.signals.axes import AxesTrace, Trace
 from tachometry.sim.signals.recording import PinTrace, merged, quadrature
 from tachometry.spec import CoreSpec, TachometerSpec
 from tachometry.spec.core.sensors import packed_levels
-from tachometry.spec.core.stream import READY
 
 _SPEEDS = (0.3, 1.01, 1.5, 2.2, 3.25, 0.1)  # counts per tick
 
@@ -79,7 +78,6 @@ def _probed(spec: TachometerSpec, trace: PinTrace, seed: int) -> PinTrace:
     """Return the trace with edges of the inputs of extras in clocks of counts, beside them and anywhere."""
     bits = {pin.port.name: pin.port.width for pin in spec.front_end.pins if not pin.of}
     often = dict.fromkeys(bits, 0.4) | {pin.port.name: 0.2 for pin in spec.front_end.pins if pin.act}
-    bits |= {READY: 1} if spec.stream is not None else {}
     if not bits:
         return trace
     rng = np.random.default_rng([seed, 2])

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from tachometry.sim.golden import compare, extras, stream
+from tachometry.sim.golden import compare, extras
 from tachometry.sim.golden.axes import run_axes
 from tachometry.sim.golden.front_end import Steps, count, decoded
 from tachometry.sim.golden.low_pass import filtered
@@ -68,5 +68,4 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
         **added,
         **pulses,
     }
-    found = stream.with_overruns(spec, trace, steps, found)
     return {name: table.rows(slice(np.searchsorted(table.clock, trace.n_clocks))) for name, table in found.items()}

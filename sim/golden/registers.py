@@ -9,7 +9,6 @@ from tachometry.sim import golden
 from tachometry.sim.golden import compare, extras
 from tachometry.sim.golden.front_end import decoded, homed
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.spec.core.stream import OVERRUNS_WIDTH
 from tachometry.spec.language.field import WORD, Field, Register
 from tachometry.spec.language.port import INDEX, MISSED, TICK, UPDATE, WIDE
 from tachometry.spec.registers.map import COUNTER_WIDTH, RegisterMap
@@ -229,12 +228,7 @@ class GoldenBank:
             **self._shown(extras.shown(self._map.spec, self._tables, np.array([clock]), self._cleared)),
             "homed": int(homed(self._map.spec, self._steps, np.array([clock]))[0]),
             **self._shown(compare.shown(self._map.spec, self._tables, np.array([clock]))),
-            **({"overruns": self._overruns(clock)} if self._map.spec.stream else {}),
         }
-
-    def _overruns(self, clock: int) -> int:
-        dropped = self._count(self._tables["overruns"].clock, self._cleared + 1, clock)
-        return min(dropped, (1 << OVERRUNS_WIDTH) - 1)
 
     def _act(self, accesses: Sequence[Access]) -> None:
         """Find what extras show, and where pulses are, when a program writes what are inputs without a bus."""

@@ -18,7 +18,6 @@ from tachometry.spec import TachometerSpec
 from tachometry.spec.core.compare import LIST_PINS
 from tachometry.spec.core.front_end import OF_CONTROLS
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
-from tachometry.spec.core.stream import READY
 from tachometry.spec.language.units import format_time
 
 LINES = ("a", "b", "c", "z", "tick_in")
@@ -277,8 +276,6 @@ class PinTrace(_Lines):
         low |= {f"{line}_n": self.lines[line] ^ np.uint8(1) for line in spec.front_end.complemented}
         if spec.compare is not None and spec.compare.depth:
             low |= dict.fromkeys(LIST_PINS, np.zeros_like(self.a))
-        if spec.stream is not None:
-            low[READY] = np.ones_like(self.a)
         return PinTrace.of_lines(self.clock, self.n_clocks, low | self.lines) if low else self
 
 

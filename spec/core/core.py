@@ -9,7 +9,6 @@ from tachometry.spec.core.extras import EXTRAS, Extra
 from tachometry.spec.core.front_end import FrontEnd
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 from tachometry.spec.core.numbers import Numbers
-from tachometry.spec.core.stream import STREAM_HELP, Stream
 from tachometry.spec.core.words import Words, speed_notes
 from tachometry.spec.language.option import option
 
@@ -29,14 +28,6 @@ class Core(Numbers):
         parse=Compare.parse,
         tests=("", "2:3:0:2clk", "1.5:2.5:0:2clk:fine", "-2:3:40:1clk:backward", "3:4:9:1clk:both", "list:3:2clk"),
         few=3,
-        tacit=True,
-    )
-    stream: Stream | None = option(  # noqa: RUF009
-        None,
-        STREAM_HELP,
-        metavar="axi[:WHEN[:N]]",
-        parse=Stream.parse,
-        tests=("", "axi:update:3", "axi:edge:2", "axi:tick:1"),
         tacit=True,
     )
     # why this method was taken, where none was named; empty: it was named

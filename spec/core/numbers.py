@@ -11,7 +11,7 @@ from tachometry.spec.core.recovery import Recovery
 from tachometry.spec.core.tick import Scale, Tick
 from tachometry.spec.core.times import Times, Widths
 from tachometry.spec.core.velocity import Bound, Velocity
-from tachometry.spec.language.port import Port
+from tachometry.spec.language.port import Port, Ports
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,6 +76,11 @@ class Numbers(Asked):
             ticks = -(-clocks // self.times.shortest_tick) - (self.facts.update_by != "count")
             stamp = ticks.bit_length()
         return Widths(self.tick.max_count, self.timing.max_ticks.bit_length(), stamp)
+
+    @cached_property
+    def ports(self) -> Ports:
+        """Ports of the exported core, in order; features beside the measurement have some of them."""
+        raise NotImplementedError
 
     @cached_property
     def recovery(self) -> Recovery:

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Iterator
 
 from tachometry.spec.core.compare import COUNT_WIDTH
 from tachometry.spec.core.core import Core
-from tachometry.spec.core.stream import READY, stream_ports
 from tachometry.spec.language.port import COMPARE, INDEX, MISSED, TICK, UPDATE, WIDE, Port, held, pin, strobe
 
 # The ends of what encloses the true speed, and which way each is rounded: outward.
@@ -65,8 +64,7 @@ def ports_of(spec: Core, own: Iterable[Port]) -> Iterator[Port]:
         text = "Edges that the glitch filter has kept out, two for each glitch; it stays at 65534. Between the ticks "
         text += "it counts on, and a capture takes what it is then."
         yield held(TICK, "swallowed_edges", 16, unit="edges", help=text)
-    if spec.stream:
-        yield from stream_ports(spec)
+    yield from _of_extras(spec, 1)
 
 
 def _of_extras(spec: Core, place: int) -> Iterator[Port]:
@@ -90,10 +88,10 @@ def _inputs(spec: Core) -> Iterator[Port]:
         yield pin("preset", text)
     if front.index_once:
         yield pin("home", "Homing, asynchronous; its rising edge lets the next index be taken.")
-    yield from (pin.port for pin in front.pins if not pin.of)
+    pins = [(pin.port, extra.place) for extra in spec.extras for pin in extra.pins(spec) if not pin.of]
+    yield from (port for port, place in pins if place < 0)
     yield from _list_pins(spec)
-    if spec.stream:
-        yield pin(READY, "The record is taken in this clock; synchronous to clk.")
+    yield from (port for port, place in pins if place >= 0)
 
 
 def _index_ports(spec: Core) -> Iterator[Port]:

@@ -8,7 +8,6 @@ from tachometry.spec.core.checks import check
 from tachometry.spec.core.core import Core
 from tachometry.spec.core.described import options_as_asked, parameters_of
 from tachometry.spec.core.ports import bound_ports, ports_of
-from tachometry.spec.core.stream import stream_entry
 from tachometry.spec.core.tick import Scale
 from tachometry.spec.core.timing import Timing
 from tachometry.spec.core.velocity import Velocity
@@ -69,7 +68,7 @@ class TachometerSpec(Core):
                 "full_scale_rad_per_s": velocity.full_scale * velocity.rad_per_s_per_lsb,
             },
             **self.method_entries,
-            "stream": stream_entry(self.stream, self, self.ports) if self.stream else None,
+            **{extra.name: extra.entry(self) for extra in self.extras},
             "max_time_cycles": times.longest,
             "min_time_cycles": times.shortest,
             "bounds": {"none": self.velocity.shown_absent} if self.bounds else None,

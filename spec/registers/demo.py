@@ -52,8 +52,6 @@ class DemoMap(RegisterMap):
         if not self.spec.encoder.plain:
             raise ParameterError("sensor", "must be quadrature with a demo, its lines as they come: it emulates these")
         refuse(self.spec.extras, "demo")
-        if self.spec.stream:
-            raise ParameterError("stream", "must be left out of a demo, whose pins lead to no DMA")
 
     @cached_property
     def ports(self) -> tuple[Port, ...]:

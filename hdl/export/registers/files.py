@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from tachometry.hdl.export.registers import rdl
 from tachometry.hdl.export.registers.values import captured_values, in_unit, is_whole, sentences, written_values
 from tachometry.hdl.export.render import render, render_files
-from tachometry.spec.core.stream import flags_of, parts_of, size_of
 from tachometry.spec.language.field import Field, Register
 from tachometry.spec.registers.map import RegisterMap
 
@@ -38,9 +37,6 @@ def register_files(registers: RegisterMap, name: str) -> dict[str, str]:
         in_unit=in_unit,
         word=lambda value: f"UINT32_C(0x{value:08X})",
         pi=math.pi,
-        parts=parts_of(registers.spec),
-        size=size_of(registers.spec),
-        flags=flags_of(registers.spec.ports),
         identifier=rdl.identifier,
         described=rdl.described,
         access=rdl.ACCESS,

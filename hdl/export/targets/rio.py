@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 from tachometry.hdl.export.render import render_files
 from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
+from tachometry.spec.core.extras.extra import refuse
 from tachometry.spec.core.front_end import OF_CONTROLS
 from tachometry.spec.core.ports import bound_ports
 from tachometry.spec.language.option import ParameterError
@@ -70,8 +71,7 @@ def check(spec: CoreSpec) -> None:
         raise ParameterError("parallel", "must be given together with --axes for RIO: HAL has pins for each axis")
     for name in alone.front_end.controls:
         raise ParameterError(OF_CONTROLS[name], "must not be given for RIO, which has no pin for it")
-    if alone.stream:
-        raise ParameterError("stream", "must not be given for RIO, which has no DMA for it")
+    refuse(alone.extras, "rio")
     if alone.front_end.index_resets:
         raise ParameterError("index_reset", "must not be given for RIO: its pin index-enable resets the position")
     for port in _values(spec):

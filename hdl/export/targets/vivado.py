@@ -60,7 +60,7 @@ def vivado(spec: AnySpec, name: str, bus: Bus | None, made: Mapping[str, str]) -
     ports = ports_on(spec, bus)
     there = _INTERFACES[bus.name] if bus else None
     outer = {port.name: port.name for port in ports}
-    kinds = {STREAM: "axis"} if spec.tachometer.stream else {}
+    kinds = {STREAM: "axis"} if spec.tachometer.ports.streamed else {}
     if there is not None:
         outer |= {"clk": there.clock, "rst": there.reset}
         kinds = {there.name: there.kind} | kinds

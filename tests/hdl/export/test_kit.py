@@ -19,7 +19,7 @@ from tachometry.hdl.export import export
 from tachometry.hdl.export.targets.target import TARGETS
 from tachometry.sim.engines.verilator import home
 from tachometry.spec import METHODS, common_options, of_texts, own_options
-from tachometry.spec.core.stream import READY
+from tachometry.spec.core.extras.stream import READY
 from tachometry.spec.language.provenance import LICENSE, generator, version
 
 BIN = Path(sys.executable).parent

@@ -4,9 +4,9 @@ from functools import partial
 
 from proofs.formal.prove import Proof
 
-from tachometry.hdl.output import record_stream as box
+from tachometry.hdl.extras import stream as box
 from tachometry.spec import Encoder, MTachometer, Timing
-from tachometry.spec.core.stream import Part
+from tachometry.spec.core.extras.stream import Part
 from tachometry.spec.registers.map import IDENTIFICATION, RegisterMap
 
 _SPEC = MTachometer(encoder=Encoder(1, 4), timing=Timing(8, 2, 4), frac_bits=4, position_width=8, average=2)
@@ -76,5 +76,5 @@ RECORDS = Proof(
     {"PACKET": 3},
     _RECORD_PROBES,
     depth=2,
-    box=partial(lambda *given: box.RecordStream(*given), _PARTS, 1, 16, 3),
+    box=partial(lambda *given: box.Gates(*given), _PARTS, ("overflow",), 16, 3, "tick"),
 )

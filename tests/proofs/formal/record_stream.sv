@@ -8,7 +8,7 @@ module record_stream #(
   wire tvalid, tlast;
   wire [15:0] overruns;
   tachometer core (
-      .clk(clk), .rst(rst), .\event (comes), .flags(flag), .position(position), .clear(clear), .m_axis_tdata(tdata),
+      .clk(clk), .rst(rst), .tick(comes), .overflow(flag), .position(position), .clear(clear), .m_axis_tdata(tdata),
       .m_axis_tvalid(tvalid), .m_axis_tlast(tlast), .m_axis_tready(tready), .overruns(overruns)
   );
   wire [31:0] core_clocks;

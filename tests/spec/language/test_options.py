@@ -116,8 +116,6 @@ def test_every_option_does_what_it_says() -> None:
         "preset",
         "index-once",
         "position-modulo",
-        "probe",
-        "stream",
         "compare",
     } == {word.split("=")[0] for word in texts.split()}
 

@@ -1,27 +1,28 @@
-"""The golden stream sends a record of each event, unless the one before still waits."""
+"""Golden model of `spec.core.extras.stream`: a record of each event, unless the one before still waits."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden import compare, extras
+from tachometry.sim.golden.extras import View
 from tachometry.sim.golden.front_end import Steps, homed, positions_at
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.stream import LOST, OVERRUNS_WIDTH, READY, flags_of, stream_entry
+from tachometry.spec.core.extras.stream import LOST, OVERRUNS_WIDTH, READY, Stream
 from tachometry.spec.language.port import TICK, UPDATE
 
 Ints = NDArray[np.int64]
 
 
-def _events(spec: TachometerSpec, steps: Steps, tables: Mapping[str, Table]) -> Ints:
+def _events(extra: Stream, spec: TachometerSpec, steps: Steps, tables: Mapping[str, Table]) -> Ints:
     """Return clocks of records, sent or not."""
-    assert spec.stream is not None
-    if spec.stream.when == "edge":
+    if extra.records.when == "edge":
         return steps.clock[steps.step != 0] + spec.latency.tick
-    return tables[TICK if spec.stream.when == "tick" else UPDATE].clock
+    return tables[TICK if extra.records.when == "tick" else UPDATE].clock
 
 
 def _free(trace: PinTrace, clock: Ints) -> NDArray[np.bool_]:
@@ -41,17 +42,19 @@ def _free(trace: PinTrace, clock: Ints) -> NDArray[np.bool_]:
     return found
 
 
-def with_overruns(spec: TachometerSpec, trace: PinTrace, steps: Steps, tables: dict[str, Table]) -> dict[str, Table]:
-    """Return tables with `overruns`, as a column of the ticks and as the clocks from which each dropped record is
-    counted.
-    """
-    if spec.stream is None:
-        return tables
-    clock = _events(spec, steps, tables)
-    dropped = clock[~_free(trace, clock)] + 1
-    number = np.searchsorted(dropped, tables[TICK].clock, side="right")
-    ticks = tables[TICK].having(overruns=np.minimum(number, (1 << OVERRUNS_WIDTH) - 1))
-    return tables | {TICK: ticks, "overruns": Table(dropped, {})}
+def tables(extra: Stream, view: View) -> dict[str, Table]:
+    """Return the clocks in which records are dropped."""
+    clock = _events(extra, view.spec, view.steps, view.tables)
+    return {"overruns": Table(clock[~_free(view.trace, clock)], {})}
+
+
+def shown(
+    extra: Stream, spec: TachometerSpec, found: Mapping[str, Table], clock: Ints, cleared: int
+) -> dict[str, NDArray[Any]]:
+    """Return how many were dropped after `cleared`, and before each clock."""
+    dropped = found["overruns"].clock
+    number = np.searchsorted(dropped, clock) - np.searchsorted(dropped, cleared, side="right")
+    return {"overruns": np.clip(number, 0, (1 << OVERRUNS_WIDTH) - 1)}
 
 
 def records(
@@ -73,8 +76,9 @@ def records(
     records : structured array, shape (n,)
         With the `dtype` of the manifest. What belongs to updates, the velocity aside, is not defined before the first.
     """
-    assert spec.stream is not None
-    entry, clock = stream_entry(spec.stream, spec, spec.ports), _events(spec, steps, tables)
+    extra = Stream.of(spec.extras)
+    assert extra is not None
+    entry, clock = extra.entry(spec), _events(extra, spec, steps, tables)
     free = _free(trace, clock)
     rows = {name: np.searchsorted(tables[name].clock, clock, side="right") for name in (TICK, UPDATE)}
     held = {
@@ -85,7 +89,7 @@ def records(
     shown = Table(clock, held).having(homed=homed(spec, steps, clock), **{LOST: np.append(False, ~free[:-1])})
     shown = shown.having(**extras.shown(spec, tables, clock), **compare.shown(spec, dict(tables), clock))
     found = np.zeros(len(clock), dtype=np.dtype(entry["dtype"]))
-    bits = [shown[name].astype(np.uint32) << np.uint32(place) for place, name in enumerate(flags_of(spec.ports))]
+    bits = [shown[name].astype(np.uint32) << np.uint32(place) for place, name in enumerate(extra.flags(spec))]
     position = positions_at(spec, steps, clock - spec.latency.tick, reset=True)
     values = {"time": clock, "flags": sum(bits), "position": position}
     for name in entry["dtype"]["names"]:
