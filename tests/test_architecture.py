@@ -10,6 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from tachometry.spec import of_texts
+from tachometry.spec.core.extras import EXTRAS
+from tachometry.spec.language.option import options_of
+
 ROOT = Path(__file__).parent.parent
 LAYERS = ("spec", "hdl", "sim", "boards", "cli")
 # What each room may import beside itself; a layer stands for all of its rooms.
@@ -320,3 +324,44 @@ def test_it_only_falls(what: str) -> None:
     found = count()
     assert found.total() <= ceiling, f"{found.total()} {what}, at most {ceiling}: {dict(found.most_common(20))}"
     assert found.total() >= 0.99 * ceiling, f"{found.total()} {what}: lower the ceiling, which is {ceiling}"
+
+
+# Words outside extras that mean something else there, or belong to the wiring of an encoder as well.
+OTHER_MEANINGS = {
+    "boards/monitor/selftest.py": {"stream"},
+    "boards/monitor/session.py": {"stream"},
+    "cli/explore/server.py": {"stream"},
+    "cli/options/capture.py": {"complements"},
+    "sim/captures/sigrok.py": {"probe"},
+    "sim/encoder/virtual.py": {"stream"},
+}
+
+
+def names_of_extras() -> set[str]:
+    """Return the options and ports of a core with every extra."""
+    options = [(about, extra) for extra in EXTRAS for about in options_of(extra)]
+    texts = {about.name: "yes" if about.flag else next(filter(None, about.tests)) for about, _ in options}
+    spec = of_texts("track", {"ppr": "25", "index": "yes", "max-speed": "100rad/s", **texts})
+    ports = [port for extra in spec.extras for port in extra.ports(spec)]
+    ports += [
+        pin.port for extra in spec.extras for pin in extra.pins(spec) if not pin.of
+    ]  # wiring has complements, too
+    return {*texts, *(name.replace("-", "_") for name in texts), *(port.name for port in ports)}
+
+
+def named_in(file: Path) -> set[str]:
+    """Return attributes, imports of this package and texts of a file, but its docstrings."""
+    docstrings = {id(node.value) for node in nodes(file) if isinstance(node, ast.Expr)}
+    words = {part for name in imports(file) if name.startswith("tachometry") for part in name.split(".")}
+    words |= {node.attr for node in nodes(file) if isinstance(node, ast.Attribute)}
+    texts = (node for node in nodes(file) if isinstance(node, ast.Constant) and id(node) not in docstrings)
+    return words | {node.value for node in texts if isinstance(node.value, str)}
+
+
+def test_only_extras_name_an_extra() -> None:
+    names = names_of_extras()
+    assert len(names) > 30
+    for layer in LAYERS:
+        for file in (file for file in (ROOT / layer).rglob("*.py") if "extras" not in file.parts):
+            place = file.relative_to(ROOT).as_posix()
+            assert names & named_in(file) == OTHER_MEANINGS.get(place, set()), place
