@@ -310,8 +310,8 @@ CEILING: dict[str, tuple[int, Callable[[], Counter[str]]]] = {
     "lines of Python of the tests": (42200, lambda: lines("tests")),
     "lines of Python of the benchmarks": (3140, lambda: lines("bench")),
     "functions over 40 lines": (45, lambda: every(is_long, *PRODUCT)),
-    "functions with more than 6 parameters": (31, lambda: every(has_many_parameters, *PRODUCT)),
-    "getattr and hasattr in hdl": (39, lambda: every(lambda node: calls(node, "getattr", "hasattr"), "hdl")),
+    "functions with more than 6 parameters": (30, lambda: every(has_many_parameters, *PRODUCT)),
+    "getattr and hasattr in hdl": (36, lambda: every(lambda node: calls(node, "getattr", "hasattr"), "hdl")),
     "places that tell kinds of core apart": (22, lambda: every(tells_kinds_apart, *PRODUCT)),
     "broken docstrings": (80, lambda: every(has_a_broken_docstring, *PRODUCT, "bench", "tests")),
 }
@@ -340,12 +340,10 @@ OTHER_MEANINGS = {
 def names_of_extras() -> set[str]:
     """Return the options and ports of a core with every extra."""
     options = [(about, extra) for extra in EXTRAS for about in options_of(extra)]
-    texts = {about.name: "yes" if about.flag else next(filter(None, about.tests)) for about, _ in options}
+    texts = {about.name: "yes" if about.flag else next(filter(None, about.tests or ())) for about, _ in options}
     spec = of_texts("track", {"ppr": "25", "index": "yes", "max-speed": "100rad/s", **texts})
     ports = [port for extra in spec.extras for port in extra.ports(spec)]
-    ports += [
-        pin.port for extra in spec.extras for pin in extra.pins(spec) if not pin.of
-    ]  # wiring has complements, too
+    ports += [pin.port for pin in spec.front_end.pins if not pin.of]  # wiring has complements, too
     return {*texts, *(name.replace("-", "_") for name in texts), *(port.name for port in ports)}
 
 

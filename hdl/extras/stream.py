@@ -9,8 +9,9 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import by_name
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.extras.stream import OVERRUNS_WIDTH, Part, Stream
+from tachometry.spec.core.extras.stream import OVERRUNS_WIDTH, Part, Stream, size_of
 from tachometry.spec.language.port import TICK, UPDATE
 
 _EVENTS = {"tick": TICK, "update": UPDATE, "edge": "step"}
@@ -27,24 +28,20 @@ class Gates(wiring.Component):
         Parts of a record, `time` and `flags` first.
     flags : sequence of str
         Ports that are the bits of `flags` behind the lowest, which says that records were dropped before.
-    size : int
-        Bytes of a record.
     packet : int
         Records from one `m_axis_tlast` to the next.
     event : str
         The strobe with which a record comes, or `step`, which is `latency` clocks ahead of the values.
     """
 
-    def __init__(
-        self, parts: Sequence[Part], flags: Sequence[str], size: int, packet: int, event: str, latency: int = 0
-    ) -> None:
+    def __init__(self, parts: Sequence[Part], flags: Sequence[str], packet: int, event: str, latency: int = 0) -> None:
         self._parts, self._flags, self._packet, self._event, self._latency = parts, flags, packet, event, latency
         super().__init__(
             {
                 event: In(signed(2) if event == "step" else 1),
                 **dict.fromkeys((*flags, "clear", "m_axis_tready"), In(1)),
                 **{part.name: In(Shape(part.width, part.signed)) for part in parts[2:]},
-                "m_axis_tdata": Out(8 * size),
+                "m_axis_tdata": Out(8 * size_of(parts)),
                 **dict.fromkeys(("m_axis_tvalid", "m_axis_tlast"), Out(1)),
                 "overruns": Out(OVERRUNS_WIDTH),
             }
@@ -54,7 +51,7 @@ class Gates(wiring.Component):
     def of(cls, extra: Stream, spec: TachometerSpec) -> Self:
         """Return the gates of this core."""
         event, flags = _EVENTS[extra.records.when], extra.flags(spec)[1:]
-        return cls(extra.parts(spec), flags, extra.size(spec), extra.records.packet, event, spec.latency.tick)
+        return cls(extra.parts(spec), flags, extra.records.packet, event, spec.latency.tick)
 
     @property
     def idle(self) -> tuple[Idle, ...]:
@@ -67,8 +64,9 @@ class Gates(wiring.Component):
         lost = Signal()
         free = Signal()
         left = Signal(range(max(self._packet, 2)), init=self._packet - 1)  # of the packet, behind the next record
-        now = {"time": clocks, "flags": Cat(lost, *(getattr(self, name) for name in self._flags))}
-        event = getattr(self, self._event)
+        now = {"time": clocks, "flags": Cat(lost, *by_name(self, self._flags).values())}
+        now |= by_name(self, (part.name for part in self._parts[2:]))
+        (event,) = by_name(self, [self._event]).values()
         if self._event == "step":
             (event,) = delay(m, self.step[0], clocks=self._latency)
         m.d.comb += free.eq(~self.m_axis_tvalid | self.m_axis_tready)
@@ -80,10 +78,9 @@ class Gates(wiring.Component):
             with m.If(left == 0):
                 m.d.sync += left.eq(self._packet - 1)
         for part in self._parts:
-            value = now.get(part.name, getattr(self, part.name, None))
-            held = Signal.like(value, name=f"held_{part.name}")
+            held = Signal.like(now[part.name], name=f"held_{part.name}")
             with m.If(event & free):
-                m.d.sync += held.eq(value)
+                m.d.sync += held.eq(now[part.name])
             m.d.comb += self.m_axis_tdata[8 * part.offset : 8 * (part.offset + part.size)].eq(held)
         with m.If(event & ~free & ~self.overruns.all()):
             m.d.sync += self.overruns.eq(self.overruns + 1)

@@ -1,7 +1,7 @@
 """Stream: records of what the ports show, as AXI4-Stream."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -54,6 +54,12 @@ class Part:
         return _WORD if self.width <= 8 * _WORD else 2 * _WORD
 
 
+def size_of(parts: Sequence[Part]) -> int:
+    """Return the bytes of a record, a power of two."""
+    last = parts[-1]
+    return 1 << (last.offset + last.size - 1).bit_length()
+
+
 @dataclass(frozen=True, kw_only=True)
 class Stream(Extra):
     """A record comes with each event; what comes while a record waits is dropped, and counted in `overruns`."""
@@ -86,11 +92,6 @@ class Stream(Extra):
             found.append(Part(name, width, found[-1].offset + found[-1].size))
         return tuple(found)
 
-    def size(self, spec: Numbers) -> int:
-        """Return the bytes of a record, a power of two."""
-        last = self.parts(spec)[-1]
-        return 1 << (last.offset + last.size - 1).bit_length()
-
     def flags(self, spec: Numbers) -> tuple[str, ...]:
         """Return the bits of `flags`, the lowest first: `LOST`, and ports."""
         held = (port for port in spec.ports.outputs if port.held_by in (TICK, UPDATE) and not port.is_strobe)
@@ -100,7 +101,7 @@ class Stream(Extra):
         yield Pin(pin(READY, "The record is taken in this clock; synchronous to clk."), rest=1)
 
     def ports(self, spec: Numbers) -> Iterable[Port]:
-        size = self.size(spec)
+        size = size_of(self.parts(spec))
         help = f"A record of {size} bytes, see stream.dtype of the manifest."
         yield Port(f"{STREAM}_tdata", "output", 8 * size, help=help)
         yield Port(f"{STREAM}_tvalid", "output", help="There is a record; it stays until it is taken.")
@@ -115,7 +116,7 @@ class Stream(Extra):
             "names": [part.name for part in parts],
             "formats": [f"<{'i' if part.signed else 'u'}{part.size}" for part in parts],
             "offsets": [part.offset for part in parts],
-            "itemsize": self.size(spec),
+            "itemsize": size_of(parts),
         }
         flags = [*self.flags(spec)]
         return {"when": self.records.when, "packet": self.records.packet, "flags": flags, "dtype": dtype}

@@ -76,5 +76,5 @@ RECORDS = Proof(
     {"PACKET": 3},
     _RECORD_PROBES,
     depth=2,
-    box=partial(lambda *given: box.Gates(*given), _PARTS, ("overflow",), 16, 3, "tick"),
+    box=partial(lambda *given: box.Gates(*given), _PARTS, ("overflow",), 3, "tick"),
 )
