@@ -1,19 +1,120 @@
 """Random cores are right in every bit, or refused in a line: as exported Verilog, against the golden model."""
 
+import random
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support.nightly import nightly
-from support.random_cores import motions, random_options
 from support.verilog import run_in_icarus
 
 from tachometry.cli.reports.axes import axes_rows
 from tachometry.cli.reports.core import core_rows
 from tachometry.hdl.export import export
 from tachometry.sim import golden
+from tachometry.sim.encoder.stress import stress_of
+from tachometry.sim.signals.axes import Trace
+from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import compare
-from tachometry.spec import AxesSpec, CoreSpec, ParameterError, of_options
+from tachometry.spec import AUTO, METHODS, AxesSpec, CoreSpec, ParameterError, common_options, of_options, own_options
+from tachometry.spec.core.sensors import SENSORS
+from tachometry.spec.core.timing import MAX_TICK_CYCLES, MAX_TICKS
+from tachometry.spec.formats.velocity_output import UNITS
+from tachometry.spec.registers.buses import BUSES
+
+CLOCKS_HZ, MOST_COUNTS = (100_000, 400_000_000), 1 << 24
+EDGES, TICKS, LEAST_CLOCKS, MOST_CLOCKS = 20, 30, 6000, 24_000  # of a motion
+_NUMBERS = "ppr clock tick max-time unit sensor decoding frac-bits velocity-width max-speed over-speed filter lowpass"
+_QUADRATURE = {"health", "index-at"}  # which few other sensors have
+
+
+class _Draw(random.Random):
+    """Random numbers that are often at an end of their range."""
+
+    def log(self, least: int, most: int) -> int:
+        """Return a whole number whose logarithm is uniform."""
+        if self.random() < 0.15:
+            return self.choice((least, most))
+        return round(2 ** self.uniform(np.log2(least), np.log2(most)))
+
+    def speed(self) -> str:
+        return f"{self.log(1, 1 << 40) / (1 << 20):.6g}{self.choice(('rad/s', 'rev/s', 'rpm'))}"
+
+    def often(self, share: float) -> bool:
+        return self.random() < share
+
+
+def random_options(seed: int) -> tuple[dict[str, str], str]:
+    """Return options of a core by their names, and a bus for its registers or `none`."""
+    draw = _Draw(seed)
+    method = draw.choice([*METHODS, "track", AUTO])
+    sensor = draw.choice([*SENSORS] + ["quadrature"] * 4)
+    decoding = draw.choice(SENSORS[sensor].decodings)
+    clock = draw.log(*CLOCKS_HZ)
+    if round_clock := draw.often(0.5):
+        clock = round(clock, 1 - len(str(clock)))
+    tick = draw.log(200, 8000) if method == "track" else draw.log(1, 4000)
+    tick = draw.log(1, MAX_TICK_CYCLES) if draw.often(0.05) else tick
+    ticks = draw.log(2, 300) if draw.often(0.9) else draw.log(2, MAX_TICKS)
+    ticks = max(2, min(ticks, (1 << 28) // tick))  # a motion has a rest that is longer
+    texts = {
+        "method": method,
+        "ppr": str(draw.log(1, MOST_COUNTS // decoding)),
+        "decoding": str(decoding),
+        "clock": f"{clock}Hz",
+        "unit": draw.choice(UNITS),
+    }
+    if sensor != "quadrature":
+        texts["sensor"] = sensor
+    if draw.often(0.9) or not round_clock:
+        texts["tick"] = f"{tick}clk"
+        texts |= {"max-time": f"{tick * ticks}clk"} if draw.often(0.9) else {}
+    some = {
+        "frac-bits": (0.15, str(draw.randint(4, 24))),
+        "velocity-width": (0.15, str(draw.randint(8, 64))),
+        "max-speed": (0.4, draw.speed()),
+        "over-speed": (0.05, draw.speed()),
+        "filter": (0.2, str(draw.log(1, 3000))),
+        "lowpass": (0.1, f"{draw.log(1, 1 << 20) * clock / tick / (1 << 20):.6g}Hz"),
+    }
+    texts |= {name: text for name, (share, text) in some.items() if draw.often(share)}
+    _add_others(texts, draw, method, sensor)
+    if method in ("s", "track", AUTO) and draw.often(0.06):
+        axes = draw.choice((1, 2, 3, 5, 8, 32, 64))
+        kept = {"method", "ppr", "clock", "unit", "max-speed", "filter", "index", "external-tick"}
+        texts = {name: text for name, text in texts.items() if name in kept} | {"axes": str(axes)}
+    return texts, draw.choice([*BUSES]) if draw.often(0.1) else "none"
+
+
+def _add_others(texts: dict[str, str], draw: _Draw, method: str, sensor: str) -> None:
+    """Add some of the other options of a method, with values that it declares for tests or any within its limits."""
+    own = () if method == AUTO else own_options(method)
+    for about in {about.name: about for about in (*common_options(), *own)}.values():
+        values = [value for value in about.tested if value]
+        rare = sensor != "quadrature" and {about.name, about.needs} & _QUADRATURE
+        if about.name in _NUMBERS.split() or not values or draw.often(0.99 if rare else 0.88):
+            continue
+        if method == "track" and "bounds" in (about.name, about.needs):
+            continue
+        if about.needs and draw.often(0.95):
+            texts[about.needs] = "yes"
+        within = about.limits is not None and draw.often(0.5)
+        texts[about.name] = str(draw.randint(*about.limits)) if about.limits and within else draw.choice(values)
+
+
+def motions(spec: CoreSpec, seed: int) -> list[Trace]:
+    """Return motions that are played within seconds: one at usual speeds, and the same eight times as fast."""
+    whole = stress_of(spec, seed, EDGES)
+    clocks = min(max(LEAST_CLOCKS, TICKS * spec.timing.tick_cycles), MOST_CLOCKS)
+    if not isinstance(whole, PinTrace):
+        return [whole.until(min(whole.n_clocks, LEAST_CLOCKS))]
+    trace = whole.until(min(whole.n_clocks, clocks))
+    clock, last = np.unique(whole.clock[::-1] // 8, return_index=True)
+    lines = {name: levels[::-1][last] for name, levels in whole.lines.items()}
+    hurried = PinTrace.of_lines(clock, whole.n_clocks, lines)
+    return [trace, hurried.until(min(whole.n_clocks, clocks // 4))]
+
 
 # Cores that are played in a second: every method and sensor, and number 205, a constant of which was too wide.
 SEEDS = (3, 6, 12, 13, 20, 26, 28, 31, 42, 59, 61, 205)

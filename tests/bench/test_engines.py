@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from support.nightly import nightly
 from support.script import load
 
 from tachometry.sim import golden
@@ -21,13 +20,6 @@ SPEC = MTachometer(encoder=Encoder(500), timing=Timing.parse("48MHz", "20us", "1
 def trace(monkeypatch: pytest.MonkeyPatch) -> PinTrace:
     monkeypatch.setattr(bench, "BEGIN", 100_000)
     return VirtualEncoder(500).record(parse_motion("constant:300rad/s:20ms")).recording.place(48_000_000)
-
-
-@nightly  # it compiles a core three times; what it measures is held against the golden models in tests/sim/engines
-def test_all_engines_see_the_same(trace: PinTrace) -> None:
-    _, *speeds = bench.speeds("m", SPEC, trace, slow=3000, fast=100_000)
-    assert min(map(float, speeds)) > 0
-    assert len(speeds) == len(bench.SPEED_COLUMNS) - 1
 
 
 def test_part_of_a_trace_has_the_same_levels(trace: PinTrace) -> None:

@@ -5,25 +5,143 @@ the process, fails.
 """
 
 import contextlib
+import gzip
 import io
 import json
 import os
+import random
 import resource
 import select
 import shlex
 import signal
 import sys
+import zipfile
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from support.captures import make_sr
 from support.command import without
-from support.hostile import make_files
 from support.nightly import only
 
 from tachometry.cli.main import main
+
+_NOISE = random.Random(1).randbytes(5000)
+_MOTION = "time,angle_rad\n"
+_CAPTURE = "time,a,b\n"
+_LOG = "time [ms],n\n0,0\n5,9\n"
+_VARIABLES = '$var wire 1 ! a $end\n$var wire 1 "! b $end\n$var wire 1 " c $end\n'
+_HEAD = f"$timescale 1 us $end\n{_VARIABLES}$enddefinitions $end\n"
+_BEGIN = '#0\n0!\n0"!\n0"\n#1000\n1!\n'
+
+_TEXTS = {
+    "huge-angle.csv": _MOTION + "0,0\n1,1e300\n",
+    "huge-time.csv": _MOTION + "0,0\n1e300,1\n",
+    "tiny-time.csv": _MOTION + "0,0\n1e-300,1\n1,2\n",
+    "negative-time.csv": _MOTION + "-1e308,0\n1e308,1\n",
+    "steep.csv": _MOTION + "0,0\n1e-29,1e29\n1,1e29\n",
+    "far.csv": _MOTION + "0,1e15\n1,1e15\n",
+    "backwards.csv": _MOTION + "0,0\n2,1\n1,1\n",
+    "nan.csv": _MOTION + "0,0\n1,nan\n",
+    "quoted.csv": _MOTION + '0,0\n"1","1"\n',
+    "control.csv": _MOTION + "0,0\n1,\x1b]0;title\x07\x9b31m\n",
+    "one-row.csv": _MOTION + "0,0\n",
+    "good.csv": _CAPTURE + "0,0,0\n0.0001,1,0\n0.0002,1,1\n0.0005,1,1\n",
+    "slow.csv": _CAPTURE + "0,0,0\n0.5,1,0\n1.0,1,1\n1.5,0,1\n",
+    "whole.csv": _CAPTURE + "0,0,0\n1,1,0\n2,1,1\n3,0,1\n",
+    "overflow.csv": _CAPTURE + "-1e308,0,0\n1e308,1,0\n",
+    "late.csv": _CAPTURE + "0,0,0\n1e29,1,0\n",
+    "nan-time.csv": _CAPTURE + "0,0,0\nnan,1,0\n",
+    "backwards-time.csv": _CAPTURE + "1,0,0\n0,1,0\n",
+    "level.csv": _CAPTURE + "0,0,0\n1,1e300,0\n",
+    "fields.csv": _CAPTURE + "0,0,0\n1" + "," * 100_000 + "\n",
+    "control-names.csv": "time,\x1b[31ma,\x9b2Jb\n0,0,0\n1,1\x1b[31m,0\n",
+    "no-time.csv": "a,b\n0,0\n1,0\n",
+    "quotes.csv": 'time,"a,b"\n0,0\n',
+    "comments.csv": "; only\n# comments\n" * 50_000,
+    "unit.csv": "Time [fortnights],Channel 0,Channel 1\n0,0,0\n1,1,0\n",
+    "same-names.csv": "time,a,a\n0,0,0\n",
+    "cut-time.vcd": _HEAD + _BEGIN + "#200",
+    "cut-value.vcd": _HEAD + _BEGIN + "#2000\n1",
+    "cut-variable.vcd": _HEAD + _BEGIN + '#2000\n1"',
+    "vector.vcd": _HEAD + _BEGIN + "#2000\nb10 !\n",
+    "undefined.vcd": _HEAD + "#2000\nx!\n",
+    "no-scale.vcd": f"{_VARIABLES}$enddefinitions $end\n{_BEGIN}",
+    "late.vcd": _HEAD + _BEGIN + f"#1{'0' * 19}\n0!\n",
+    "long-time.vcd": _HEAD + _BEGIN + f"#{'9' * 5000}\n0!\n",
+    "endless.vcd": f"$comment {'x' * (9 << 20)}\n",
+    "scopes.vcd": "$scope module m $end\n" * 5000 + _HEAD,
+    "log.csv": _LOG + "10,20\n",
+    "cut-log.csv": _LOG + "10,2",
+    "nan-log.csv": _LOG.replace("9", "nan"),
+    "far-log.csv": _LOG + f"10,{1 << 53}\n15,-{1 << 53}\n",
+    "late-log.csv": _LOG + "1e29,10\n",
+    "deep.toml": "ppr = " + "[" * 100_000,
+    "deep-table.toml": "ppr = " + "{a = " * 5_000,
+    "good.toml": 'ppr = 100\nclock = "1MHz"\nmax-time = "20ms"\nmotion = "constant:{speed}:100ms"\n'
+    '[vary]\nspeed = ["5rad/s", "50rad/s"]\ntick = ["100us", "1ms"]\n',
+    "broken.toml": "ppr = \n",
+    "unknown-key.toml": "revolutions = 9\n",
+    "list.toml": "ppr = [9, 10]\n",
+    "nested-list.toml": "ppr = 9\n[vary]\ntick = [[1]]\n",
+    "many.toml": 'ppr = 9\nmotion = "stop:1ms"\n[vary]\n'
+    'seed = "1..101:101"\njitter = "0..0.1:101"\nlost = "0..0.1:101"\n',
+    "control.toml": '"\\u001b[31m" = 9\n',
+    "date.toml": "ppr = 9\ntick = 1979-05-27\n",
+}
+
+
+def _cut(path: Path, keep: float) -> None:
+    content = path.read_bytes()
+    path.write_bytes(content[: int(len(content) * keep)])
+
+
+def make_files(folder: Path) -> None:
+    """Put all of them into a folder."""
+    (folder / "folder").mkdir()
+    for name, text in _TEXTS.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    for name in ("empty", "empty.csv", "empty.sr", "empty.vcd", "empty.fst"):
+        (folder / name).touch()
+    for name in ("noise", "noise.csv", "noise.sr", "noise.vcd", "noise.fst", "noise.parquet", "binary.toml"):
+        (folder / name).write_bytes(_NOISE)
+    (folder / "board").mkdir()
+    (folder / "board" / "x.bin").touch()
+    zeros = ("csv", "toml", "sr", "vcd", "txt", "csv.gz", "json", "parquet")
+    for name in (*(f"zero.{suffix}" for suffix in zeros), "board/x.json"):
+        (folder / name).symlink_to("/dev/zero")
+    (folder / "endless.csv").write_text("time,a,b\n" + "0" * (9 << 20), encoding="ascii")
+    (folder / "endless.csv.gz").write_bytes(gzip.compress((folder / "endless.csv").read_bytes()))
+    make_sr(folder / "blanks.sr", [bytes(4)], comment="x" + " " * 900_000 + "y", probe9="X")
+    (folder / "utf16.csv").write_text(_MOTION + "0,0\n1,1\n", encoding="utf-16")
+
+    levels = bytes([0, 1, 3, 2] * 100)
+    make_sr(folder / "good.sr", [levels])
+    make_sr(folder / "cut.sr", [levels])
+    _cut(folder / "cut.sr", 0.7)
+    with zipfile.ZipFile(folder / "no-metadata.sr", "w") as archive:
+        archive.writestr("version", "2")
+    make_sr(folder / "metadata-bomb.sr", [levels], comment="x" * (32 << 20))
+    make_sr(folder / "edges-bomb.sr", [bytes([0, 1]) * (8 << 20)] * 2)
+    make_sr(folder / "quiet-bomb.sr", [bytes(16 << 20)] * 2, samplerate="1 Hz")
+    make_sr(folder / "rate.sr", [levels], samplerate="9" * 400)
+    make_sr(folder / "slow.sr", [levels], samplerate="0.000000001")
+    make_sr(folder / "probe.sr", [levels], {1: "A", 999: "B"})
+    make_sr(folder / "unit.sr", [levels], unitsize="9")
+    with zipfile.ZipFile(make_sr(folder / "members-bomb.sr", [levels]), "a") as archive:
+        for number in range(260):
+            member = zipfile.ZipInfo(f"m{number}")
+            member.comment = bytes(65_535)  # in the list of members only
+            archive.writestr(member, "")
+    content = bytearray(make_sr(folder / "encrypted.sr", levels).read_bytes())
+    for magic, flags in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+        at = -1
+        while (at := content.find(magic, at + 1)) >= 0:
+            content[at + flags] |= 1
+    (folder / "encrypted.sr").write_bytes(content)
+
 
 TABLE = Path(__file__).with_name("hostile.txt")
 CORE = "--ppr 9 --clock 1MHz --tick 10us --max-time 100us"

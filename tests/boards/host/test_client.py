@@ -1,19 +1,14 @@
 """The client: against the golden bank, against the simulated core, and against boards that are none."""
 
-import json
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import pytest
 from support.lockstep import random_case
-from support.native import NativeCore, check_golden, logged, snapshots
-from support.nightly import nightly
 
 from tachometry.boards.host import client
 from tachometry.boards.host.snapshot import Snapshot
-from tachometry.hdl.export import export
 from tachometry.sim.golden.registers import Access, GoldenBank
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TachometerSpec, of_texts
@@ -86,32 +81,6 @@ def test_snapshots_are_those_of_the_golden_bank(method: str, seed: int) -> None:
     bench.hold(False)
     board.clock += 300
     assert dict(bench.snapshot()) != dict(first)
-
-
-@nightly  # the C driver plays on this core, too, and the golden bank above is that of the gates
-def test_on_the_simulated_core(tmp_path: Path) -> None:
-    spec, trace, _ = case("m", 16)
-    registers = RegisterMap(spec)
-    core = NativeCore(spec, trace, tmp_path)
-    bench = client.Client(core.read, core.write, json.loads(export(spec, "spindle", "native")["spindle.json"]))
-    shown = []
-    for _ in range(8):
-        core.run(400)
-        shown.append(bench.snapshot())
-    bench.hold(True)
-    core.run(100)
-    shown.append(bench.snapshot())
-    assert dict(shown[-1]) == dict(shown[-2])
-    core.capture()
-    core.run(100)
-    shown.append(bench.snapshot())
-    assert dict(shown[-1]) != dict(shown[-2])
-    counters = bench.counters()
-    bench.clear()
-    bench.hold(False)
-    assert bench.counters() != counters
-    check_golden(registers, trace, core.log)
-    assert [dict(one) for one in shown] == snapshots(registers, logged(core.log)[0])
 
 
 def test_a_snapshot_cannot_be_changed() -> None:

@@ -7,10 +7,9 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from support import docs
 from support.command import run
 from support.compiled import lint
-from support.nightly import nightly, only
+from support.nightly import only
 
 from tachometry.hdl.export import export
 from tachometry.sim.studies import verify as study
@@ -53,20 +52,6 @@ def test_simulate_and_replay(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert run("replay", tmp_path / "s.sr", *CORE, *two) == 0
     other = {line.split()[1]: line for line in rows(capsys) if line.startswith("axis")}
     assert f"counts out {counts['1'][1]}," in other["0"]
-
-
-@nightly
-def test_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    """The other tests of this file run the same commands on shorter motions."""
-    monkeypatch.chdir(tmp_path)
-    page = docs.page("concepts/axes.md").replace("\\\n", " ")
-    simulate, replay = re.findall(r"^tachometry ((?:simulate|replay) .*)", page, re.MULTILINE)
-    counts = []
-    for command in (simulate, replay):
-        assert run(*command.split()) == 0
-        counts.append(re.findall(r"counts out (-?[0-9]+), 0 errors", " ".join(rows(capsys))))
-    assert [len(of) for of in counts] == [3, 2]
-    assert counts[1] == [counts[0][0], counts[0][2]]
 
 
 def test_what_the_reader_says_of_an_axis_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

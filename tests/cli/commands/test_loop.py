@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from distributed import LocalCluster
 from support import command
-from support.nightly import nightly
 
 from tachometry.sim import build
 from tachometry.sim.engines.loop import COLUMNS
@@ -93,20 +92,6 @@ def test_all_cores_of_this_machine_run_loops(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(cluster, "cluster", none)
     assert run(*SHORT, "--vary", "kv=20,80") == run(*SHORT, "--vary", "kv=20,80", "--jobs", "3") == 2
     assert asked == [(None, None), (None, 3)]
-
-
-@nightly  # tests/sim/engines/test_gate_loop.py runs the same gates without the command
-def test_a_controller_in_gates(tmp_path: Path) -> None:
-    gains = "--kp 1600 --kv 80 --observer 160rad/s --current-limit 8A --seeds 1".split()
-    for name, more in (("gates", ["--gates"]), ("double", [])):
-        assert run(*SHORT, *gains, *more, "--log", tmp_path / f"{name}.csv") == 0
-    current = {}
-    for name in ("gates", "double"):
-        with (tmp_path / f"{name}.csv").open() as file:
-            current[name] = [float(row["current (A)"]) for row in csv.DictReader(file)]
-    away = {name: max(abs(2048 * value - round(2048 * value)) for value in each) for name, each in current.items()}
-    assert away["gates"] < 1e-4  # whole LSB, but for what the file rounds
-    assert away["double"] > 0.1
 
 
 def test_nothing_is_half_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

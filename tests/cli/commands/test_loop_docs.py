@@ -7,9 +7,9 @@ from pathlib import Path
 
 import click
 import pytest
-from loops import GAINS, KINDS, REAL, is_usable, setting, variants
+from loops import KINDS, REAL, setting, variants
 from support import command, docs
-from support.nightly import nightly, only
+from support.nightly import only
 
 from tachometry.cli.commands.loop import loop
 from tachometry.cli.options.loop_study import loop_options
@@ -70,17 +70,6 @@ def test_the_command_with_axes_means_loops() -> None:
 def test_rows_of_what_synchronising_does(place: int) -> None:
     found = outcome_of(setting(KINDS[place], 80.0, 20e-6, REAL), range(6))
     assert numbers(cells("real disc", "80")[place]) == figures(found)
-
-
-@nightly  # twelve loops; the rows below are of the same simulation
-def test_rows_of_loopss() -> None:
-    """Ticks of 1 ms, S: the gain of the table is usable, and the next one is not."""
-    gain, *rest = numbers(cells("real disc", "S, synchronised")[0])
-    above = GAINS[GAINS.index(gain) + 1]
-    found, other = (outcome_of(setting(KINDS[0], kv, 1e-3, REAL), range(6)) for kv in (gain, above))
-    assert is_usable(found)
-    assert not is_usable(other)
-    assert rest == figures(found)
 
 
 def test_rows_of_what_was_assumed() -> None:

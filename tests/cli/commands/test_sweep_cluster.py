@@ -8,10 +8,8 @@ import time
 from collections import Counter
 from pathlib import Path
 
-import dask
 import pyarrow.parquet as pq
 import pytest
-from distributed import Client, LocalCluster
 from support.nightly import nightly, only
 
 COMMAND = [sys.executable, "-c", "from tachometry.cli.main import main; main()", "sweep"]
@@ -96,35 +94,6 @@ def wait_for(rows: int, result: Path, sweep: subprocess.Popen[str]) -> None:
 
 def points_in(rows: list[str]) -> list[str]:
     return [row.split('"point": "')[1].split('"')[0] for row in rows]
-
-
-@nightly  # the dead workers of the test below take the same way
-def test_a_worker_is_killed_in_the_middle(tmp_path: Path) -> None:
-    result, trace = tmp_path / "r.parquet", Trace(tmp_path)
-    with (
-        dask.config.set({"distributed.worker.preload": [str(trace.script)]}),
-        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=50) as local,
-        Client(local) as client,
-    ):
-        sweep = begun(result, "--scheduler", local.scheduler_address)
-        trace.let(20)
-        wait_for(20, result, sweep)
-        victim = str(next(iter(client.run(os.getpid).values())))
-        before = points_in(kept(result))
-        os.kill(int(victim), signal.SIGKILL)
-        trace.let(2 * POINTS)
-        out, err = sweep.communicate(timeout=600)
-    assert (sweep.returncode, err) == (0, "")
-    assert f"{POINTS} points, {POINTS} of them run in " in out
-    points = pq.read_table(result)["point"].to_pylist()
-    assert len(points) == len(set(points)) == POINTS
-    executed = trace.all()
-    assert set(executed) == set(points)
-    assert len(before) == 20
-    # Only what the killed worker had not handed over ran again, or what Dask did not know yet to be in our hands.
-    again = {point for point, times in executed.items() if times > 1}
-    assert again <= set(trace.of(victim))
-    assert len(again) <= 5
 
 
 # They are held back in one place.

@@ -1,9 +1,12 @@
-"""Options of the core through simulate and replay: what is reported, and that a capture keeps all lines."""
+"""Options of core and loop: what commands report of them, and that a capture keeps all lines."""
 
 from pathlib import Path
 
 import pytest
 from support.command import run
+
+from tachometry.spec import METHODS, LoopSpec
+from tachometry.spec.language.option import options_of
 
 CORE = "--method s --ppr 24 --clock 100kHz --tick 1ms --max-time 20ms".split()
 LINES = "--index --index-reset --external-tick".split()
@@ -32,3 +35,26 @@ def test_a_tick_that_stays_away_is_told(tmp_path: Path, capsys: pytest.CaptureFi
     words = ["--external-tick", "--tick-in", "sync", "--engine", "pysim"]
     assert run("replay", tmp_path / "x.csv", *CORE, *words) == 0
     assert " tick errors 4 (external tick too early or missing)" in " ".join(capsys.readouterr().out.split())
+
+
+LOOP = ["--ppr", "500", "--clock", "10MHz", "--tick", "100us", "--max-speed", "400rad/s"]
+COMMANDS = {
+    "generate": ["generate", *LOOP, "--loop"],
+    "loop": ["loop", *LOOP, "--methods", "s", "--motion", "ramp:0:20rad/s:20ms", "--seeds", "1"],
+}
+ACCEPTED = [["--kp", "0"], ["--velocity-filter", "NONE"], ["--observer", "20Hz"], ["--control-period", "2000clk"]]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("option", ACCEPTED, ids=" ".join)
+def test_accepted(command: str, option: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # An option is accepted before the Verilog is written, which takes most of the time.
+    monkeypatch.setattr("tachometry.hdl.export.files.verilog_of", lambda top, described: "")
+    output = ["-o", tmp_path] if command == "generate" else []
+    assert run(*COMMANDS[command], *option, *output) == 0
+
+
+def test_no_option_of_the_loop_is_one_of_a_method() -> None:
+    """One of the two could not be given."""
+    loop = {about.name for about in options_of(LoopSpec)}
+    assert not loop & {about.name for spec in METHODS.values() for about in options_of(spec)}

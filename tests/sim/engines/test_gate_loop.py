@@ -1,19 +1,15 @@
 """A core with its control loop in gates, about a motor: what it commands is what the golden models say, bit for bit."""
 
-import functools
 from dataclasses import replace
 from fractions import Fraction
 
-import numpy as np
 import pytest
-from loops import KINDS, MOTOR, REAL, check, setting
-from support.nightly import nightly
+from loops import KINDS, REAL, check, setting
 
 from tachometry.sim.encoder.motion import parse_motion
-from tachometry.sim.engines.gate_loop import GateLoop, Through
-from tachometry.sim.engines.loop import Log, Observer
+from tachometry.sim.engines.loop import Observer
 from tachometry.sim.golden.control import Control
-from tachometry.sim.studies.loops.control import Load, Task, edges_of, in_gates
+from tachometry.sim.studies.loops.control import Load, Task, in_gates
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.language.option import ParameterError
 
@@ -33,25 +29,6 @@ SPEC = LoopSpec(
     observer=Fraction(160),
     current_limit=Fraction(8),
 )
-
-
-@functools.cache
-def through_gates() -> tuple[Log, Through]:
-    """Run 0.4 s of a loop, for nightly tests; the last one below holds 80 ms against the golden models."""
-    course = DOUBLE.task.course(MOTOR, 2)
-    return GateLoop(SPEC).run(MOTOR, edges_of(replace(REAL, seed=2)), course, feed_forward=True)
-
-
-@nightly
-def test_the_log_is_that_of_the_ports() -> None:
-    log, through = through_gates()
-    clock = np.round(log["time"] * SPEC.timing.clock_hz).astype(np.int64)
-    last = np.searchsorted(through.currents[:, 0], clock, side="left") - 1
-    shown = last >= 0
-    np.testing.assert_allclose(log["current"][shown], through.currents[last[shown], 1] * float(SPEC.units.amperes))
-    per_lsb = float(SPEC.units.rad_per_s / (1 << SPEC.form.extra_bits))
-    np.testing.assert_allclose(log["y"][shown], through.currents[last[shown], 2] * per_lsb)
-    assert np.abs(log["disturbance"][-400:]).max() > 0.05  # the load
 
 
 def test_the_core_of_a_setting_has_its_gains() -> None:

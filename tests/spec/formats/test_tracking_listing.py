@@ -4,7 +4,6 @@ from collections import Counter
 from dataclasses import replace
 
 import pytest
-from support.nightly import nightly
 from support.tracking import Interpreter, core, windows
 
 from tachometry.sim.golden.methods.track_recursion import Recursion, log2
@@ -149,9 +148,3 @@ def test_two_terms_are_added_at_once(line: str, terms: list[tuple[str, str]]) ->
 def test_what_comes_too_early_waits(listing: str, idle: int) -> None:
     made = assembled(listing, ports=2).instructions
     assert made.count(Instruction()) == idle
-
-
-@nightly
-@pytest.mark.parametrize("seed", range(2, 22))
-def test_more_motions(seed: int) -> None:
-    run(replace(CORES[seed % 4], multiplier=("serial", "block")[seed // 4 % 2]), seed, 4000)

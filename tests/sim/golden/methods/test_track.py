@@ -73,14 +73,6 @@ def test_states_stay_within_their_words(seed: int) -> None:
         assert all(abs(offset) <= spec.form.constants["count"] for offset in state.offsets)
 
 
-@nightly
-@pytest.mark.parametrize("seed", range(10))
-def test_twins_on_more_motions(seed: int) -> None:
-    spec = CORES[[*CORES][seed % len(CORES)]]
-    held = windows(spec, seed, 20_000)
-    assert np.array_equal(compiled(spec, held), track.rows(spec.form, spec.program.lead)(held))
-
-
 @pytest.mark.parametrize("seed", only([1], range(12)))
 def test_the_fine_position_stays_at_an_edge_that_no_count_has_shown(seed: int) -> None:
     """In ticks without a count, on all motions; the place of the edge is the one that was learned."""

@@ -1,22 +1,29 @@
 """Points of a sweep: their rows, and what they are known by."""
 
 import ast
+import asyncio
+import os
 import pickle
 import shutil
+import socket
+import ssl
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
+from distributed import Security
+from distributed.comm import connect
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.imperfections import Bounce
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.tables import held_velocity, velocity_error
-from tachometry.sim.studies.sweeping import sweep
+from tachometry.sim.studies.sweeping import cluster, sweep
 from tachometry.sim.studies.sweeping.sweep import COLUMNS, OtherCode, Point, code_digest, run_packed, run_point
 from tachometry.spec import METHODS, Encoder, MTTachometer, RairanTachometer, Speed, STachometer, Timing
 
@@ -209,3 +216,47 @@ def test_code_that_decides_no_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         assert hardware != before[1], file
         before = golden, hardware
     assert replace(POINT, engine="pysim").digest != POINT.digest
+
+
+def listening() -> list[tuple[str, int]]:
+    """Return addresses at which this process and those that it has started accept connections."""
+    here = psutil.Process(os.getpid())
+    processes = [here, *here.children(recursive=True)]
+    found = [connection for process in processes for connection in process.net_connections("inet")]
+    return [(one.laddr.ip, one.laddr.port) for one in found if one.status == psutil.CONN_LISTEN]
+
+
+def answer(address: tuple[str, int], *, tls: bool) -> bytes:
+    """Return what a stranger is told who asks for a page."""
+    context = ssl.create_default_context()
+    context.check_hostname = False
+    context.verify_mode = ssl.CERT_NONE
+    with socket.create_connection(address) as plain:
+        plain.settimeout(60)
+        try:
+            with context.wrap_socket(plain) if tls else plain as stream:
+                stream.sendall(b"GET /info/main/workers.html HTTP/1.0\r\n\r\n")
+                return stream.recv(1000)
+        except (ssl.SSLError, OSError):
+            return b""
+
+
+def test_the_processes_of_a_sweep_answer_no_stranger() -> None:
+    before = set(listening())
+    with cluster.cluster(None, 1) as client:
+        assert client.submit(sum, [1, 2]).result() == 3
+        opened = [address for address in listening() if address not in before]
+        assert {ip for ip, _ in opened} == {"127.0.0.1"}
+        for address in opened:
+            if page := answer(address, tls=False):  # an HTTP server without a page
+                assert page.startswith(b"HTTP/1.1 404")
+            else:  # TLS, which wants a certificate
+                assert answer(address, tls=True) == b""
+        addresses = [client.scheduler.address, *client.scheduler_info()["workers"]]
+        assert {address.split(":")[0] for address in addresses} == {"tls"}
+        for address in addresses:
+            for security in (Security(), Security.temporary()):
+                place = address if security.tls_ca_file else address.replace("tls:", "tcp:")
+                arguments = security.get_connection_args("client")
+                with pytest.raises((OSError, TypeError)):
+                    asyncio.run(connect(place, timeout=1, **arguments))
