@@ -101,8 +101,8 @@ def test_errors_are_in_1024ths_of_a_period() -> None:
 
 
 def test_jitter_moves_every_edge_and_has_no_mean() -> None:
-    a, _ = edges(replace(STEADY, jitter=63), 4000 * PERIOD)
-    straight, _ = edges(STEADY, 4000 * PERIOD)
+    a, _ = edges(replace(STEADY, jitter=63), 2000 * PERIOD)
+    straight, _ = edges(STEADY, 2000 * PERIOD)
     late = (a - straight) / (PERIOD / 1024)
     assert len(a) == len(straight)
     assert np.abs(late).max() <= 63
@@ -112,8 +112,8 @@ def test_jitter_moves_every_edge_and_has_no_mean() -> None:
 
 
 def test_some_edges_are_dropped() -> None:
-    _, ideal = edges(STEADY, 4000 * PERIOD)
-    _, b = edges(replace(STEADY, drop=64), 4000 * PERIOD)
+    _, ideal = edges(STEADY, 2000 * PERIOD)
+    _, b = edges(replace(STEADY, drop=64), 2000 * PERIOD)
     # Each gap that a dropped edge leaves takes the edge after it, too, if that is not dropped as well.
     lost = 1 - len(b) / len(ideal)
     assert 0.3 < lost < 0.5

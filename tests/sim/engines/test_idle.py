@@ -1,11 +1,13 @@
 """Clocks that CXXRTL skips: every row is that of a simulation which skips none."""
 
+from fractions import Fraction
 from itertools import product
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from support.nightly import only, only_rows
+from support.nightly import nightly, only, only_rows
 
 from tachometry.hdl.arithmetic.idle import IdleCounter
 from tachometry.hdl.core.tachometer import Tachometer
@@ -16,7 +18,7 @@ from tachometry.sim.signals.axes import AxesTrace
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.spec import METHODS, AxesSpec, STachometer, TachometerSpec, of_texts
-from tachometry.spec.control import AnySpec
+from tachometry.spec.control import AnySpec, LoopSpec
 
 
 def turning(distances: list[int], number: int, then: int) -> PinTrace:
@@ -96,6 +98,19 @@ def test_many_axes() -> None:
     distances = ([4000, 8, 12, 16, 20, 24, 28], [9000, 7000, 5], [1000, 20_001], [30_000])
     each = tuple(turning(list(one), 60, 0) for one in distances)
     assert check(AxesSpec(tachometer=axis, axes=4), AxesTrace.of(each)) > 0.8
+
+
+@nightly  # tests/sim/engines/test_gate_loop.py skips clocks of such a core, too
+def test_a_loop_in_gates() -> None:
+    """Its commands change between control ticks."""
+    tachometer = of_texts("s", {"ppr": "16", "clock": "1MHz", "tick": "1ms"})
+    gains = {"position_gain": 1600, "velocity_gain": 80, "observer": 160, "current_limit": 8}
+    spec = LoopSpec(tachometer=tachometer, **{name: Fraction(value) for name, value in gains.items()})  # type: ignore[arg-type]
+    trace = turning([1500, 700, 4000], 300, 0)
+    rng = np.random.default_rng(1)
+    lines = {pin.name: rng.integers(0, 1 << pin.width, len(trace.clock), np.uint64) for pin in spec.ports.pins}
+    played = SimpleNamespace(clock=trace.clock, n_clocks=trace.n_clocks, lines={**lines, **trace.lines})
+    assert check(spec, played) > 0.8
 
 
 def test_a_counter_that_does_not_exist_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

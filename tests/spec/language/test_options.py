@@ -13,6 +13,7 @@ from support.options import had_by
 
 import tachometry.spec
 from tachometry.hdl.export import export
+from tachometry.sim import golden
 from tachometry.sim.studies.pairs import configurations, spec_of
 from tachometry.spec import (
     METHODS,
@@ -44,8 +45,9 @@ def test_parameters_are_given_by_name(made: type) -> None:
 
 
 def test_what_is_described_does_not_change() -> None:
-    """Every dataclass of spec/ is frozen, so it can be kept in a cache and shared by processes."""
-    for module in pkgutil.walk_packages(tachometry.spec.__path__, "tachometry.spec."):
+    """Every dataclass of spec/ and of golden models is frozen, so it can be kept in a cache and shared by processes."""
+    spec, models = (pkgutil.walk_packages(one.__path__, f"{one.__name__}.") for one in (tachometry.spec, golden))
+    for module in (*spec, *models):
         for name, made in vars(importlib.import_module(module.name)).items():
             params = getattr(made, "__dataclass_params__", None)
             assert params is None or params.frozen, name
