@@ -100,7 +100,7 @@ upset: $(VENV)/.test ## flip-flops upset at random, and how long that is seen, w
 mutate: $(VENV)/.test icarus ## how many wrong cores the tests notice, written to docs/measured/mutation.md
 	PYTHONPATH=tests $(BIN)/python -m proofs.mutation -o docs/measured/mutation.md
 
-bench: $(VENV)/.test ## speed of the golden models, of the engines and of sweeps, written to docs/measured/bench.md and sweep.md
+bench: $(VENV)/.test ## speed of the golden models, of the engines and of the tests, errors of sweeps, written to docs/measured/bench.md and sweep.md
 	$(BIN)/python bench/engines.py
 	$(BIN)/python bench/sweep.py
 

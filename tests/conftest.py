@@ -30,7 +30,8 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Tell how long the tests of each folder took."""
     seconds: Counter[str] = Counter()
     for report in (report for reports in terminalreporter.stats.values() for report in reports):
-        seconds[getattr(report, "nodeid", "").removeprefix("tests/").split("/")[0]] += getattr(report, "duration", 0)
+        folder = getattr(report, "nodeid", "").partition("::")[0].removeprefix("tests/").split("/")[0]
+        seconds[folder if "." not in folder else "others"] += getattr(report, "duration", 0)
     told = (f"{folder} {time:.0f}" for folder, time in seconds.most_common(12) if time >= 1)
     terminalreporter.write_line(f"seconds: {', '.join(told)}")
 

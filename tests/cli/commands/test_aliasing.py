@@ -8,7 +8,6 @@ import pytest
 from support.command import run
 
 from tachometry.sim.signals.recording import Recording, quadrature
-from tachometry.spec import of_texts
 
 SLOW = "--ppr 500 --clock 20kHz --tick 1ms --engine pysim".split()
 
@@ -67,16 +66,3 @@ def test_times_that_are_stretched_are_told(command: str, tmp_path: Path, capsys:
         described = json.loads((tmp_path / "tachometer.json").read_text())
         assert (described["min_time_cycles"], described["max_time_cycles"]) == (21, 22)
         assert described["parameters"]["min_time"] == 21
-
-
-def test_nothing_is_stretched_without_need() -> None:
-    for method in ("t", "mt"):
-        spec = of_texts(method, {"ppr": "500"})
-        assert spec.words.notes == ()
-        assert spec.times.longest == 480_000
-
-
-def test_the_t_method_on_the_lattice_is_as_wide_as_one_count() -> None:
-    spec = of_texts("t", {"ppr": "500", "timer": "tick"})
-    assert spec.velocity.width == 16 + 2
-    assert spec.velocity.full_scale == 1 << 16

@@ -12,7 +12,6 @@ from support.captures import make_sr
 from support.command import run
 from support.formats import FORMATS, QUARTERS
 
-from tachometry.sim.captures.sigrok import write_sr
 from tachometry.sim.captures.text import write_csv
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
@@ -160,11 +159,6 @@ def test_the_guide(
     said = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
     assert f"counts out {QUARTERS}" in said
     assert "errors flagged 0" in said
-
-
-def test_samplerate(tmp_path: Path) -> None:
-    write_sr(tmp_path / "c.sr", recorded().place(20_000), 20_000)
-    assert run("replay", tmp_path / "c.sr", *CORE, "--samplerate", "20kHz") == 0
 
 
 def test_a_real_shaft_loses_no_count(

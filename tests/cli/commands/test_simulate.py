@@ -181,16 +181,6 @@ def test_overflow_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert "faster than --max-speed" in summary(capsys.readouterr().out)["overflow"]
 
 
-@pytest.mark.parametrize("suffix", [".png", ".pdf"])
-def test_plots(suffix: str, tmp_path: Path) -> None:
-    for name in ("one", "two"):
-        assert run("simulate", *CORE, "--motion", "ramp:0:20rad/s:50ms", "--plot", tmp_path / f"{name}{suffix}") == 0
-    one, two = (tmp_path / f"{name}{suffix}" for name in ("one", "two"))
-    assert one.read_bytes() == two.read_bytes()
-    assert b"matplotlib v" not in one.read_bytes().lower()
-    assert one.read_bytes()[:5] in (b"\x89PNG\r", b"%PDF-")
-
-
 def test_equal_options_give_equal_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     options = ["simulate", *CORE, "--motion", "ramp:0:20rad/s:100ms", "--jitter", "0.1", "--vibration", "1mrad:50Hz"]
     for name in ("one", "two"):
@@ -206,13 +196,6 @@ def test_equal_options_give_equal_files(tmp_path: Path, capsys: pytest.CaptureFi
     )
     assert done.stdout == out[: len(out) // 2]
     assert contents(tmp_path / "one") == contents(tmp_path / "two") == contents(tmp_path / "three")
-
-
-def test_another_seed_gives_another_trace(tmp_path: Path) -> None:
-    for seed in "01":
-        options = ["--motion", "constant:20rad/s:100ms", "--jitter", "0.3", "--seed", seed]
-        assert run("simulate", *CORE, *options, "--save-capture", tmp_path / f"{seed}.sr") == 0
-    assert (tmp_path / "0.sr").read_bytes() != (tmp_path / "1.sr").read_bytes()
 
 
 def test_a_mismatch_fails_but_leaves_the_outputs(
