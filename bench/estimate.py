@@ -1,8 +1,9 @@
 """Fits the estimates of cells and greatest clock that commands print, and measures how far off they are.
 
-The fit is to the cores of docs/measured/size.md, so `make size` comes first. It is measured at random cores, which are
-synthesised, packed and routed with three seeds, and kept: a second run repeats only what depends on changed Verilog or
-tools. It writes sim/studies/estimate.json and docs/measured/estimate.md.
+The fit is to the cores of docs/measured/size.md, so `make size` comes first; Gowin, which it lacks, is fitted to random
+cores. It is measured at other random cores, which are synthesised, packed and routed with three seeds, and kept: a
+second run repeats only what depends on changed Verilog or tools. It writes sim/studies/estimate.json and
+docs/measured/estimate.md.
 """
 
 import argparse
@@ -10,6 +11,7 @@ import json
 import random
 import statistics
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from math import log
 from typing import Any
 
@@ -45,12 +47,11 @@ def draw(chance: random.Random) -> tuple[AnySpec, Bus | None, str]:
     bus = chance.choice(["none"] * 7 + [*BUSES])
     axes = chance.choice([1] * 9 + [2, 4, 8]) if method in ("s", "track") else 1
     has_loop = axes == 1 and chance.random() < 0.07
-    tachometer = of_texts(method, texts)
-    core: Any = tachometer
+    core: Any = of_texts(method, texts)
     if axes > 1:
-        core = with_axes(tachometer, axes, parallel=bus != "none")
+        core = with_axes(core, axes, parallel=bus != "none")
     elif has_loop:
-        core = LoopSpec(tachometer=tachometer)
+        core = LoopSpec(tachometer=core)
     ports_on(core, bus_of(bus))
     more = {"bus": bus, "axes": str(axes), "loop": "yes" if has_loop else "no"}
     shown = {"method": method} | texts | {name: text for name, text in more.items() if text not in ("none", "1", "no")}
@@ -61,44 +62,48 @@ def random_cores(number: int) -> Iterator[tuple[AnySpec, Bus | None, str]]:
     """Yield random cores, the same in every run."""
     chance = random.Random(_DATA["seed"])
     while number:
-        try:
+        with suppress(ValueError):  # options that do not go together
             yield draw(chance)
             number -= 1
-        except ValueError:  # options that do not go together
-            continue
 
 
 def known(family: str) -> list[tuple[Mapped, Mapping[str, float]]]:
     """Return the cores of docs/measured/size.md in tables, with their figures, but for cores changed since."""
-    rows = kept(SIZES.read_text(encoding="utf-8"), versions())
-    found = []
+    every, target = kept(SIZES.read_text(encoding="utf-8"), versions()), FAMILIES[family].target
+    rows = {name: row for (name, device), row in every.items() if TARGETS[device] is target}
+    found = [(mapped(spec, bus, family), figures) for spec, bus, _, figures in drawn(family, "fitted")]
     for one in CONFIGURATIONS:
-        row = rows.get((one.name, FAMILIES[family].target))
-        if row is None or one.demo or one.after:
+        if (row := rows.get(one.name)) is None or one.demo or one.after:
             continue
         here = estimate.flip_flops(mapped(one.spec, bus_of(one.bus), "ecp5"))
-        if (name := (one.name, "ECP5")) in rows and rows[name].figures["FF"] == here:
+        if (name := (one.name, "ECP5")) in every and every[name].figures["FF"] == here:
             found.append((mapped(one.spec, bus_of(one.bus), family), row.figures))
     return found
 
 
-def cells_of(figures: Mapping[str, float]) -> float:
-    """Return logic cells, as the family counts them."""
-    return figures.get("COMB", figures.get("LC", 0))
+def drawn(family: str, part: str) -> Iterator[tuple[AnySpec, Bus | None, str, Mapping[str, float]]]:
+    """Yield the random cores of a family that are compared, or that have a part in its fit, with their figures."""
+    target, numbers = FAMILIES[family].target, DRAWN[family]
+    tools, first = versions(target.route[0]), 0 if part == "cores" else numbers["cores"]
+    for at, (spec, bus, text) in enumerate(random_cores(first + numbers.get(part, 0))):
+        if at >= first:
+            verilog = export(spec, CORE, bus.name if bus else "none")[f"{CORE}.v"]
+            seeds = range(1, 4) if at < numbers["routed"] else ()
+            yield spec, bus, text, measure_core(spec, target, verilog, tools, ports_on(spec, bus), [*seeds]).figures
 
 
 def fit(family: str) -> dict[str, list[float]]:
     """Return weights of cells, least squares of the relative error, and times whose periods are the nearest."""
     rows = known(family)
-    counted = np.array([[each / cells_of(figures) for each in features(core, family)] for core, figures in rows])
+    cells = [next(iter(figures.values())) for _, figures in rows]
+    counted = np.array([features(core, family) for core, _ in rows]) / np.array(cells)[:, None]
     weights = np.linalg.lstsq(counted, np.ones(len(rows)), rcond=None)[0]
     routed = [(core, 1000 / figures["Fmax"]) for core, figures in rows if figures.get("Fmax")]
 
     def error(times: Sequence[float]) -> float:
         return sum(log(Timing(*times).period(core) / period) ** 2 for core, period in routed)
 
-    times: list[float] = [*DRAWN[family]["start"]]
-    least = error(times)
+    least = error(times := [*DRAWN[family]["start"]])
     for step in (1.3, 1.1):
         for at in range(len(times)):
             for factor in (step, 1 / step):
@@ -109,15 +114,12 @@ def fit(family: str) -> dict[str, list[float]]:
 
 
 def measured(family: str) -> list[tuple[str, float, float, float, float]]:
-    """Return random cores: options, cells and MHz that nextpnr reaches, and those estimated; MHz 0 where not routed."""
-    tools, drawn = versions(), DRAWN[family]
+    """Return random cores: options, cells that nextpnr packs and those estimated, MHz and those estimated, or 0."""
     rows = []
-    for at, (spec, bus, text) in enumerate(random_cores(drawn["cores"])):
-        verilog = export(spec, CORE, bus.name if bus else "none")[f"{CORE}.v"]
-        target, seeds = TARGETS[FAMILIES[family].target], range(1, 4) if at < drawn["routed"] else ()
-        figures = measure_core(spec, target, verilog, tools, ports_on(spec, bus), [*seeds]).figures
-        found = estimate.Estimate.of(spec, bus, family)
-        rows.append((text, cells_of(figures), figures.get("Fmax", 0), float(found.cells), found.clock_hz / 1e6))
+    for spec, bus, text, figures in drawn(family, "cores"):
+        found, (cells, *_), clock = estimate.Estimate.of(spec, bus, family), figures.values(), figures.get("Fmax", 0)
+        guess = found.clock_hz / 1e6 if clock or FAMILIES[family].timed else 0
+        rows.append((text, cells, float(found.cells), clock, guess))
     return rows
 
 
@@ -128,18 +130,16 @@ def page(found: Mapping[str, Sequence[tuple[str, float, float, float, float]]]) 
         off = sorted(abs(guess / real - 1) for real, guess in pairs if real)
         return [str(len(off)), f"{statistics.median(off):.1%}", f"{off[-1]:.1%}"] if off else ["0", "", ""]
 
-    heads = ("family", "cores", "median, cells", "worst, cells", "routed", "median, MHz", "worst, MHz")
     columns = ("core", "cells", "estimated", "MHz", "estimated MHz")
+    heads = ("family", "cores", "median, cells", "worst, cells", "routed", "median, MHz", "worst, MHz")
     rows, cores = [], ""
     for name, each in found.items():
-        title, device = FAMILIES[name].title, TARGETS[FAMILIES[name].target].device
-        rows.append([title, *spread([(r[1], r[3]) for r in each]), *spread([(r[2], r[4]) for r in each])])
-        lines = [
-            [text, f"{cells:.0f}", f"{guess:.0f}", f"{clock:.0f}" if clock else "", f"{guessed:.0f}"]
-            for text, cells, clock, guess, guessed in each
-        ]
-        cores += f"\n## {title} ({device})\n\n{markdown(columns, lines)}"
-    return filled("estimate.md", used=used(versions()), summary=markdown(heads, rows), cores=cores)
+        about = FAMILIES[name]
+        rows.append([about.title, *spread([(r[1], r[2]) for r in each]), *spread([(r[3], r[4]) for r in each])])
+        lines = [[text, *(f"{value:.0f}" if value else "" for value in values)] for text, *values in each]
+        cores += f"\n## {about.title} ({about.target.device})\n\n{markdown(columns, lines)}"
+    tools = used(versions(*(FAMILIES[name].target.route[0] for name in found)))
+    return filled("estimate.md", used=tools, summary=markdown(heads, rows), cores=cores)
 
 
 def main() -> None:
@@ -150,7 +150,7 @@ def main() -> None:
     options = parser.parse_args()
     if not options.keep:
         estimate.FITTED.update({family: fit(family) for family in options.families})
-        write(FITTED, json.dumps(estimate.FITTED, indent=1) + "\n")
+        write(FITTED, json.dumps(estimate.FITTED).replace('}, "', '},\n "') + "\n")
     write(PAGE, page({family: measured(family) for family in options.families}))
     stamp(PAGE)
 

@@ -43,7 +43,7 @@ from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES
 from tachometry.sim.studies.comparing.comparison import Source, comparison
 from tachometry.sim.studies.estimate import FAMILIES
 from tachometry.sim.studies.plan import Plan, Plans, cells_of, default_range
-from tachometry.sim.studies.size import CORE, SEEDS, TARGETS, measure_core, versions
+from tachometry.sim.studies.size import CORE, SEEDS, measure_core, versions
 from tachometry.sim.theory.performance import REAL_DISC
 from tachometry.spec import METHODS, TachometerSpec, Timing, methods_with, of_texts
 from tachometry.spec.language.option import ParameterError, options_of
@@ -254,10 +254,10 @@ def size(options: Texts) -> Answer:
 
     def of(asked: Asked) -> Answer:
         try:
-            tools = versions()
+            target = FAMILIES[asked.family].target
             verilog = replace(asked, name=CORE).texts()[f"{CORE}.v"]
             ports = ports_on(asked.spec, asked.on)
-            found = measure_core(asked.spec, TARGETS[FAMILIES[asked.family].target], verilog, tools, ports, SEEDS[:3])
+            found = measure_core(asked.spec, target, verilog, versions(target.route[0]), ports, SEEDS[:3])
         except RuntimeError as error:
             raise click.ClickException(f"the size cannot be measured: {error}") from error
         figures = {name: f"{value:.0f}" for name, value in found.figures.items() if value and name != "latency"}

@@ -125,9 +125,10 @@ def advice(plans: Plans) -> list[tuple[str, str]]:
 
 def size_rows(found: Estimate) -> list[tuple[str, str]]:
     """Return rows of the estimated cells and greatest clock, and a warning if the clock of the core is above it."""
-    rows = [("cells", f"about {found.cells:,}, with {found.flip_flops:,} flip-flops ({found.title})")]
-    if FAMILIES[found.family].timed:
-        clock = f"about {found.clock_hz / 1e6:.0f} MHz ({found.title}); seeds of the router differ by {SPREAD:.0%}"
+    family = FAMILIES[found.family]
+    rows = [("cells", f"about {found.cells:,}, with {found.flip_flops:,} flip-flops ({family.title})")]
+    if family.timed:
+        clock = f"about {found.clock_hz / 1e6:.0f} MHz ({family.title}); seeds of the router differ by {SPREAD:.0%}"
         rows.append(("greatest clock", clock))
     if found.is_too_slow:
         remedy = "take a lower --clock, or route it with several seeds"

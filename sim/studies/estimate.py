@@ -10,7 +10,8 @@ from importlib.resources import files
 from math import log2
 from typing import Any, NamedTuple
 
-from tachometry.sim.studies.mapping import ECP5, ICE40, Fabric, Logic, Mapped
+from tachometry.sim.studies import size
+from tachometry.sim.studies.mapping import ECP5, GOWIN, ICE40, Fabric, Logic, Mapped
 from tachometry.spec import TachometerSpec, TrackTachometer
 from tachometry.spec.control import AnySpec
 from tachometry.spec.registers.buses import Bus
@@ -24,7 +25,7 @@ class Family:
     """A family of FPGAs: what it is called, and what its cells are made of."""
 
     title: str
-    target: str  # its device in `sim.studies.size.TARGETS`
+    target: size.Target  # where it is measured
     fabric: Fabric
     factor: int  # greatest factor of its multipliers, in bits; 0: it has none
     packs: bool  # a flip-flop whose data no table makes takes a cell
@@ -32,9 +33,10 @@ class Family:
 
 
 FAMILIES = {
-    "ecp5": Family("ECP5", "ECP5", ECP5, 18, packs=False, timed=True),
-    "ice40hx": Family("iCE40 HX", "HX8K", ICE40, 0, packs=True, timed=False),
-    "ice40up": Family("iCE40 UltraPlus", "UP5K", ICE40, 16, packs=True, timed=False),
+    "ecp5": Family("ECP5", size.TARGETS["ECP5"], ECP5, 18, packs=False, timed=True),
+    "ice40hx": Family("iCE40 HX", size.TARGETS["HX8K"], ICE40, 0, packs=True, timed=False),
+    "ice40up": Family("iCE40 UltraPlus", size.TARGETS["UP5K"], ICE40, 16, packs=True, timed=False),
+    "gowin": Family("Gowin GW1N", size.GOWIN, GOWIN, 18, packs=False, timed=False),
 }
 
 
@@ -90,7 +92,8 @@ def features(core: Mapped, family: str) -> Sequence[int]:
 
 def flip_flops(core: Mapped) -> int:
     """Return flip-flops of a core, with those that read lookup tables."""
-    read = sum(bits for _, bits in core.logic.small) if core.logic.fabric.writes else 0
+    fabric, small = core.logic.fabric, core.logic.small
+    read = sum(bits + round(-(-words // 16) * bits * fabric.bypass) for words, bits in small if fabric.writes)
     return len(core.logic.flip_flops) + read
 
 
@@ -104,11 +107,6 @@ class Estimate:
     clock_hz: float  # the greatest
     wanted_hz: int  # that of --clock
     remedy: tuple[str, float] | None = None  # options with which the core reaches the clock, and what it reaches
-
-    @property
-    def title(self) -> str:
-        """The name of the family."""
-        return FAMILIES[self.family].title
 
     @property
     def is_too_slow(self) -> bool:

