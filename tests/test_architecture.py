@@ -309,7 +309,7 @@ CEILING: dict[str, tuple[int, Callable[[], Counter[str]]]] = {
     "lines of Python of the product": (47160, lambda: lines(*PRODUCT)),
     "lines of Python of the tests": (41611, lambda: lines("tests")),
     "lines of Python of the benchmarks": (3140, lambda: lines("bench")),
-    "functions over 40 lines": (45, lambda: every(is_long, *PRODUCT)),
+    "functions over 40 lines": (44, lambda: every(is_long, *PRODUCT)),
     "functions with more than 6 parameters": (30, lambda: every(has_many_parameters, *PRODUCT)),
     "getattr and hasattr in hdl": (36, lambda: every(lambda node: calls(node, "getattr", "hasattr"), "hdl")),
     "places that tell kinds of core apart": (22, lambda: every(tells_kinds_apart, *PRODUCT)),

@@ -20,6 +20,15 @@ class Unplugged(OSError):
         self.why = why
 
 
+def pyserial() -> Any:
+    """Return the module that opens serial ports; OSError if it is not installed."""
+    try:
+        import serial
+    except ImportError as error:
+        raise OSError("serial ports need pyserial: pip install 'tachometry[host]'") from error
+    return serial
+
+
 class SerialPort:
     """Opens a serial port, such as `/dev/ttyUSB1` or `COM5`, that nobody else uses; it is a context manager.
 
@@ -28,11 +37,7 @@ class SerialPort:
     """
 
     def __init__(self, name: str, baud: int) -> None:
-        try:
-            import serial
-        except ImportError as error:
-            raise OSError("serial ports need pyserial: pip install 'tachometry[host]'") from error
-        self.name = name
+        self.name, serial = name, pyserial()
         try:
             with _told(name, opens=True):
                 self._port: Any = serial.Serial(name, baud, timeout=_WAIT, write_timeout=1.0, exclusive=True)

@@ -20,6 +20,7 @@ from tachometry.boards.monitor.emulator_settings import emulator_settings
 from tachometry.boards.monitor.recorder import Recorder
 from tachometry.boards.monitor.selftest import selftest as run_selftest
 from tachometry.boards.monitor.selftest import steps
+from tachometry.boards.monitor.serial_port import pyserial
 from tachometry.boards.monitor.session import Session, connected
 from tachometry.boards.monitor.watch import State, watch
 from tachometry.cli.files import Outputs
@@ -140,6 +141,7 @@ def monitor(
     target = target_of(port, core, manifest)
     if serve is not None:
         return _serve(target, serve, seconds)
+    pyserial()  # before a simulated board is compiled
     if selftest:
         return _selftest(target)
     settings = emulator_settings(target.registers.spec, words)
