@@ -47,7 +47,7 @@ ALLOWED = {
         "hdl/wires",
         "spec",
     },
-    "hdl/export": {"hdl/core", "spec"},
+    "hdl/export": {"hdl/core", "hdl/wires", "spec"},
     "sim": {"sim/signals", "spec"},
     "sim/signals": {"spec"},
     "sim/encoder": {"sim/signals", "spec"},
@@ -306,7 +306,7 @@ def has_a_broken_docstring(node: ast.AST) -> bool:
 
 # What may only fall, with the rule by which it is counted. A change that brings a capability raises lines alone.
 CEILING: dict[str, tuple[int, Callable[[], Counter[str]]]] = {
-    "lines of Python of the product": (47160, lambda: lines(*PRODUCT)),
+    "lines of Python of the product": (48740, lambda: lines(*PRODUCT)),
     "lines of Python of the tests": (41611, lambda: lines("tests")),
     "lines of Python of the benchmarks": (3140, lambda: lines("bench")),
     "functions over 40 lines": (44, lambda: every(is_long, *PRODUCT)),

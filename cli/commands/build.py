@@ -19,7 +19,7 @@ from tachometry.cli.reports.build import print_build
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.registers.buses import BUSES, bus_of
-from tachometry.spec.registers.demo import demo_map
+from tachometry.spec.registers.demo import demo_map, demo_ports
 from tachometry.spec.registers.manifest import check_module_name
 
 if TYPE_CHECKING:  # Amaranth is slow to import, and --help does not need it
@@ -104,7 +104,7 @@ def build(
         with activity() as say:
             built = builder.build(core, board, say)
             say("writing Verilog")
-            verilog = verilog_of(component(spec, on), manifest)
+            verilog = verilog_of(component(spec, on), manifest, demo_ports(demo_map(spec), on))
         manifest["board"] |= _made(board, name, built)
         outputs[suffix].write_bytes(built.content)
         outputs[".json"].write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8", newline="\n")

@@ -20,11 +20,11 @@ from tachometry.cli.reports.core import core_rows, size_rows
 from tachometry.cli.reports.loop import loop_rows
 from tachometry.cli.reports.run import print_warnings
 from tachometry.cli.reports.terminal import print_rows
-from tachometry.hdl.export import export
 from tachometry.hdl.export.ci import HOSTS, ci_files
-from tachometry.hdl.export.files import CORE_FILES, file_names, manifest_of, recorded
+from tachometry.hdl.export.files import CORE_FILES, core_files, file_names, manifest_of, recorded
 from tachometry.hdl.export.registers.files import REGISTER_FILES
 from tachometry.hdl.export.targets.target import TARGETS, bus_for
+from tachometry.hdl.export.verilog import WRITERS
 from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.studies.estimate import Estimate
 from tachometry.sim.testbench.check import left_files
@@ -63,7 +63,7 @@ class Asked:
     spec: AnySpec
     # name, bus, baud, target and irq: see `hdl.export.export`
     name: str
-    # testbench and ci: what is written beside the core
+    # testbench and ci: what is written beside the core; writer: of the Verilog
     testbench: str | None
     bus: str
     baud: int | None
@@ -71,6 +71,7 @@ class Asked:
     target: str
     irq: bool
     ci: str | None
+    writer: str
     record: Callable[..., Encoding] | None  # gives what an encoder records of the motion of the testbench
     tables: list[Path]  # the files that the motion reads
 
@@ -95,9 +96,10 @@ class Asked:
     def texts(self) -> dict[str, str]:
         """Return all files by their names."""
         bench = {} if self.testbench is None else _bench(self.spec, self.name, self.record)
-        texts = export(self.spec, self.name, self.bus, self.baud, self.target, self.irq)
+        texts = core_files(self.spec, self.name, self.on, self.target, self.writer)
         jobs = {file: text for file, text in ci_files(self.name).items() if file == f"{self.name}_{self.ci}.yml"}
-        return recorded(texts | bench | jobs, self.name, self.target, self.testbench or "none", self.ci or "none")
+        asked = self.target, self.testbench or "none", self.ci or "none", self.writer
+        return recorded(texts | bench | jobs, self.name, *asked)
 
     @property
     def size(self) -> list[tuple[str, str]]:
@@ -133,6 +135,13 @@ ASKED = Group(
         BUS,
         BAUD,
         FAMILY,
+        option(
+            "Files",
+            "--writer",
+            type=click.Choice(WRITERS, case_sensitive=False),
+            default=WRITERS[0],
+            help="What writes the Verilog; yosys: Amaranth's Yosys, with more names and no comments.",
+        ),
         option(
             "Files",
             "--irq",

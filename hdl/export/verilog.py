@@ -4,7 +4,7 @@ import json
 import os
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -12,8 +12,12 @@ from amaranth.back import rtlil, verilog
 from amaranth.back.verilog import YosysError
 from amaranth.lib import wiring
 
+from tachometry.hdl.export.modules import write
 from tachometry.hdl.export.render import render
+from tachometry.spec.language.port import Port
 from tachometry.spec.language.tools import complaint
+
+WRITERS = ("tachometry", "yosys")
 
 # Yosys wakes `always @*` by giving a register its value; SystemVerilog does that too early where it is declared.
 _WAKE = re.compile(r"^(  reg) (\\\$auto\$\S+)  = 0;$", re.MULTILINE)
@@ -60,13 +64,30 @@ def bundled_yosys() -> Iterator[None]:
             os.environ["AMARANTH_USE_YOSYS"] = before
 
 
-def verilog_of(top: wiring.Component, described: Mapping[str, Any]) -> str:
-    """Return the text of a module; its manifest says its name, and what is said above it."""
+def verilog_of(
+    top: wiring.Component, described: Mapping[str, Any], ports: Iterable[Port] = (), writer: str = WRITERS[0]
+) -> str:
+    """Return the text of a module.
+
+    Parameters
+    ----------
+    described : mapping
+        Its manifest, which gives its name and the lines above it.
+    ports : iterable of Port
+        The order and the comments of its ports.
+    writer : str
+        One of `WRITERS`.
+    """
     name = described["module"]
+    text = yosys_text(top, name) if writer == "yosys" else write(top, name, ports).text
+    return render("NAME.v", **described, name=name, writer=writer, verilog=text.removesuffix("\n"))
+
+
+def yosys_text(top: wiring.Component, name: str) -> str:
+    """Return the text of a module as Yosys writes it, with Amaranth's names."""
     with bundled_yosys():
         text = verilog.convert(top, name=name, emit_src=False)
-    text = _LED.sub(r"port_\1_\2 ", _WAKE.sub(r"\1 \2 ;\n  initial \2 = 0;", text))
-    return render("NAME.v", **described, name=name, verilog=text.removesuffix("\n"))
+    return _LED.sub(r"port_\1_\2 ", _WAKE.sub(r"\1 \2 ;\n  initial \2 = 0;", text))
 
 
 def netlist_of(top: wiring.Component) -> dict[str, Any]:

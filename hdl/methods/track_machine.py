@@ -13,6 +13,7 @@ from tachometry.hdl.arithmetic.idle import Idle, IdleBox
 from tachometry.hdl.front_end.sampling_clock import state_after, states_of
 from tachometry.hdl.methods.block_unit import BlockUnit
 from tachometry.hdl.methods.serial_unit import SerialUnit
+from tachometry.hdl.wires.commented_memory import CommentedMemory
 from tachometry.hdl.wires.ports import by_name
 from tachometry.spec.formats.tracking import PLACE_BITS, WIDTH
 from tachometry.spec.formats.tracking_code import (
@@ -132,11 +133,11 @@ class TrackMachine(wiring.Component):
         self._layout = layout = _layout(program)
         # Nothing needs them to be in order, so a shift register with feedback takes the place of a counter.
         self._states = at = states_of(len(program.code.instructions).bit_length())
-        codes = {
-            place: _encoded(program, one, layout, at) for place, one in zip(at, program.code.instructions, strict=False)
-        }
-        depth = len(at) + 1
-        self._rom = Memory(shape=layout.size, depth=depth, init=[codes.get(place, 0) for place in range(depth)])
+        code = dict(zip(at, enumerate(program.code.instructions), strict=False))
+        places = [code.get(place) for place in range(len(at) + 1)]
+        texts = [f"{one[0]}: {one[1].text}" if one else "" for one in places]
+        words = [_encoded(program, one[1], layout, at) if one else 0 for one in places]
+        self._rom = CommentedMemory(texts, shape=layout.size, depth=len(places), init=words)
         self._words = Memory(
             shape=signed(WIDTH),
             depth=1 << ((len(self._axes) - 1).bit_length() + ADDRESS_BITS),

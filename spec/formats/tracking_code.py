@@ -73,6 +73,19 @@ class Instruction:
         """The words that it reads."""
         return tuple(word for word in (self.first, self.word) if word and word[0] not in "$~")
 
+    @property
+    def text(self) -> str:
+        """The instruction as a comment: its sum, what it begins and gives out, and where the program goes on."""
+        left = {Left.ZERO: self.first, Left.LEAST: "min(sum, 0)", Left.MOST: "max(sum, 0)", Left.SUM: "sum"}[self.left]
+        right = f"{'s' * self.by_sign}{'+-'[self.subtract]} {self.word}" if self.word else ""
+        total = f"{left} {right}".strip().removeprefix("+ ") or "0"
+        parts = [f"{self.store} = {total}" if self.store else total, "keep" * self.keep]
+        parts += [f"begin {self.start.name.lower()} {self.how}".rstrip()] if self.start else []
+        parts += [f"out {self.output}"] if self.output else []
+        test = {Jump.NEVER: "", Jump.ALWAYS: "", Jump.END: "end"}.get(self.jump, f"if {self.jump.name.lower()}")
+        parts.append(f"{test} goto {self.target}".strip() if self.target else test)
+        return "; ".join(part for part in parts if part)
+
 
 def _chain(words: list[str]) -> list[Instruction]:
     """Return the instructions of a line of the listing."""

@@ -8,7 +8,7 @@ from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import Port
 
 _OF_PORTS = ("name", "direction", "width", "signed")
-_KEYWORDS = frozenset(
+KEYWORDS = frozenset(
     """
     always and assign automatic begin buf bufif0 bufif1 case casex casez cell cmos config deassign default defparam
     design disable edge else end endcase endconfig endfunction endgenerate endmodule endprimitive endspecify endtable
@@ -50,7 +50,7 @@ def check_module_name(name: str) -> str:
     It raises ValueError if it is no plain identifier, or a keyword of Verilog or of SystemVerilog, in which the smoke
     test is written.
     """
-    if name in _KEYWORDS:
+    if name in KEYWORDS:
         raise ParameterError("name", f"must not be a Verilog keyword, which {name!r} is")
     if name.casefold() in _OF_OTHERS:
         raise ParameterError("name", f"must not be a word of VHDL or a device of Windows, which {name!r} is")

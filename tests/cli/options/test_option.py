@@ -49,7 +49,7 @@ ACCEPTED = [["--kp", "0"], ["--velocity-filter", "NONE"], ["--observer", "20Hz"]
 @pytest.mark.parametrize("option", ACCEPTED, ids=" ".join)
 def test_accepted(command: str, option: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # An option is accepted before the Verilog is written, which takes most of the time.
-    monkeypatch.setattr("tachometry.hdl.export.files.verilog_of", lambda top, described: "")
+    monkeypatch.setattr("tachometry.hdl.export.files.verilog_of", lambda *_: "")
     output = ["-o", tmp_path] if command == "generate" else []
     assert run(*COMMANDS[command], *option, *output) == 0
 

@@ -107,14 +107,14 @@ def test_the_smoke_test_fails_on_a_wrong_core(tmp_path: Path) -> None:
 
 def flip_flops(verilog: str) -> dict[str, str]:
     """Return paths of the synchronisers' flip-flops from the top, with a slash, and their attributes."""
-    modules = dict(re.findall(r"^module (\S+?) ?\(.*?$(.*?)^endmodule", verilog, re.MULTILINE | re.DOTALL))
+    modules = dict(re.findall(r"^module (\w+) \($(.*?)^endmodule", verilog, re.MULTILINE | re.DOTALL))
 
     def below(module: str, path: str) -> dict[str, str]:
         text = modules[module]
         found: dict[str, str] = {}
-        for attributes, name in re.findall(r"((?:^  \(\*.*\*\)\n)*)^  (?:output|reg) (stage\d)\b", text, re.MULTILINE):
+        for attributes, name in re.findall(r"(\(\*.*\*\))\s(?: +output +)?reg +(stage\d)\b", text):
             found[path + name] = found.get(path + name, "") + attributes
-        for inner, name in re.findall(r"^  (\\\S+|\w+) +(\w+) \(", text, re.MULTILINE):
+        for inner, name in re.findall(r"^    (\w+) (\w+) \($", text, re.MULTILINE):
             found |= below(inner, f"{path}{name}/") if inner in modules else {}
         return found
 

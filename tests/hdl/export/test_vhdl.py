@@ -26,6 +26,9 @@ CORES = {
 }
 
 
+PORT = r"^    (input|output) +(?:reg|wire) +(?:\[(\d+):0\] +)?(\w+)"
+
+
 def made(core: str, name: str) -> dict[str, str]:
     texts, bus = CORES[core]
     if "axes" in texts or "loop" in texts:
@@ -35,8 +38,8 @@ def made(core: str, name: str) -> dict[str, str]:
 
 def ports_of(files: dict[str, str], name: str) -> dict[str, tuple[str, str]]:
     """Return direction and type of each port: bits of the Verilog, and signs of the manifest."""
-    (top,) = re.findall(rf"^module \\?{re.escape(name)} ?\(.*?^endmodule", files[f"{name}.v"], re.MULTILINE | re.DOTALL)
-    found = re.findall(r"^  (input|output) (?:\[(\d+):0\] )?(\w+);", top, re.MULTILINE)
+    (top,) = re.findall(rf"^module {name} \($.*?^\);", files[f"{name}.v"], re.MULTILINE | re.DOTALL)
+    found = re.findall(PORT, top, re.MULTILINE)
     signs = {port["name"]: port["signed"] for port in json.loads(files[f"{name}.json"])["ports"]}
     assert {port for *_, port in found} == signs.keys()
     return {

@@ -201,7 +201,7 @@ def test_options_say_which_core_it_is(method: str) -> None:
 @pytest.mark.parametrize("bus", ["none", *BUSES])
 def test_a_manifest_says_which_core_it_is(bus: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # The manifest is made without the Verilog, which takes a second a core.
-    monkeypatch.setattr("tachometry.hdl.export.files.verilog_of", lambda top, described: "")
+    monkeypatch.setattr("tachometry.hdl.export.files.verilog_of", lambda *_: "")
     core = of_texts("s", PPR | {"max-speed": "7000rpm", "tick": "0.1ms", "clock": "30MHz", "max-time": "3ms"})
     assert isinstance(core, STachometer)
     cores: list[AnySpec] = [
