@@ -3,7 +3,6 @@
 import json
 import re
 import shutil
-import subprocess
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tachometry.sim.signals.temporary import run_tool, scratch
+from tachometry.sim.testbench.proof import differences
 from tachometry.sim.testbench.vectors import cocotb_bench
 from tachometry.spec import of_manifest
 from tachometry.spec.control import AnySpec
@@ -27,29 +27,7 @@ SAME, EQUIVALENT, DIFFERENT, MISSING, LEFT = (
     "of an earlier core: remove it",
 )
 
-_LONGEST_PROOF = 300.0  # seconds
 _MOST = 1 << 28  # bytes of a file: what is longer differs
-_PROOF = """
-design -copy-from gold -as gold gold
-design -copy-from gate -as gate gate
-equiv_make gold gate both
-hierarchy -top both
-opt -full
-equiv_struct
-equiv_simple -undef
-equiv_induct -undef
-equiv_status -assert
-"""
-_READ = """
-read_verilog {file}
-hierarchy -top {name}
-proc
-flatten
-memory_map
-opt_clean
-rename -top {side}
-design -stash {side}
-"""
 
 
 @dataclass(frozen=True)
@@ -239,17 +217,8 @@ def _yosys() -> str | None:
 
 @cache
 def _equivalent(there: str, text: str, name: str, yosys: str) -> bool:
-    """Prove by induction that two texts describe the same core."""
-    with scratch() as folder:
-        for side, verilog in (("gold", text), ("gate", there)):
-            (folder / f"{side}.v").write_text(verilog, encoding="utf-8")
-        reads = "".join(_READ.format(file=f"{side}.v", name=name, side=side) for side in ("gold", "gate"))
-        (folder / "prove.ys").write_text(reads + _PROOF, encoding="utf-8")
-        try:
-            done = run_tool([yosys, "-q", "prove.ys"], folder, seconds=_LONGEST_PROOF)
-        except subprocess.TimeoutExpired:
-            return False
-    return done.returncode == 0
+    """Prove that two texts with the same names describe the same core."""
+    return not differences(text, there, name, {}, yosys)
 
 
 def _simulated(
