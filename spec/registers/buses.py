@@ -23,7 +23,7 @@ class Bus:
     # ports that it adds to the core; one of width 0 is an address, as wide as the registers need
     lines: tuple[Port, ...]
     words: bool = False  # the address is that of a word, not of a byte
-    idle: Mapping[str, int] = field(default_factory=dict)  # levels of inputs that are not 0 when nothing happens
+    idle: Mapping[str, int] = field(default_factory=dict, hash=False)  # levels of inputs that rest not at 0
     asynchronous: tuple[str, ...] = ()  # inputs that are not of the clock domain
     baud: int = 0  # bits a second on a line without a clock; 0 if the bus has none
     address_bits: int = 0  # bits of the address of a word in its frames; 0 if it has no frames

