@@ -125,6 +125,8 @@ def _declarations(path: Path, words: _Words) -> tuple[list[Variable], set[bytes]
         elif word == b"$upscope" and scopes:
             scopes.pop()
         elif word == b"$var":
+            if len(said) > 2 and (glued := re.fullmatch(rb"([0-9]{1,7})([^0-9]\S*)", said[1])):
+                said[1:2] = glued.groups()  # without the blank between size and code
             variable = _variable(path, said, scopes)
             names.add(variable.name, said[2])
             codes.add(said[2])
@@ -148,7 +150,9 @@ def _unit(path: Path, said: list[bytes]) -> Fraction:
 def _variable(path: Path, said: list[bytes], scopes: list[str]) -> Variable:
     """Return the variable of a declaration: type, size, code, name, and bits that may be part of the name."""
     if len(said) < 4 or not re.fullmatch(rb"[0-9]{1,7}", said[1]):
-        raise _incomplete(path, f"$var must have a type, a size, a code and a name, not {_shown(b' '.join(said))}")
+        slip = ": a blank is missing between two of them" if len(said) == 3 else ""
+        shown = f"{_shown(b' '.join(said))}{slip}"
+        raise _incomplete(path, f"$var must have a type, a size, a code and a name, not {shown}")
     size, own = int(said[1]), b"".join(said[3:]).decode("utf-8", "replace")
     name, high, low = own, size - 1, 0
     if size > 1 and (match := re.fullmatch(r"(.+)\[([0-9]{1,7}):([0-9]{1,7})\]", own)):
@@ -172,9 +176,9 @@ def _read_changes(path: Path, words: _Words, codes: set[bytes], changes: Changes
         head, code, value = word[:1], word[1:], word[:1]
         if head == b"#":
             now, code = code, b""
-            if not now.isdigit() or len(now) > _LATEST:
+            if len(now) > _LATEST or not re.fullmatch(rb"[0-9]+(\.[0-9]+)?", now):
                 raise _incomplete(path, f"{_shown(word)} must be # and a time of at most {_LATEST} digits")
-            changes.at(int(now))
+            changes.at(int(now) if now.isdigit() else Fraction(now.decode()))
             continue
         if head == b"$":
             code = b""

@@ -86,16 +86,17 @@ class Changes:
         self._value = {variable.code: "x" for variable, _ in of}
         self._last: list[int | None] = [None] * len(of)
         self._gap, self._gaps = [False] * len(of), 0
-        self._times, self._rows = list[int](), list[int]()
-        self._begin: int | None = None
-        self._now, self._changed = 0, False
+        self._times, self._rows = list[int | Fraction](), list[int]()
+        self._begin: int | Fraction | None = None
+        self._now: int | Fraction = 0
+        self._changed = False
 
     @property
     def codes(self) -> frozenset[Code]:
         """Those of the variables that lines are taken from."""
         return frozenset(self._value)
 
-    def at(self, time: int) -> None:
+    def at(self, time: int | Fraction) -> None:
         """Go on to a time; CaptureError if it is before the last one."""
         self._settle()
         if self._begin is None:
@@ -148,12 +149,12 @@ class Changes:
             raise CaptureError(f"{self._path} must contain the levels of all lines, 0 or 1, at least once")
         first, told = self._times[0], list(notes)
         if first > (self._begin or 0):
-            at = (first * unit.numerator) / unit.denominator
+            at = float(first * unit.numerator / unit.denominator)
             told.append(f"begins at {at:.9g} s of the waveform, where all lines have been 0 or 1")
         if self._gaps:
             told.append(f"{plural(self._gaps, 'change')} to x or z: the level before holds there")
-        seconds = np.array([(time - first) * unit.numerator / unit.denominator for time in self._times])
-        duration = (self._now - first) * unit.numerator / unit.denominator
+        seconds = np.array([float((time - first) * unit.numerator / unit.denominator) for time in self._times])
+        duration = float((self._now - first) * unit.numerator / unit.denominator)
         recording = Recording.of_level(seconds, np.array(self._rows, dtype=np.uint8), duration, self._lines)
         return named(recording, self._names, self._chosen, told)
 
