@@ -203,6 +203,8 @@ def _verdict(simulation: Simulation, warned: bool) -> Text:
     of = f" ({plural(n_values, 'value')}), which says nothing of wiring and --ppr" if captured else ""
     only = "; neither was compared with the shaft: see the warning" if warned else ""
     verdict, style = ("INTERRUPTED", "bold yellow") if simulation.interrupted else ("PASS", "bold green")
+    if not any(len(axis.recording.time) > 1 for axis in simulation.axes):
+        verdict, style = "NO EDGE", "bold yellow"
     return Text(
         f"{verdict}: hardware and golden model agree in every bit of {len(run.updates.clock)} updates "
         f"and {len(run.ticks.clock)} ticks{of}{only}",
