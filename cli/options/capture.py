@@ -35,6 +35,11 @@ _OPTIONS = [
             "much it must fall below where it rose, as in 1.65V:200mV. [default: levels are 0 or 1]",
             "--count COLUMN": "Column of the counts in a text that logs time and count: its name, or its number from "
             "0. Between two rows the shaft turns evenly; a count is one of --ppr and --decoding. With --axes as --a.",
+            "--angle COLUMN[:UNIT]": "Column of the shaft's angle in a text. Its unit is rad, deg or turn, in its "
+            "name, in the line of units or typed. Between two rows the shaft turns evenly. With --axes as --a.",
+            "--pulse-times COLUMN": "Read each row of a text as a pulse at this time. Needs --sensor pulses. [default: "
+            "a text that has times alone]",
+            "--pulse-periods COLUMN": "Read each row of a text as a pulse after this period. Needs --sensor pulses.",
         },
     ),
     option(
@@ -65,6 +70,9 @@ def _read(
     threshold: str | None,
     samplerate: str | None,
     count: str | None,
+    angle: str | None,
+    pulse_times: str | None,
+    pulse_periods: str | None,
     wrap: int | None,
     **others: Any,
 ) -> dict[str, Any]:
@@ -72,7 +80,7 @@ def _read(
 
     def read(capture: Path, spec: CoreSpec, axis: int = 0) -> Recording:
         from tachometry.sim.captures.cell_parsers import parse_threshold
-        from tachometry.sim.captures.count_log import read_count_log
+        from tachometry.sim.captures.count_log import read_angle_log, read_count_log
         from tachometry.sim.captures.file import SAME, CaptureError, OptionError, is_stream
         from tachometry.sim.captures.header import TextOptions
         from tachometry.sim.captures.other_sensors import fitted
@@ -86,16 +94,22 @@ def _read(
             None if time_unit is None else parse_time_unit("time_unit", time_unit),
             None if threshold is None else parse_threshold("threshold", threshold),
             slowest_s=float(alone.tick.seconds(alone.times.longest)),
+            pulse_times=pulse_times,
+            pulse_periods=pulse_periods,
         )
         if axes and is_stream(capture):
             raise CaptureError(f"{capture} must be a regular file with --axes: it is read anew for each axis")
-        if count is not None:
+        for name, column in (("count", count), ("angle", angle)):
+            if column is None:
+                continue
             more = {"sensor": None if alone.encoder.plain else sensor, "index": alone.index}
-            _refuse_lines({**lines, **more, "complements": alone.front_end.complemented or None})
-            log = read_count_log(capture, _of_axis("count", count, axis, axes) or "", text, wrap)
-            return with_last_tick(log.recording(alone.encoder.decoding), spec)
+            more |= {"pulse_times": pulse_times, "pulse_periods": pulse_periods}
+            _refuse_lines(name, {**lines, **more, "complements": alone.front_end.complemented or None})
+            read_log = read_count_log if name == "count" else read_angle_log
+            log = read_log(capture, _of_axis(name, column, axis, axes) or "", text, wrap)
+            return with_last_tick(log.recording(alone.encoder), spec)
         if wrap is not None:
-            raise OptionError("wrap", "must not be given without --count")
+            raise OptionError("wrap", "must not be given without --count or --angle")
         for line, text_of_line in (("b", b), ("c", c)):
             if text_of_line is not None and line not in alone.encoder.kind.lines:
                 raise OptionError(line, f"must not be given together with --sensor {sensor}")
@@ -117,13 +131,13 @@ CAPTURE_OPTIONS = Group(_OPTIONS, _read)
 """Handed over as `read`, which reads a capture for a spec, or for an axis of so many."""
 
 
-def _refuse_lines(given: dict[str, Any]) -> None:
-    """Refuse what is of lines where there is a count."""
+def _refuse_lines(log: str, given: dict[str, Any]) -> None:
+    """Refuse options of lines where there is a count or an angle."""
     from tachometry.sim.captures.file import OptionError
 
     for name, value in given.items():
         if value is not None:
-            raise OptionError(name, "must not be given together with --count: a log of counts has no lines")
+            raise OptionError(name, f"must not be given together with --{log}: a log of {log}s has no lines")
 
 
 def _of_axis(line: str, text: str | None, axis: int, axes: int | None) -> str | None:

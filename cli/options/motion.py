@@ -94,8 +94,8 @@ def _record(encoder: VirtualEncoder, motion: str, spec: TachometerSpec) -> Encod
             "motion", f"has times without a unit: {name} must have it in its name, as time_ms"
         ) from None
     # In the middle of a quarter period, for rounding not to make or lose an edge.
-    angle = (log.count * (encoder.edges_per_rev / spec.encoder.counts_per_rev) + 0.5) * encoder.disc.pitch_rad
-    encoding = encoder.record(Motion.of_table(log.time, angle.astype("float64")))
+    angle = (log.edges(spec.encoder, encoder.edges_per_rev) + 0.5) * encoder.disc.pitch_rad
+    encoding = encoder.record(Motion.of_table(log.time, angle))
     return replace(encoding, recording=replace(encoding.recording, source=log.source))
 
 

@@ -1,19 +1,24 @@
 """Cells of a text are numbers, times and levels; what is none of these is marked, so that the reader can name it."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim.captures.time_unit import unit_named
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.units import VOLTAGE, read_nearest
 
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?", re.ASCII)
+QUANTITY = re.compile(rf"({NUMBER.pattern})\s*([A-Za-zµμ]+)", re.ASCII)  # a number with its unit
+CLOCK = re.compile(r"(\d{1,3}):(\d\d):(\d\d)(?:[.:](\d{1,9}))?", re.ASCII)  # a time of day
 DATE = re.compile(r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d(?:\.\d{1,9})?)(Z|[+-]\d\d:?\d\d)?", re.ASCII)
 HELD, BAD = -1, -2  # in place of a level: the one before holds; there is none in the cell
-_LEVELS = {"false": 0, "true": 1, "x": HELD}
+WORDS = {"off": 0, "on": 1, "low": 0, "high": 1, "lo": 0, "hi": 1}
+_LEVELS = {"false": 0, "true": 1, "x": HELD, **WORDS}
+VOLTS = {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "millivolt": 1e-3, "millivolts": 1e-3}
 
 
 class Threshold(NamedTuple):
@@ -34,18 +39,45 @@ def parse_threshold(what: str, text: str) -> Threshold:
 
 def is_value(cell: str) -> bool:
     """Return whether a cell may be in a row, and not a name."""
-    return bool(NUMBER.fullmatch(cell) or DATE.fullmatch(cell)) or cell.lower() in _LEVELS
+    if NUMBER.fullmatch(cell) or DATE.fullmatch(cell) or CLOCK.fullmatch(cell) or cell.lower() in _LEVELS:
+        return True
+    unit = unit_of(cell)
+    return bool(unit) and (unit_named(unit) is not None or unit.casefold() in VOLTS)
 
 
-def numbers(cells: Sequence[str]) -> NDArray[np.float64]:
-    """Return plain decimal numbers; NaN stands for what is none."""
+def unit_of(cell: str) -> str:
+    """Return the unit behind a number; empty if there is none."""
+    quantity = QUANTITY.fullmatch(cell)
+    return quantity[2] if quantity else ""
+
+
+def numbers(cells: Sequence[str], size_of: Callable[[str], float] | None = None) -> NDArray[np.float64]:
+    """Return decimal numbers, times the size of the unit behind them if it has one; NaN stands for what is none."""
     if all(map(NUMBER.fullmatch, cells)):
         return np.array(list(map(float, cells)))
-    return np.array([float(cell) if NUMBER.fullmatch(cell) else np.nan for cell in cells])
+
+    def number(cell: str) -> float:
+        if NUMBER.fullmatch(cell):
+            return float(cell)
+        quantity = size_of and QUANTITY.fullmatch(cell)
+        return float(quantity[1]) * size_of(quantity[2]) if size_of and quantity else np.nan
+
+    return np.array(list(map(number, cells)))
+
+
+def _of_day(cell: str) -> int | None:
+    """Return the nanoseconds from midnight to a time of day; None if a cell is none."""
+    if (clock := CLOCK.fullmatch(cell)) is None or int(clock[2]) > 59 or int(clock[3]) > 59:
+        return None
+    seconds = (int(clock[1]) * 60 + int(clock[2])) * 60 + int(clock[3])
+    return seconds * 10**9 + int((clock[4] or "0").ljust(9, "0"))
 
 
 def nanoseconds(cells: Sequence[str], origin: int) -> NDArray[np.float64]:
-    """Return times of day with their dates as nanoseconds after another; NaN stands for what is none."""
+    """Return times of day, all with their dates or all without, as nanoseconds after another; NaN: it is none."""
+    if any(map(CLOCK.fullmatch, cells)):
+        clocks = [_of_day(cell) for cell in cells]
+        return np.array([np.nan if clock is None else float(clock - origin) for clock in clocks])
     dates = [DATE.fullmatch(cell) for cell in cells]
     texts = [f"{date[1]}T{date[2]}" if date else "NaT" for date in dates]
     if len({date[3] for date in dates if date}) > 1:  # the zone of a clock that is put forward
@@ -58,7 +90,9 @@ def nanoseconds(cells: Sequence[str], origin: int) -> NDArray[np.float64]:
 
 
 def origin_of(cell: str) -> int | None:
-    """Return nanoseconds from 1970 to a time of day with its date; None if a cell is none."""
+    """Return nanoseconds from 1970, or from midnight, to a time of day with or without a date; None: it is none."""
+    if (clock := _of_day(cell)) is not None:
+        return clock
     date = DATE.fullmatch(cell)
     try:
         return None if date is None else int(np.datetime64(f"{date[1]}T{date[2]}", "ns").astype(np.int64))
@@ -94,7 +128,7 @@ def _each(cells: Sequence[str], of: dict[str, int]) -> NDArray[np.int8]:
 
 def compared(cells: Sequence[str], threshold: Threshold, volts: float) -> NDArray[np.int8]:
     """Return levels of voltages, in units of so many volts; HELD within the hysteresis, and where there is an X."""
-    value = numbers(cells) * volts
+    value = numbers(cells, lambda unit: VOLTS.get(unit.casefold(), np.nan) / volts) * volts
     level = np.full(len(value), HELD, np.int8)
     level[value >= threshold.volts + threshold.hysteresis / 2] = 1
     level[value < threshold.volts - threshold.hysteresis / 2] = 0

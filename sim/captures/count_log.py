@@ -1,149 +1,135 @@
-"""A log of time and count, as a microcontroller's own counter gives it, is read as what turned the counter."""
+"""A log of the time and of a count or an angle is read as the shaft that was measured."""
 
-from collections.abc import Sequence
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.captures.cell_parsers import numbers
-from tachometry.sim.captures.file import CaptureError, Channel, OptionError, check_edges, kind_of, reading
-from tachometry.sim.captures.header import PLAIN, Header, TextOptions, check_seconds, read_header
-from tachometry.sim.captures.rows import COUNTERS, Lines, Times, blocks, opened, refuse
-from tachometry.sim.signals.arrays import Ints
+from tachometry.sim.captures.file import CaptureError, Channel, OptionError
+from tachometry.sim.captures.header import PLAIN, TextOptions
+from tachometry.sim.captures.rows import COUNTERS
+from tachometry.sim.captures.series import ANGLES, read_series, unit_named
 from tachometry.sim.signals.recording import MAX_EDGES, Recording, quadrature
 from tachometry.sim.signals.source import Source
+from tachometry.spec import Encoder
 
 _MODULI = tuple(1 << bits for bits in COUNTERS)  # of the counters that wrap
-_MOST = 1 << 53  # counts that a number of a spreadsheet holds
 NO_WRAP = 0
 
 
 @dataclass(frozen=True)
-class CountLog:
-    """Holds what a counter showed."""
+class ShaftLog:
+    """Where a shaft was, as a counter or a sensor of angles showed it."""
 
     time: NDArray[np.float64]  # shape (n,), seconds, strictly increasing, first entry 0
-    count: Ints  # shape (n,), first entry 0: since the first row; what wrapped goes on
+    place: NDArray[np.float64]  # shape (n,), counts or rad, first entry 0: since the first row; what wrapped goes on
     name: str  # of the column
     notes: tuple[str, ...]  # how the rows were understood
+    angles: bool = False  # whether places are angles
 
     @property
     def source(self) -> Source:
-        """Tells what the log says of itself; a change is one of the count."""
-        total = int(np.abs(np.diff(self.count)).sum())
-        return Source({"count": self.name}, float(self.time[-1]), total, () if total else ("count",), notes=self.notes)
+        """Column of the log, and how its rows were understood; a change is one of a whole count."""
+        total = 0 if self.angles else int(np.abs(np.diff(self.place)).sum())
+        line = "angle" if self.angles else "count"
+        still = () if np.any(np.diff(self.place)) else (line,)
+        return Source({line: self.name}, float(self.time[-1]), total, still, notes=self.notes)
 
-    def recording(self, decoding: int) -> Recording:
-        """Return the lines of an encoder whose shaft turns evenly between two rows; a decoding makes these counts."""
-        steps = np.diff(self.count) * (4 // decoding)
-        each = np.abs(steps)
+    def edges(self, encoder: Encoder, per_rev: int) -> NDArray[np.float64]:
+        """Return the places in edges of a disc that has so many in a revolution."""
+        return self.place * (per_rev / (2 * math.pi if self.angles else encoder.counts_per_rev))
+
+    def recording(self, encoder: Encoder) -> Recording:
+        """Return the lines of an encoder in quadrature whose shaft turns evenly between two rows."""
+        place = self.edges(encoder, 4 * encoder.pulses_per_rev)
+        before = 0.5 * self.angles  # an edge leads to a count; it lies half a quarter before an angle
+        quarter = np.rint(place)
+        steps = np.diff(quarter)
+        each = np.abs(steps).astype(np.int64)
         if (total := int(each.sum())) > MAX_EDGES:
             raise CaptureError(f"counts of {self.name} must be at most {MAX_EDGES} edges to and fro, not {total}")
-        part = np.arange(1, total + 1) - np.repeat(np.cumsum(each) - each, each)
-        start, end = np.repeat(self.time[:-1], each), np.repeat(self.time[1:], each)
-        time = np.minimum(start + (end - start) * (part / np.repeat(each, each)), end)
-        level = quadrature(np.cumsum(np.append(0, np.repeat(np.sign(steps), each))))
+        number = np.arange(1, total + 1) - np.repeat(np.cumsum(each) - each, each)
+        sign = np.repeat(np.sign(steps), each)
+        start, end, first, last, whole = (
+            np.repeat(values, each) for values in (self.time[:-1], self.time[1:], place[:-1], place[1:], quarter[:-1])
+        )
+        part = (whole - first + sign * (number - before)) / (last - first)
+        time = np.clip(start + (end - start) * part, start, end)
+        level = quadrature(np.cumsum(np.append(0, sign.astype(np.int64))))
         duration = float(self.time[-1])
         source = replace(self.source, n_changes=total)
         return Recording(np.append(0.0, time), level & np.uint8(1), level >> np.uint8(1), duration, source=source)
 
 
-def read_count_log(path: Path, count: Channel, text: TextOptions = PLAIN, wrap: int | None = None) -> CountLog:
-    """Read a text with a column of times and one of counts, whose head is that of `read_csv`.
-
-    Rows of one time are one, the last of them.
+def read_count_log(path: Path, count: Channel, text: TextOptions = PLAIN, wrap: int | None = None) -> ShaftLog:
+    """Read a text with a column of times and one of counts, see `read_series`.
 
     Parameters
     ----------
-    count : str or int
-        Name of the column, else its number among all columns, from 0.
-    text : TextOptions
-        What the text does not say; it has no threshold.
     wrap : int or None
         The counter goes from one less than this to 0. `NO_WRAP`: it does not wrap. None: if it has 16 or 32 bits, as
         seen from a jump by more than half of them.
-
-    Raises
-    ------
-    CaptureError
-        If the file cannot be read, or a row is not of this kind.
     """
-    if kind_of(path) in (".sr", ".vcd", ".fst"):
-        raise OptionError("count", f"must not be given for {path}: it has levels, not counts")
-    with reading(path), opened(path) as file:
-        source = Lines(path, file)
-        header = read_header(path, source.head, text, None)
-        if header.time is None:
-            raise OptionError("time", f"must be given for {path}: counts must have times")
-        column, times = _column(path, header, count), Times(path, header)
-        parts = [
-            np.stack([times.of(line, columns), _counts(path, line, header.names[column], columns[column])])
-            for line, columns in blocks(path, source, header)
-        ]
-    if not source.ended:
-        raise CaptureError(
-            f"the last line of {path} must end, else its last number may be cut: put a line end there if it is whole"
-        )
-    rows = np.concatenate([np.zeros((2, 0)), *parts], axis=1).T
-    if len(rows) < 2:
-        raise CaptureError(f"{path} must have at least two rows after its header, not {len(rows)}")
-    seconds, counts = header.seconds(rows[:, 0] - rows[0, 0]), rows[:, 1].astype(np.int64)
-    steps, notes = _unwrapped(path, counts, wrap)
-    last = np.append(np.diff(seconds) > 0, True)
-    if len(again := np.flatnonzero(~last)):
-        notes.append(f"{len(again)} rows have the time of the next one, which holds")
-    seconds, total = seconds[last], np.cumsum(np.append(0, steps))[last]
-    if len(seconds) < 2:
-        raise CaptureError(f"times of {path} must not all be equal")
-    check_seconds(path, header, text, np.diff(seconds), "rows", whole=times.whole)
-    notes += times.notes
-    notes.insert(0, f"between two of the {len(seconds)} rows the shaft is taken to turn evenly")
-    if counts[0]:
-        notes.append(f"the log begins at {counts[0]} counts, and counts out are since then")
-    return CountLog(seconds, total - total[0], header.names[column], tuple(notes))
-
-
-def _column(path: Path, header: Header, count: Channel) -> int:
-    names, wanted = [name.casefold() for name in header.names], str(count).strip()
-    if wanted in header.names:
-        return header.names.index(wanted)
-    if wanted.casefold() in names:
-        return names.index(wanted.casefold())
-    if wanted.isascii() and wanted.isdigit() and int(wanted) < len(names):
-        return int(wanted)
-    listed = ", ".join(f"{name} ({number})" for number, name in enumerate(header.names))
-    raise OptionError("count", f"of {path} must be one of the columns {listed}, not {count!r}")
-
-
-def _counts(path: Path, line: Sequence[int], name: str, texts: Sequence[str]) -> NDArray[np.float64]:
-    """Return the counts of a block of rows."""
-    count = numbers(texts)
-    check_edges(path, line[-1])
-    wrong = ~(np.abs(count) <= _MOST) | (count != np.rint(count))
-    refuse(path, line, wrong, f"{name} must be a whole number up to 2^53", texts)
-    return count
-
-
-def _unwrapped(path: Path, counts: Ints, wrap: int | None) -> tuple[Ints, list[str]]:
-    """Return the steps from row to row, and what there is to say of a counter that wraps."""
-    steps = np.diff(counts)
-    modulus = _seen(counts, steps) if wrap is None else wrap
-    if not modulus:
-        return steps, []
-    spread = int(counts.max() - counts.min())
-    if spread >= modulus:
+    series, _ = read_series(path, count, "count", text, whole=True)
+    counts = series.value.astype(np.int64)
+    modulus = _seen(counts) if wrap is None else wrap
+    if (spread := int(counts.max() - counts.min())) >= modulus > 0:
         raise OptionError("wrap", f"must be more than the counts of {path} differ, {spread}, not {modulus}")
-    taken = (steps + modulus // 2) % modulus - modulus // 2
-    n_wraps = np.count_nonzero(taken != steps)
     how = "as its greatest jump shows; --wrap 0 says that it does not" if wrap is None else "as --wrap says"
-    return taken, [f"the counter wraps at {modulus}, {n_wraps} times here, {how}"]
+    notes = [f"the log begins at {counts[0]} counts, and counts out are since then"] if counts[0] else []
+    place, wraps = _unwrapped(series.value, modulus)
+    if modulus:
+        notes.append(f"the counter wraps at {modulus}, {wraps} times here, {how}")
+    return _log(series.time, place, series.name, (*series.notes, *notes))
 
 
-def _seen(counts: Ints, steps: Ints) -> int:
+def read_angle_log(path: Path, angle: str, text: TextOptions = PLAIN, wrap: int | None = None) -> ShaftLog:
+    """Read a text with a column of times and one of angles, whose name may be followed by `:` and their unit.
+
+    Parameters
+    ----------
+    wrap : int or None
+        `NO_WRAP`: the angle does not wrap. None: it wraps at a turn if all angles are within one, and it jumps by more
+        than half of it.
+    """
+    if wrap:
+        raise OptionError("wrap", f"must be 0 or left out with --angle: an angle wraps at a turn, not at {wrap}")
+    name, colon, given = angle.rpartition(":")
+    own = unit_named(given) if colon else ""
+    series, unit = read_series(path, name if own in ANGLES else angle, "angle", text)
+    if (unit := own or unit) not in ANGLES:
+        raise OptionError(
+            "angle", f"must have a unit, as {series.name}:deg: one of {', '.join(ANGLES)}, not {unit or angle!r}"
+        )
+    turn = round(2 * math.pi / ANGLES[unit], 9)  # 360 and 1 are exact
+    least, most = series.value.min(), series.value.max()
+    within = -0.51 * turn <= least <= most <= 0.51 * turn or -0.01 * turn <= least <= most <= 1.01 * turn
+    wraps_at = turn if wrap is None and within and np.abs(np.diff(series.value)).max() > turn / 2 else 0.0
+    place, wraps = _unwrapped(series.value, wraps_at)
+    notes = [f"the angle wraps at {turn:.6g} {unit}, {wraps} times here; --wrap 0 says that it does not"]
+    return _log(series.time, place * ANGLES[unit], series.name, (*series.notes, *notes[: bool(wraps)]), angles=True)
+
+
+def _log(
+    time: NDArray[np.float64], place: NDArray[np.float64], name: str, notes: tuple[str, ...], *, angles: bool = False
+) -> ShaftLog:
+    evenly = f"between two of the {len(time)} rows the shaft is taken to turn evenly"
+    return ShaftLog(time, place, name, (evenly, *notes), angles)
+
+
+def _unwrapped(value: NDArray[np.float64], modulus: float) -> tuple[NDArray[np.float64], int]:
+    """Return how far the shaft has turned since the first row, and how often what shows it has wrapped."""
+    steps = np.diff(value)
+    taken = (steps + modulus / 2) % modulus - modulus / 2 if modulus else steps
+    n_wraps = int(np.count_nonzero(np.abs(taken - steps) > modulus / 2)) if modulus else 0
+    return np.cumsum(np.append(0.0, taken)), n_wraps
+
+
+def _seen(counts: NDArray[np.int64]) -> int:
     """Return the modulus of a counter that jumps by more than half of it, signed or not; `NO_WRAP` if none does."""
-    jump, least, most = np.abs(steps).max(), counts.min(), counts.max()
+    jump, least, most = np.abs(np.diff(counts)).max(), counts.min(), counts.max()
     for modulus in _MODULI:
         fits = (least >= 0 and most < modulus) or (-modulus // 2 <= least and most < modulus // 2)
         if fits and jump > modulus // 2:

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.captures.cell_parsers import NUMBER, Threshold, origin_of
+from tachometry.sim.captures.cell_parsers import CLOCK, NUMBER, VOLTS, Threshold, origin_of, unit_of
 from tachometry.sim.captures.file import CaptureError, Channel, OptionError
 from tachometry.sim.captures.sigrok import agreed_samplerate, divide, parse_samplerate
-from tachometry.sim.captures.text_layout import VOLTS, Table, bare, is_comment, names_times, sniff, trimmed
+from tachometry.sim.captures.text_layout import Table, bare, is_comment, names_times, sniff, trimmed
 from tachometry.sim.captures.time_unit import TimeUnit, parted, rank, unit_named
 from tachometry.spec.language.units import TIME
 
@@ -31,12 +31,17 @@ class TextOptions:
         Of columns that are voltages. None: they are levels, 0 or 1.
     slowest_s : float or None, seconds
         Edges that are further apart are taken for a mistake where nothing says the unit of the times.
+    pulse_times, pulse_periods : str, int or None
+        Column in place of `time` of a text that has a row for each pulse: when it came, or how long after the one
+        before.
     """
 
     time: Channel | None = None
     unit: TimeUnit | None = None
     threshold: Threshold | None = None
     slowest_s: float | None = None
+    pulse_times: Channel | None = None
+    pulse_periods: Channel | None = None
 
 
 PLAIN = TextOptions()
@@ -55,10 +60,29 @@ class Header:
     period: int | None = None  # for files of sigrok, whose times are sample numbers times so many of a unit
 
     @property
-    def origin(self) -> int | None:
-        """Nanoseconds from 1970 to the first row, if its time has a date."""
+    def _first(self) -> str:
+        """Time in the first row, as it is written there."""
         in_first = self.time is not None and self.time < len(self.table.first)
-        return origin_of(self.table.first[self.time or 0]) if in_first else None
+        return self.table.first[self.time or 0].replace(",", ".") if in_first else ""
+
+    @property
+    def origin(self) -> int | None:
+        """Nanoseconds from 1970, or from midnight, to the first row, if it has a time of day."""
+        return origin_of(self._first)
+
+    @property
+    def clock(self) -> bool:
+        """Whether times are times of day without a date."""
+        return CLOCK.fullmatch(self._first) is not None
+
+    @property
+    def n_cells(self) -> int:
+        """Cells of a row: one for each name, but for names that are the start and the step of an oscilloscope."""
+        return len(self.names) - _n_constants(self.names, self.table)
+
+    def unit_of(self, column: int) -> str:
+        """Return the unit of a column: in its name, or in the line of units."""
+        return parted(self.names[column])[1] or bare(self.table.units[column] if column < len(self.table.units) else "")
 
     @property
     def _columns(self) -> list[int]:
@@ -75,8 +99,7 @@ class Header:
 
     def volts(self, column: int) -> float:
         """Return how many volts the unit of a column is."""
-        units = self.table.units
-        return VOLTS.get(bare(parted(self.names[column])[1] or (units[column] if column < len(units) else "")), 1.0)
+        return VOLTS.get(bare(self.unit_of(column)), 1.0)
 
     def seconds(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what the times, or the numbers of the rows, are in seconds; a sample is dated as in a `.sr`."""
@@ -100,6 +123,7 @@ def read_header(path: Path, lines: Sequence[str], options: TextOptions, samplera
     It raises CaptureError if columns have no names, nor numbers that are given, or if rows cannot be dated.
     """
     table = sniff(lines, options.time)
+    one_column = table is not None and len(table.names or table.first) == 1
     first = next((line.strip() for line in lines if not is_comment(line)), "")
     shown = first if len(first) <= 60 else first[:60] + "..."
     if table is None or (table.names is not None and not _are_names(table, options.time)):
@@ -108,9 +132,10 @@ def read_header(path: Path, lines: Sequence[str], options: TextOptions, samplera
             f"not {shown!r}"
         )
     if table.names is None and options.time is None and samplerate_hz is None:
+        line, columns = ("time_us", "--pulse-times 0") if one_column else ("time,a,b", "--time 0 --a 1 --b 2")
         raise CaptureError(
-            f"{path} has no line of names: put one such as time,a,b before its rows, or give its columns by number, as "
-            "--time 0 --a 1 --b 2"
+            f"{path} has no line of names: put one such as {line} before its rows, or give its columns by number, as "
+            f"{columns}"
         )
     names = _names(table)
     column = _time_column(path, names, table, options.time)
@@ -136,10 +161,17 @@ def _are_names(table: Table, time: Channel | None) -> bool:
     """Return whether the names are some: one for each column, and no numbers unless the times are named beside them."""
     names = _names(table)
     if not names_times(names, time):
-        extra = len(table.first) - len(names)
+        extra = len(table.first) - len(names) + _n_constants(names, table)
         if any(map(NUMBER.fullmatch, names)) or (table.first and extra not in (0, 1)):
             return False
     return "" not in names[1:] and len({*names}) == len(names)
+
+
+def _n_constants(names: Sequence[str], table: Table) -> int:
+    """Return how many names at the end have no cells in the first row, as they are values of an oscilloscope."""
+    beyond = names[len(table.first) :] if len(table.first) > 1 else ()
+    constants = all(name.casefold().startswith(("t0", "tinc", "start", "increment")) for name in beyond)
+    return len(beyond) if constants else 0
 
 
 def _names(table: Table) -> tuple[str, ...]:
@@ -176,10 +208,13 @@ def _unit(path: Path, table: Table, names: Sequence[str], column: int, given: Ti
     """Return the unit of the times, and whether it is a guess."""
     word = parted(names[column])[1] or (bare(table.units[column]) if column < len(table.units) else "")
     unit = given or (unit_named(word) if word else TimeUnit("s", 1.0))
-    if column < len(table.first) and origin_of(table.first[column]) is not None:
+    first = table.first[column].replace(",", ".") if column < len(table.first) else ""
+    if origin_of(first) is not None:
         if given is not None:
-            raise OptionError("time_unit", f"must not be given for {path}: its times have dates")
+            raise OptionError("time_unit", f"must not be given for {path}: its times are times of day")
         return TimeUnit("ns", 1e9), False
+    if unit_named(unit_of(first)) and (unit is None or not unit.per_second):
+        return TimeUnit("s", 1.0), False
     if unit is None:
         units = ", ".join(TIME)
         raise CaptureError(f"unit of column {names[column]} of {path} must be one of {units}, not {word!r}")
@@ -190,21 +225,21 @@ def _unit(path: Path, table: Table, names: Sequence[str], column: int, given: Ti
         unit = TimeUnit(unit.name, 1 / float(increments[0]))
     if not unit.per_second:
         raise OptionError("time_unit", f"must be given for {path}: the rate of {names[column]}, such as 16MHz")
-    return unit, given is None and not word
+    return unit, given is None and not word and not unit_of(first)
 
 
 def check_seconds(
-    path: Path, header: Header, options: TextOptions, distances: NDArray[np.float64], what: str, *, whole: bool
+    path: Path, header: Header, slowest_s: float | None, distances: NDArray[np.float64], what: str, *, whole: bool
 ) -> None:
     """Check that times, of which nothing says the unit, make sense as seconds.
 
     `distances`, a float64 array in seconds, are between edges, or whatever they date, `what`. `whole` tells whether all
     times are whole numbers.
     """
-    if not header.assumed or options.slowest_s is None or not distances.size:
+    if not header.assumed or slowest_s is None or not distances.size:
         return
     median = float(np.median(distances))
-    if median > options.slowest_s or (whole and median):
+    if median > slowest_s or (whole and median):
         raise OptionError(
             "time_unit",
             f"must be given for {path}: as seconds, its {what} would be {median:.4g} s apart; it is s, ms, us, ns or "

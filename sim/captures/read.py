@@ -31,7 +31,7 @@ class Reader(Protocol):
     ) -> Recording: ...
 
 
-TEXTS = (".csv", ".txt", ".tsv", ".teeth")
+TEXTS = (".csv", ".txt", ".tsv", ".teeth", ".msl")
 PACKED = (*TEXTS, ".vcd")  # may end in .gz, too
 READERS: dict[str, Reader] = {".sr": read_sr, ".vcd": read_vcd, ".fst": read_fst, **dict.fromkeys(TEXTS, read_csv)}
 _LOOKED_AT = 16  # channels; each takes as long as the capture
@@ -93,10 +93,10 @@ def read_capture(
     if reader is read_csv:
         reader = functools.partial(read_csv, options=text)
     else:
-        for option in ("time", "unit", "threshold"):
-            if getattr(text, option) is not None:
-                name = "time_unit" if option == "unit" else option
-                why = "it has levels" if option == "threshold" else "it has its times"
+        of_times = dict(time=text.time, time_unit=text.unit, threshold=text.threshold)
+        for name, value in (of_times | dict(pulse_times=text.pulse_times, pulse_periods=text.pulse_periods)).items():
+            if value is not None:
+                why = "it has levels" if name == "threshold" else "it has its times"
                 raise OptionError(name, f"must not be given for {path}: {why}")
     others = {name: channel for name, channel in (("c", c), ("z", z), ("tick_in", tick_in)) if channel is not None}
     others |= {f"{line}_n": f"{line}_n" for line in complemented}

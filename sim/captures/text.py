@@ -1,8 +1,10 @@
 """Text (`.csv` and its like) is read as a `Recording`, and written."""
 
 import os
+import re
 import shlex
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +13,11 @@ from numpy.typing import NDArray
 from tachometry.sim.captures import cell_parsers
 from tachometry.sim.captures.file import (
     NONE,
+    SAME,
     CaptureError,
     Channel,
     Line,
+    OptionError,
     check_edges,
     choose_channels,
     named,
@@ -21,9 +25,12 @@ from tachometry.sim.captures.file import (
     writing,
 )
 from tachometry.sim.captures.header import PLAIN, Header, TextOptions, check_seconds, read_header
-from tachometry.sim.captures.rows import BLOCK, Lines, Times, blocks, opened, refuse
+from tachometry.sim.captures.rows import BLOCK, Lines, Times, blocks, check_rows, cut, opened, refuse
+from tachometry.sim.captures.series import ANGLES, unit_in
+from tachometry.sim.captures.text_layout import split
 from tachometry.sim.signals import files
 from tachometry.sim.signals.recording import Recording, packed
+from tachometry.sim.signals.source import Source
 from tachometry.spec.language.units import plural
 
 
@@ -58,9 +65,17 @@ def read_csv(
         decreases, or a level that is neither 0 nor 1.
     """
     path = Path(path)
+    rows_are_pulses = options.pulse_times is not None or options.pulse_periods is not None
+    if rows_are_pulses:
+        own = options.pulse_periods if options.pulse_times is None else options.pulse_times
+        options = replace(options, time=own)
     with reading(path), opened(path) as file:
         source = Lines(path, file)
         header = read_header(path, source.head, options, samplerate_hz)
+        if rows_are_pulses or not header.channels:
+            return _pulses(path, source, header, options, one_line=b == SAME)
+        if len(header.channels) == 1 and a is None and b is None:
+            _refuse_numbers(path, source, header)
         lines = choose_channels(path, header.channels, a, b, others, header.channels)
         times, pins, changes = Times(path, header), _Pins(path, header, options, lines), _Changes(path)
         for number, columns in blocks(path, source, header, _block):
@@ -68,8 +83,28 @@ def read_csv(
         pins.check_end(source.ended)
     recording = changes.recording(header, ("a", "b", *others))
     moved = recording.time[1:][(np.diff(recording.a) != 0) | (np.diff(recording.b) != 0)]
-    check_seconds(path, header, options, np.diff(moved), "edges", whole=times.whole)
+    check_seconds(path, header, options.slowest_s, np.diff(moved), "edges", whole=times.whole)
     return named(recording, header.channels, lines, (*times.notes, *pins.notes, *changes.notes))
+
+
+def _pulses(path: Path, source: Lines, header: Header, options: TextOptions, *, one_line: bool) -> Recording:
+    """Return a recording in which each row of a text is a pulse of no width on line A."""
+    if not one_line:
+        raise OptionError("sensor", f"must be pulses for {path}: each of its rows is a pulse")
+    assert header.time is not None
+    times = Times(path, header, periods=options.pulse_periods is not None)
+    parts = [np.empty(0)]
+    for number, columns in blocks(path, source, header):
+        parts.append(times.of(number, columns))
+        check_edges(path, 2 * number[-1])
+    time, name = np.concatenate(parts), header.names[header.time]
+    check_rows(path, source, len(time))
+    at = np.repeat(header.seconds(time - time[0]), 2)
+    check_seconds(path, header, options.slowest_s, np.diff(at[::2]), "pulses", whole=times.whole)
+    level = 1 - np.arange(len(at), dtype=np.uint8) % 2
+    notes = (f"each of the {len(time)} rows is a pulse", *times.notes)
+    lines = Source({"a": f"the rows' {name}", "b": ""}, float(at[-1]), len(at), notes=notes)
+    return Recording(at, level, np.zeros_like(level), float(at[-1]), source=lines)
 
 
 class _Pins:
@@ -93,41 +128,58 @@ class _Pins:
                 rule = f"{name} must be a number"
             else:
                 level, rule = cell_parsers.levels(texts), f"level of {name} must be 0 or 1"
-            refuse(self._path, line, level == cell_parsers.BAD, rule, texts, self._hint(name, bit))
+            hint = _option_for(name, unit_in(self._header, column), texts)
+            plain = bit is None and self._threshold is None
+            refuse(self._path, line, level == cell_parsers.BAD, rule, texts, hint if plain else lambda _: "")
             self._gaps += texts.count("X") + texts.count("x")
             every.append(cell_parsers.held(level, int(last)))
         level = np.stack(every)
         self._last = level[:, -1]
         return level
 
-    def _hint(self, name: str, bit: int | None) -> Callable[[str], str]:
-        """Return a function of a bad cell that says what to type."""
-
-        def hint(cell: str) -> str:
-            if bit is not None or self._threshold is not None or not cell_parsers.NUMBER.fullmatch(cell):
-                return ""
-            if cell.isdigit() and int(cell) > 3:
-                return f" (of a counter, --count {shlex.quote(name)} takes its counts)"
-            if cell.isdigit():
-                return f" (of both lines in one number, --a {name}[0] is the lowest bit)"
-            return " (of a voltage, --threshold 1.65V says from where on it is high)"
-
-        return hint
-
     def check_end(self, ended: bool) -> None:
         """Check that nothing is missing at the end of the last line, where a part of a number is another one."""
         header, last = self._header, len(self._header.names) - 1
         numbers = {column for column, bit in self._lines if bit is not None or self._threshold is not None}
         if not ended and last in numbers | {header.time}:
-            raise CaptureError(
-                f"the last line of {self._path} must end, else its last number may be cut: put a line end there if it "
-                "is whole"
-            )
+            raise cut(self._path)
 
     @property
     def notes(self) -> list[str]:
         """Return what was made of the levels."""
         return [f"{plural(self._gaps, 'cell')} with an X: the level before holds there"] if self._gaps else []
+
+
+def _refuse_numbers(path: Path, source: Lines, header: Header) -> None:
+    """Refuse a text whose only channel is a counter, an angle or a speed in its first rows."""
+    column, name = header.column(0), header.channels[0]
+    rows = [split(line, header.table.separator) for line in source.head[header.table.start :]]
+    texts = [row[column] for row in rows if column < len(row)]
+    hint = _option_for(name, unit_in(header, column), texts)(next(iter(texts), ""))
+    if "--count" in hint or "--angle" in hint or "--motion" in hint:
+        raise CaptureError(f"{path} must have at least two logic channels, not {name} (0){hint}")
+
+
+def _option_for(name: str, unit: str, texts: Sequence[str]) -> Callable[[str], str]:
+    """Return a function of a bad cell of a column that names the option which reads the column."""
+    value = cell_parsers.numbers(texts)
+    whole = not np.any(value != np.rint(value), where=~np.isnan(value))
+    counts = np.any(np.abs(value) > 3) or re.search(r"count|cnt|tick|pos|pulse|enc", name, re.IGNORECASE)
+
+    def option(cell: str) -> str:
+        if not cell_parsers.NUMBER.fullmatch(cell) and not cell_parsers.unit_of(cell):
+            return ""
+        if unit in ANGLES:
+            return f" (of an angle, --angle {shlex.quote(name)} takes it)"
+        if unit:
+            return f" (a speed is a motion: simulate --motion csv:FILE:{shlex.quote(name)})"
+        if whole and counts:
+            return f" (of a counter, --count {shlex.quote(name)} takes its counts)"
+        if cell.isdigit():
+            return f" (of both lines in one number, --a {name}[0] is the lowest bit)"
+        return " (of a voltage, --threshold 1.65V says from where on it is high)"
+
+    return option
 
 
 class _Changes:

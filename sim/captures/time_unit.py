@@ -29,7 +29,7 @@ class TimeUnit(NamedTuple):
 
 def unit_named(word: str) -> TimeUnit | None:
     """Return the unit that is called so; one of ticks has no rate, 0."""
-    unit = _UNIT_OF.get(plain_unit(word.strip().casefold()))
+    unit = _UNIT_OF.get(plain_unit(word.strip().casefold().removesuffix(".")))
     return None if unit is None else TimeUnit(unit, _PER_SECOND[unit])
 
 

@@ -141,6 +141,46 @@ FORMATS = [
         _text("time,a,b\n", lambda k, a, b: f"{_s(k, a, b)}\n{k * STEP_S + 1e-4:.6f},{'Xx'[k % 2]},{b}"),
         notes=("41 cells with an X: the level before holds there",),
     ),
+    Format(
+        "On and Off",
+        ".csv",
+        _text("time_ms;A;B\n", lambda k, a, b: f"{k / 4};{('Off', 'On')[a]};{('LOW', 'HIGH')[b]}".replace(".", ",")),
+    ),
+    Format(
+        "units in cells",
+        ".csv",
+        _text(
+            '"A","B","Time"\n',
+            lambda k, a, b: f"{a},{b},{250 * k - 99}.0 us" if k < 20 else f"{a},{b},{k / 4 - 0.099} ms",
+        ),
+    ),
+    Format(
+        "volts in cells", ".csv", _text("time,a,b\n", lambda k, a, b: f"{k / 4} ms,{3.3 * a} V,{3300 * b} mV"), VOLTS
+    ),
+    Format("units of any words", ".csv", _text("Time,A,B,n\ns,,Flag,rpm\n", lambda k, a, b: _s(k, a, b) + ",750")),
+    Format(
+        "a logger of engines",
+        ".msl",
+        _text('"MS3: 1.5"\n"Date: 5, 7"\nTime\tA\tB\ns\tbit\tbit\n', lambda k, a, b: _s(k, a, b).replace(",", "\t")),
+    ),
+    Format(
+        "times of day",
+        ".csv",
+        _text(
+            "Time,A,B\n",
+            lambda k, a, b: f"{'23:59:59' if k < 20 else '0:00:00'}.{(995_000 + 250 * k) % 1_000_000:06},{a},{b}",
+        ),
+        notes=("the time wraps 1 time, at midnight",),
+    ),
+    Format(
+        "Rigol without the last comma",
+        ".csv",
+        _text(
+            "X,CH1,CH2,Start,Increment\nSequence,Volt,Volt,-5e-03,2.5e-04\n",
+            lambda k, a, b: f"{k},{3.3 * a:.2e},{3.3 * b:.2e},",
+        ),
+        VOLTS,
+    ),
     Format("blanks", ".txt", _text("time a b\n", lambda k, a, b: f"  {k * STEP_S:.6f}   {a}  {b}")),
     Format("tabs", ".tsv", _text("time\ta\tb\n", lambda k, a, b: f"{k * STEP_S:.6f}\t{a}\t{b}")),
     Format(
@@ -168,6 +208,12 @@ FORMATS = [
         _text("timestamp,a,b\n", lambda k, a, b: f"2025-06-01T12:59:59.{900_000 + 250 * k:06}Z,{a},{b}"),
     ),
     Format("waveform", ".vcd", _text(_SCALARS, _scalars)),
+    Format("waveform without blanks", ".vcd", _text(_SCALARS.replace(" ! ", "! ").replace(' " ', '" '), _scalars)),
+    Format(
+        "waveform with fractions",
+        ".vcd",
+        _text(_SCALARS, lambda k, a, b: f"#{250 * k}.5\n" + _scalars(k, a, b).partition("\n")[2]),
+    ),
     Format("waveform with a mark", ".vcd", b"\xef\xbb\xbf" + _text(_SCALARS, _scalars, "\r\n")),
     Format("waveform, compressed", ".vcd.gz", gzip.compress(_text(_SCALARS, _scalars), mtime=0)),
     Format(

@@ -16,7 +16,7 @@ from tachometry.spec.language.option import ParameterError
         *[(cell, HELD) for cell in ("x", "X")],
         *[
             (cell, BAD)
-            for cell in ("", "2", "-1", "0.5", "00", "01", "nan", "inf", "1_0", "١", "high", "xx", "1 1", "1e")
+            for cell in ("", "2", "-1", "0.5", "00", "01", "nan", "inf", "1_0", "١", "tall", "xx", "1 1", "1e")
         ],
     ],
 )

@@ -9,13 +9,14 @@ import pytest
 from support.command import run
 from support.nightly import only
 
-from tachometry.sim.captures.count_log import CountLog, read_count_log
+from tachometry.sim.captures.count_log import ShaftLog, read_angle_log, read_count_log
 from tachometry.sim.captures.file import CaptureError
+from tachometry.spec import Encoder
 
 ROOT = Path(__file__).parents[3]
 
 
-def log(folder: Path, counts: list[int], wrap: int | None = None, head: str = "time [ms],n") -> CountLog:
+def log(folder: Path, counts: list[int], wrap: int | None = None, head: str = "time [ms],n") -> ShaftLog:
     rows = [f"{5 * k},{count}" for k, count in enumerate(counts)]
     (folder / "log.csv").write_text("\n".join([head, *rows, ""]))
     return read_count_log(folder / "log.csv", "n", wrap=wrap)
@@ -23,7 +24,7 @@ def log(folder: Path, counts: list[int], wrap: int | None = None, head: str = "t
 
 @pytest.mark.parametrize("decoding", [1, 2, 4])
 def test_edges_are_even_between_rows(decoding: int, tmp_path: Path) -> None:
-    recording = log(tmp_path, [8, 12, 12, 10]).recording(decoding)
+    recording = log(tmp_path, [8, 12, 12, 10]).recording(Encoder(9, decoding=decoding))
     quarters = 4 // decoding
     steps = np.diff(np.unwrap([(0, 1, 3, 2)[n] for n in recording.level], period=4))
     assert steps.tolist() == [1] * 4 * quarters + [-1] * 2 * quarters
@@ -51,7 +52,7 @@ def test_edges_are_even_between_rows(decoding: int, tmp_path: Path) -> None:
 )
 def test_a_counter_wraps(counts: list[int], wrap: int | None, total: list[int], tmp_path: Path) -> None:
     read = log(tmp_path, counts, wrap)
-    assert read.count.tolist() == total
+    assert read.place.tolist() == total
     told = " ".join(read.notes)
     assert ("wraps" in told) == (np.diff(counts).tolist() != np.diff(total).tolist())
     assert "the shaft is taken to turn evenly" in told
@@ -60,7 +61,7 @@ def test_a_counter_wraps(counts: list[int], wrap: int | None, total: list[int], 
 def test_of_rows_with_one_time_the_last_holds(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("; by hand\nn;time [ms]\n1;0,0\n2;0,0\n\n5;2,5\n6;2,5\n")
     read = read_count_log(tmp_path / "log.csv", "0")
-    assert (read.time.tolist(), read.count.tolist()) == ([0, 2.5e-3], [0, 4])
+    assert (read.time.tolist(), read.place.tolist()) == ([0, 2.5e-3], [0, 4])
     assert "2 rows have the time of the next one, which holds" in read.notes
 
 
@@ -81,7 +82,75 @@ def test_of_rows_with_one_time_the_last_holds(tmp_path: Path) -> None:
 def test_what_cannot_be_is_told(rows: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(f"time,n\n{rows}\n")
     with pytest.raises(CaptureError, match=re.escape(message)):
-        read_count_log(tmp_path / "log.csv", "n").recording(4)
+        read_count_log(tmp_path / "log.csv", "n").recording(Encoder(9))
+
+
+@pytest.mark.parametrize(
+    ("head", "values", "column", "turns"),
+    [
+        ("time_ms,shaft_deg", [350, 10, 100, 350], "shaft_deg", [0, 20, 110, 0]),
+        ("time_ms,theta [rad]", [3.1, -3.1, 3.1, 2.1], "theta", [0, 4.7662, 0, -57.2958]),
+        ("time_ms,n", [0, 0.5, 2.5, 2.25], "n:turn", [0, 180, 900, 810]),
+        ("time,n\nms,degrees", [0, 340, 700], "n", [0, 340, 700]),
+    ],
+)
+def test_an_angle_wraps_at_a_turn(
+    head: str, values: list[float], column: str, turns: list[float], tmp_path: Path
+) -> None:
+    rows = [f"{5 * k},{value}" for k, value in enumerate(values)]
+    (tmp_path / "log.csv").write_text("\n".join([head, *rows, ""]))
+    read = read_angle_log(tmp_path / "log.csv", column)
+    np.testing.assert_allclose(np.degrees(read.place), turns, atol=1e-4)
+    recording = read.recording(Encoder(90))
+    steps = np.diff(np.unwrap([(0, 1, 3, 2)[n] for n in recording.level], period=4))
+    assert steps.sum() == round(turns[-1])
+    assert (steps.min(), steps.max()) == (-1 if min(np.diff(turns)) < 0 else 1, 1)
+
+
+def test_an_edge_comes_where_the_angle_passes_it(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("time,a_deg\n0.0,0\n0.1,0.75\n0.3,-1.25\n")
+    recording = read_angle_log(tmp_path / "log.csv", "a_deg").recording(Encoder(90))
+    np.testing.assert_allclose(recording.time, [0, 0.1 * 0.5 / 0.75, 0.1 + 0.25 * 0.1, 0.1 + 1.25 * 0.1])
+    assert recording.level.tolist() == [0, 1, 0, 2]
+
+
+@pytest.mark.parametrize(
+    ("rows", "options", "counts"),
+    [
+        ("time_us\n700\n3200\n5700\n8200\n", "", 4),
+        ("n,time_ms\n5,0\n6,2.5\n7,5.0\n", "--pulse-times time_ms", 3),
+        ("gap_us,flag\n2500,0\n2500,1\n2600,0\n", "--pulse-periods gap_us", 3),
+        ("700\n3200\n5700\n", "--pulse-times 0 --time-unit us", 3),
+    ],
+)
+def test_rows_are_pulses(
+    rows: str, options: str, counts: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "log.csv").write_text(rows)
+    core = "--sensor pulses --decoding 1 --ppr 100 --clock 1MHz --tick 1ms --method m".split()
+    assert run("replay", tmp_path / "log.csv", *core, *options.split()) == 0
+    assert f"counts out {counts} " in " ".join(capsys.readouterr().out.split())
+    assert run("replay", tmp_path / "log.csv", *core[4:], *options.split()) == 2
+    assert "--sensor must be pulses for" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("head", "rows", "hint"),
+    [
+        ("time_ms,n", [0, 1, 2, 9], "(of a counter, --count n takes its counts)"),
+        ("time_ms,count", [0, 1, 2], "(of a counter, --count count takes its counts)"),
+        ("time_ms,pos_deg", [0, 1.5], "(of an angle, --angle pos_deg takes it)"),
+        ("time_ms,speed [rpm]", [300, 301], "(a speed is a motion: simulate --motion csv:FILE:'speed [rpm]')"),
+        ("time_ms,n,m", ["0,0", "1,9"], "(of a counter, --count m takes its counts)"),
+        ("time_ms,ab", [0, 1, 3], "lines in one number are --a ab[0] --b ab[1]"),
+    ],
+)
+def test_a_refusal_names_the_option(
+    head: str, rows: list[object], hint: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "log.csv").write_text("\n".join([head, *(f"{k},{row}" for k, row in enumerate(rows)), ""]))
+    assert run("replay", tmp_path / "log.csv", *"--ppr 100 --clock 1MHz --tick 1ms".split()) == 2
+    assert capsys.readouterr().err.rstrip().endswith(hint)
 
 
 def test_the_guide(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
@@ -128,15 +197,15 @@ def test_a_motion_counts_what_the_log_says(
         ("--count n --a n", "--a must not be given together with --count"),
         ("--count n --index", "--index must not be given together with --count"),
         ("--count n --sensor pulses", "--sensor must not be given together with --count"),
-        ("--count m", "--count of log.csv must be one of the columns time (0), n (1), not 'm'"),
+        ("--count m", "--count of log.csv must be one of the columns time_s (0), n (1), not 'm'"),
         ("--count n --wrap 5", "--wrap must be more than the counts of log.csv differ, 9, not 5"),
-        ("--wrap 5", "--wrap must not be given without --count"),
+        ("--wrap 5", "--wrap must not be given without --count or --angle"),
     ],
 )
 def test_options_of_counts(
     options: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "log.csv").write_text("time,n\n0,0\n1,9\n")
+    (tmp_path / "log.csv").write_text("time_s,n\n0,0\n1,9\n")
     monkeypatch.chdir(tmp_path)
     assert (
         run(

@@ -40,6 +40,13 @@ SCOPE = "Model,MSO44\nHorizontal Units,s\nLabel,,\nTIME,CH1,CH2"
         ("time,a,b", ["yes,0,1"], None, (",", "time,a,b", "", 1)),
         ("timestamp,a,b", ["2025-06-01T12:59:59.9Z,0,1"], None, (",", "timestamp,a,b", "", 1)),
         ("time,a,b", ["0.5,False,X"], None, (",", "time,a,b", "", 1)),
+        ("time_us", ["700", "3200"], None, (",", "time_us", "", 1)),
+        ("Time [ms]\nhh:mm:ss.ms", ["0:00:01.5"], None, (",", "Time [ms]", "hh:mm:ss.ms", 2)),
+        ("", ["700", "3200"], "0", (",", None, "", 0)),
+        ("Time,A,B,n\ns,,,rpm", ["0.5,0,1,300"], None, (",", "Time,A,B,n", "s,,,rpm", 2)),
+        ("Time,A,B\n,Flag,Flag", ["0.5,On,Off", "1.5,On,On"], None, (",", "Time,A,B", ",Flag,Flag", 2)),
+        ("when,A,n\nms,bit,kPa", [A], "when", (",", "when,A,n", "ms,bit,kPa", 2)),
+        ('"# made by hand, of 5"\ntime,a,b', [A], None, (",", "time,a,b", "", 2)),
     ],
 )
 def test_the_head_of_a_text(
@@ -54,9 +61,7 @@ def test_the_head_of_a_text(
     assert table.first == cells
 
 
-@pytest.mark.parametrize(
-    "text", ["", "\n\n", "# only\n; comments\n", "words without end\n", "time\n", "0.5\n1.5\n", "a,b\n"]
-)
+@pytest.mark.parametrize("text", ["", "\n\n", "# only\n; comments\n", "words without end\n", "time\n", "a,b\n"])
 def test_what_has_no_table(text: str) -> None:
     assert sniff(text.splitlines(keepends=True)) is None
 
