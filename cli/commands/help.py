@@ -2,6 +2,7 @@
 
 import click
 
+from tachometry.cli.options.motion import FORMS
 from tachometry.cli.options.option import LONG, GroupedCommand
 from tachometry.cli.options.option_aliases import meant
 
@@ -43,4 +44,6 @@ def help(context: click.Context, command: str | None, name: str | None) -> int:
         formatter = of_command.make_formatter()
         formatter.write_dl([record] if record else [])
         click.echo(formatter.getvalue().rstrip("\n"))
+        if name == "--motion":
+            click.echo("\n" + FORMS.replace("\b\n", ""))
     return 0

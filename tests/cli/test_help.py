@@ -120,6 +120,11 @@ def test_shared_options_say_what_every_method_does(capsys: pytest.CaptureFixture
     assert text.count("[default: bound-decay]") == 1
 
 
+def test_forms_of_a_motion_are_listed_with_its_help(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("help", "compare", "--motion") == 0
+    assert "trapezoid:SPEED:ACCEL_TIME:HOLD_TIME" in capsys.readouterr().out
+
+
 def test_the_list_of_commands_loads_nothing_heavy() -> None:
     code = """
 import sys
