@@ -11,6 +11,7 @@ from tachometry.sim.studies.sweeping.run import LoopResult
 from tachometry.sim.studies.sweeping.sweep import Row
 from tachometry.spec.language.units import plural
 
+_MUCH = 0.1  # share of a run at the limit of the current of which a user is warned
 _HEADS = [head for _, head in FIGURES.values()]
 _UNITS = {
     "time": "s",
@@ -29,6 +30,14 @@ _UNITS = {
 
 def print_loops(result: LoopResult) -> None:
     """Print a row per seed of a loop that is alone, and their mean; else a row per loop, the mean of its seeds."""
+    _print_table(result)
+    *_, (limited, _) = FIGURES.values()
+    if (worst := max((row[limited] or 0 for row in result.rows.values()), default=0)) > _MUCH:
+        text = f"the current is at its limit for {100 * worst:.3g}% of the run: raise --current-limit, or take a slower"
+        stdout_console().print(Text(f"WARNING: {text} --motion", style="bold yellow"), soft_wrap=True)
+
+
+def _print_table(result: LoopResult) -> None:
     grid, axes = result.grid, list(result.grid.axes)
     first = next(iter(grid.points.values()))
     if result.seeds:

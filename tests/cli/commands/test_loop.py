@@ -25,7 +25,11 @@ def test_one_loop_and_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[st
         files = ["--log", tmp_path / folder / "log.csv", "--csv", tmp_path / folder / "all.csv"]
         files += ["--plot", tmp_path / folder / "loop.png"]
         assert run(*SHORT, "--load", "20mNm:60ms:10ms", "--kv", "20", "--seeds", "2", "--seed", "7", *files) == 0
-    table = capsys.readouterr().out.splitlines()
+    out = capsys.readouterr().out
+    assert (
+        ("is at its limit" in out) == ("raise --current-limit" in out) == (float(out.split("%")[-2].split()[-1]) > 10)
+    )
+    table = out.splitlines()
     assert table[0].split()[:4] == ["seed", "RMS", "error", "(rad/s)"]
     assert [line.split()[0] for line in table[1:4]] == ["7", "8", "mean"]
     assert table[5] == "s; ramp:0:4rad/s:30ms+constant:4rad/s:50ms"
