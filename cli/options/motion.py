@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from tachometry.cli.options.option import Group, declared, option, refuse_without, take_values
 from tachometry.sim.encoder.options import EncoderOptions
+from tachometry.sim.signals.files import file_of
 from tachometry.spec import TachometerSpec
 from tachometry.spec.language.option import ParameterError, options_of
 from tachometry.spec.language.units import parse_time
@@ -24,13 +25,15 @@ Motions, joined by + into one:
   ramp:FROM:TO:TIME
   sine:AMPLITUDE:FREQUENCY:TIME
   trapezoid:SPEED:ACCEL_TIME:HOLD_TIME
-  s-curve:FROM:TO:TIME
+  s-curve:FROM:TO:TIME, or the greatest jerk in place of TIME, as 500rad/s3
   stop:TIME
+  torque:FROM:TORQUE:INERTIA:FRICTION:TIME  of a load, in Nm, kg m2, Nm s
   N*(SEGMENT+...)  repeats what is in it
-  csv:FILE    alone: a table with the header time,angle_rad in s and rad
+  csv:FILE, csv:FILE:COLUMN  alone: a text with times and a column of speeds
+              or angles, whose unit is in its name, as speed_rpm
   counts:FILE:TIME:COUNT  alone, in no loop or sweep: the log of a counter,
               by the names of its columns; see replay --count
-Units: rad/s, rev/s, rpm (0 has none); s (default), ms, us, ns;
+Units: rad/s, rev/s, rpm (0 has none); s, ms, us, ns;
   Hz (default), kHz, MHz, GHz."""
 
 
@@ -65,7 +68,7 @@ def tables_of(motion: str) -> list[Path]:
     """Return files that a motion reads, or the motions of several axes."""
     parts = [part.strip().partition(":") for part in {motion, *motion.split(",")}]
     return [
-        Path(table.rsplit(":", 2)[0] if kind == "counts" else table)
+        Path(table.rsplit(":", 2)[0] if kind == "counts" else file_of(table)[0])
         for kind, _, table in parts
         if kind in ("csv", "counts")
     ]

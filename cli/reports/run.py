@@ -121,6 +121,10 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
     ]
     if truth is not None and truth.n_lost:
         rows.append(("edges lost", f"{truth.n_lost} (pulses that the encoder missed: {truth.n_lost // 2})"))
+    if truth is not None and axis.recording.source is None and (jumps := truth.motion.jumps):
+        time, jump = max(jumps, key=lambda one: abs(one[1]))
+        unit, times = spec.scale.shown_unit, plural(len(jumps), "time")
+        rows.append(("note", f"the speed jumps {times}, most by {unit.of(jump):.6g} {unit.name} at {time:.6g} s"))
     if spec.filter_clocks:
         rows.append(("edges swallowed", f"{run.ticks.swallowed_edges[-1]} (glitch filter)"))
     if spec.index:

@@ -62,7 +62,8 @@ def unit_in(header: Header, column: int) -> str:
 def column_of(path: Path, header: Header, wanted: Channel, what: str) -> int:
     """Return the number of a column that is called so; OptionError of the option `what` if there is none."""
     names, text = [name.casefold() for name in header.names], str(wanted).strip()
-    for alike in (header.names, names, [parted(name)[0] for name in names]):
+    bare = [" " if number == header.time else parted(name)[0] for number, name in enumerate(names)]
+    for alike in (header.names, names, bare):
         if text in alike or text.casefold() in alike:
             return alike.index(text if text in alike else text.casefold())
     if text.isascii() and text.isdigit() and int(text) < len(names):

@@ -9,16 +9,17 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import accumulate
+from decimal import Decimal, localcontext
+from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tachometry.spec.language.files import read_text
+from tachometry.sim.signals.files import file_of
 from tachometry.spec.language.option import ParameterError
-from tachometry.spec.language.units import ANGLE, FREQUENCY, SPEED, TIME, Units, read_nearest
+from tachometry.spec.language.units import ANGLE, FREQUENCY, PLAIN, SPEED, TIME, TORQUE, Units, read_nearest
 
 FloatArray = NDArray[np.float64]
 
@@ -29,11 +30,13 @@ _FIELDS: dict[str, dict[str, Units]] = {
     "trapezoid": {"SPEED": SPEED, "ACCEL_TIME": TIME, "HOLD_TIME": TIME},
     "s-curve": {"FROM": SPEED, "TO": SPEED, "TIME": TIME},
     "stop": {"TIME": TIME},
+    "torque": {"FROM": SPEED, "TORQUE": TORQUE, "INERTIA": PLAIN, "FRICTION": PLAIN, "TIME": TIME},
 }
 _FORMS = ", ".join(":".join((kind, *fields)) for kind, fields in _FIELDS.items()) + ", N*(SEGMENT+...)"
 _REPEATED = re.compile(r"(?<!\d)(\d{1,4})\*\(([^()]*)\)")
-_CSV_HEADER = ["time", "angle_rad"]
-_MOST_CSV = 1 << 26  # bytes
+_JERK = re.compile(r"(.*/s)\^?3")  # rad/s3
+_SIGNED = (SPEED, TORQUE)
+_PIECES = 256  # of even acceleration, for a load that comes to its speed
 _BELOW = 1e30  # times, angles, speeds and accelerations: what is computed of them is finite
 
 # (-1)^n (2 pi)^(2n+1) / (2n+1)!, highest power first
@@ -132,6 +135,15 @@ class Motion:
     def duration(self) -> float:
         """Length of the motion, seconds."""
         return float(self.breakpoints[-1])
+
+    @property
+    def jumps(self) -> list[tuple[float, float]]:
+        """Times at which the speed jumps between two segments, seconds, and by how much, rad/s."""
+        end = self.start_speed + self.constant_acceleration * np.diff(self.breakpoints)
+        end = end + self.sine_speed * sin2pi(self.sine_frequency * np.diff(self.breakpoints))
+        jump = self.start_speed[1:] - end[:-1]
+        rows = np.flatnonzero(np.abs(jump) > 1e-9 * np.abs(self.start_speed).max())
+        return [(float(self.breakpoints[row + 1]), float(jump[row])) for row in rows.tolist()]
 
     @property
     def max_travel(self) -> float:
@@ -234,11 +246,12 @@ def parse_motion(text: str) -> Motion:
     ----------
     text : str
         Segments joined by `+`: constant:SPEED:TIME, ramp:FROM:TO:TIME, sine:AMPLITUDE:FREQUENCY:TIME,
-        trapezoid:SPEED:ACCEL_TIME:HOLD_TIME, s-curve:FROM:TO:TIME (the acceleration is a raised cosine), stop:TIME.
-        N*(...) repeats segments. Or csv:FILE alone: a table with the header `time,angle_rad` (seconds, rad) between
-        whose rows the angle is interpolated linearly; its first time becomes 0.
-        Speeds are 0, or in rad/s, rev/s or rpm, times in s (default), ms, us or ns, frequencies in Hz (default),
-        kHz, MHz or GHz.
+        trapezoid:SPEED:ACCEL_TIME:HOLD_TIME, s-curve:FROM:TO:TIME (the acceleration is a raised cosine), or with its
+        greatest jerk, as 500rad/s3, in place of the time; stop:TIME; and torque:FROM:TORQUE:INERTIA:FRICTION:TIME, a
+        load with an inertia in kg m² and a friction in Nm s. N*(...) repeats segments. Or csv:FILE or csv:FILE:COLUMN
+        alone: a text with times and a column of speeds or angles, whose unit is in its name. Between two rows what is
+        in the column is interpolated linearly; the first time becomes 0.
+        Speeds are 0, or in rad/s, rev/s or rpm, times in s, ms, us or ns, frequencies in Hz (default), kHz, MHz or GHz.
 
     Raises
     ------
@@ -262,13 +275,21 @@ def _parse_segment(text: str) -> list[_Segment]:
     fields = _FIELDS.get(kind)
     if fields is None or len(numbers) != len(fields):
         raise ParameterError("motion segment", f"must be one of {_FORMS}, csv:FILE, not {text!r}")
-    values = []
+    values = list[float]()
     for (name, units), number in zip(fields.items(), numbers, strict=True):
         default = next(iter(units))
-        plain = "" if units is SPEED and number.strip() not in ("0", "0.0") else default  # 300 may be rad/s or rpm
+        if kind == "s-curve" and (jerk := _JERK.fullmatch(number.strip())):
+            # The greatest jerk of a raised cosine is 2 pi times the change of the speed over the time squared.
+            steepest = read_nearest("JERK of s-curve", jerk[1], SPEED)
+            if steepest <= 0 or values[0] == values[1]:
+                raise ValueError(f"JERK of s-curve must be more than 0 and change the speed, not {number!r}")
+            values.append(math.sqrt(2 * math.pi * abs(values[1] - values[0]) / steepest))
+            continue
+        zero = number.strip() in ("0", "0.0")
+        plain = "" if units in (SPEED, TIME) and not zero else default  # 300 may be rad/s or rpm
         value = read_nearest(f"{name} of {kind}", number, units, plain)
-        if units is not SPEED and value <= 0:
-            raise ValueError(f"{name} of {kind} must be more than 0 {default}, not {number!r}")
+        if units not in _SIGNED and value <= 0 and (name != "FRICTION" or value < 0):
+            raise ValueError(f"{name} of {kind} must be more than 0{f' {default}' * bool(default)}, not {number!r}")
         values.append(value)
     match kind, values:
         case "constant", [speed, duration]:
@@ -280,37 +301,37 @@ def _parse_segment(text: str) -> list[_Segment]:
         case "s-curve", [start, end, duration]:
             rise = end - start
             return [_Segment(duration, start, rise / duration, -rise / (2 * math.pi), 1 / duration)]
+        case "torque", [start, torque, inertia, friction, duration]:
+            return _loaded(start, torque / inertia, friction / inertia, duration)
         case "trapezoid", [speed, rise, hold]:
             return [_Segment(rise, 0.0, speed / rise), _Segment(hold, speed), _Segment(rise, speed, -speed / rise)]
         case _:
             return [_Segment(values[0])]
 
 
-def _read_csv(file: str) -> Motion:
-    try:
-        lines = read_text(Path(file), _MOST_CSV).splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise ValueError(f"motion file {file!r} cannot be read: {reason}") from error
-    if not lines or [cell.strip() for cell in lines[0].split(",")] != _CSV_HEADER:
-        shown = lines[0][:60] if lines else ""
-        hint = f"; a log of counts is counts:{file}:TIME:COUNT" if "," in shown else ""
-        raise ValueError(f"{file}:1: header must be 'time,angle_rad', not {shown!r}{hint}")
-    rows: list[tuple[float, float]] = []
-    for number, line in enumerate(lines[1:], start=2):
-        if not line.strip():
-            continue
-        try:
-            time, angle = map(float, line.split(","))
-        except ValueError:
-            raise ValueError(f"{file}:{number}: row must be two numbers TIME,ANGLE, not {line[:60]!r}") from None
-        if not (math.isfinite(time) and math.isfinite(angle)):
-            raise ValueError(f"{file}:{number}: time and angle must be finite, not {line!r}")
-        if rows and time <= rows[-1][0]:
-            raise ValueError(f"{file}:{number}: time must be more than {rows[-1][0]} s, not {time} s")
-        rows.append((time, angle))
-    if len(rows) < 2:
-        raise ValueError(f"{file}:{len(lines)}: file must have at least 2 rows, not {len(rows)}")
-    table = np.array(rows)
-    with np.errstate(all="ignore"):  # Motion refuses what is not finite
-        return Motion.of_table(table[:, 0] - table[0, 0], table[:, 1])
+def _loaded(start: float, acceleration: float, rate: float, duration: float) -> list[_Segment]:
+    """Return a load that a torque accelerates so, and friction slows down by so much of its speed in a second."""
+    if not rate:
+        return [_Segment(duration, start, acceleration)]
+    step, end = duration / _PIECES, acceleration / rate
+    with localcontext(prec=20):  # whose exponential is rounded rightly, so it is the same on every machine
+        left = [float((Decimal(-rate * step) * piece).exp()) for piece in range(_PIECES + 1)]
+    speeds = [end + (start - end) * share for share in left]
+    return [_Segment(step, one, (other - one) / step) for one, other in pairwise(speeds)]
+
+
+def _read_csv(text: str) -> Motion:
+    from tachometry.sim.captures.header import PLAIN as AS_IT_IS
+    from tachometry.sim.captures.series import ANGLES, SPEEDS, read_series
+
+    file, column = file_of(text)
+    series, unit = read_series(Path(file), column, "motion", AS_IT_IS)
+    if unit in ANGLES:
+        with np.errstate(all="ignore"):  # Motion refuses what is not finite
+            return Motion.of_table(series.time, series.value * ANGLES[unit])
+    if not unit:
+        units = ", ".join((*SPEEDS, *ANGLES))
+        raise ParameterError("motion", f"must have a unit in the name of column {series.name} of {file}: {units}")
+    speed = (series.value * SPEEDS[unit]).tolist()
+    rows = zip(np.diff(series.time).tolist(), pairwise(speed), strict=True)
+    return Motion._joined(_Segment(time, one, (other - one) / time) for time, (one, other) in rows)

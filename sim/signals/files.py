@@ -12,6 +12,12 @@ from numpy.typing import NDArray
 _ROWS = 1 << 16  # rows that are Python objects at once
 
 
+def file_of(text: str) -> tuple[str, str | None]:
+    """Return the file and the column of FILE or FILE:COLUMN."""
+    file, _, column = text.partition(":")
+    return (file, column) if column and Path(file).exists() else (text, None)
+
+
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Give a path to write to, which takes the place of `path` at the end; nothing is left of it after an error."""
