@@ -58,25 +58,14 @@ _OPTIONS = [
 ]
 
 
+_LINES = ("a", "b", "c", "z", "tick_in", "threshold", "samplerate", "pulse_times", "pulse_periods")
+
+
 def _read(
-    *,
-    a: str | None,
-    b: str | None,
-    c: str | None,
-    z: str | None,
-    tick_in: str | None,
-    time: str | None,
-    time_unit: str | None,
-    threshold: str | None,
-    samplerate: str | None,
-    count: str | None,
-    angle: str | None,
-    pulse_times: str | None,
-    pulse_periods: str | None,
-    wrap: int | None,
-    **others: Any,
+    *, time: str | None, time_unit: str | None, count: str | None, angle: str | None, wrap: int | None, **others: Any
 ) -> dict[str, Any]:
-    lines = dict(a=a, b=b, c=c, z=z, tick_in=tick_in, threshold=threshold, samplerate=samplerate)
+    lines: dict[str, str | None] = {name: others.pop(name) for name in _LINES}
+    a, b, c, z, tick_in, threshold, samplerate, pulse_times, pulse_periods = lines.values()
 
     def read(capture: Path, spec: CoreSpec, axis: int = 0) -> Recording:
         from tachometry.sim.captures.cell_parsers import parse_threshold
@@ -103,7 +92,6 @@ def _read(
             if column is None:
                 continue
             more = {"sensor": None if alone.encoder.plain else sensor, "index": alone.index}
-            more |= {"pulse_times": pulse_times, "pulse_periods": pulse_periods}
             _refuse_lines(name, {**lines, **more, "complements": alone.front_end.complemented or None})
             read_log = read_count_log if name == "count" else read_angle_log
             log = read_log(capture, _of_axis(name, column, axis, axes) or "", text, wrap)

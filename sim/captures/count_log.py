@@ -66,11 +66,8 @@ class ShaftLog:
 def read_count_log(path: Path, count: Channel, text: TextOptions = PLAIN, wrap: int | None = None) -> ShaftLog:
     """Read a text with a column of times and one of counts, see `read_series`.
 
-    Parameters
-    ----------
-    wrap : int or None
-        The counter goes from one less than this to 0. `NO_WRAP`: it does not wrap. None: if it has 16 or 32 bits, as
-        seen from a jump by more than half of them.
+    The counter goes from one less than `wrap` to 0. `NO_WRAP`: it does not wrap. None: if it has 16 or 32 bits, as seen
+    from a jump by more than half of them.
     """
     series, _ = read_series(path, count, "count", text, whole=True)
     counts = series.value.astype(np.int64)
@@ -88,11 +85,7 @@ def read_count_log(path: Path, count: Channel, text: TextOptions = PLAIN, wrap: 
 def read_angle_log(path: Path, angle: str, text: TextOptions = PLAIN, wrap: int | None = None) -> ShaftLog:
     """Read a text with a column of times and one of angles, whose name may be followed by `:` and their unit.
 
-    Parameters
-    ----------
-    wrap : int or None
-        `NO_WRAP`: the angle does not wrap. None: it wraps at a turn if all angles are within one, and it jumps by more
-        than half of it.
+    `wrap` is `NO_WRAP` or None: it wraps at a turn if all angles are within one, and it jumps by more than half of it.
     """
     if wrap:
         raise OptionError("wrap", f"must be 0 or left out with --angle: an angle wraps at a turn, not at {wrap}")

@@ -102,27 +102,12 @@ def choose_channels(
     others: Mapping[str, Channel] = NONE,
     vectors: Mapping[int, str] = NO_VECTORS,
 ) -> tuple[Line, ...]:
-    """Find the encoder lines among the channels of a capture: A, B and what else is wanted.
+    """Return the encoder lines among the channels of a capture: A, B and others, by their names.
 
-    Parameters
-    ----------
-    path : Path
-        File that messages name.
-    channels : mapping from number to name
-        Channels that the capture holds, in order; numbers count from 0, as sigrok's D0 to D7 do.
-    a, b : str, int or None
-        Name of the channel (in this spelling, else in any case, else without its scopes), else its number. When not
-        given: the channels named A and B if there are both, else the first two. With `SAME` for b there need not be
-        two.
-    others : mapping of str to str or int
-        Likewise, of further lines by their names.
-    vectors : mapping from number to name
-        Channels that are numbers: `name[1]`, or `name1` if there is no such channel, is bit 1.
-
-    Raises
-    ------
-    CaptureError
-        If there are fewer than two channels, if one is unknown, or if two are the same.
+    A line is given by the name of its channel (in this spelling, else in any case, else without its scopes), else by
+    its number, from 0. A and B, when not given, are the channels named A and B if there are both, else the first two;
+    with `SAME` for b there need not be two. Of `vectors`, which are numbers, `name[1]`, or `name1` if there is no such
+    channel, is bit 1. It raises CaptureError if there are too few channels, one is unknown, or two are the same.
     """
     texts = [f"{name} ({number})" for number, name in channels.items()]
     texts += [f"{name}[bit]" for number, name in vectors.items() if number not in channels]

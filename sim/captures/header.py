@@ -19,29 +19,15 @@ from tachometry.spec.language.units import TIME
 
 @dataclass(frozen=True)
 class TextOptions:
-    """Says how a text is read, where it does not say it.
+    """How a text is read, where it does not say it; columns are names, or numbers from 0."""
 
-    Parameters
-    ----------
-    time : str, int or None
-        Column of the times: its name, else its number among all columns, from 0. None: the one that is named so.
-    unit : TimeUnit or None
-        Of the times. None: as their name says, else seconds.
-    threshold : Threshold or None
-        Of columns that are voltages. None: they are levels, 0 or 1.
-    slowest_s : float or None, seconds
-        Edges that are further apart are taken for a mistake where nothing says the unit of the times.
-    pulse_times, pulse_periods : str, int or None
-        Column in place of `time` of a text that has a row for each pulse: when it came, or how long after the one
-        before.
-    """
-
-    time: Channel | None = None
-    unit: TimeUnit | None = None
-    threshold: Threshold | None = None
+    time: Channel | None = None  # column of the times; None: the one that is named so
+    unit: TimeUnit | None = None  # of the times; None: as their name says, else seconds
+    threshold: Threshold | None = None  # of columns that are voltages; None: they are levels, 0 or 1
+    # seconds: edges further apart are taken for a mistake where nothing says the unit of the times
     slowest_s: float | None = None
-    pulse_times: Channel | None = None
-    pulse_periods: Channel | None = None
+    pulse_times: Channel | None = None  # the column in place of `time`, of a text that has a row for each pulse
+    pulse_periods: Channel | None = None  # likewise, of the times since the pulse before
 
 
 PLAIN = TextOptions()

@@ -44,25 +44,15 @@ def read_csv(
     *,
     _block: int = BLOCK,
 ) -> Recording:
-    """Read two to four channels of a text with a line of names, such as `time,a,b`, and levels 0 or 1.
+    """Read two to four channels of a text with a line of names, such as `time,a,b`, and levels, see
+    docs/guides/encoder.md.
 
     Rows are change points or samples; rows that change nothing are dropped. Times count from the first row in which all
-    levels are known, and the last row ends the recording. Each column but that of the time is a channel, in any order,
-    and only those chosen are parsed. docs/guides/encoder.md says which texts there are: how columns are separated, what
-    may stand above the rows, and what says the unit of the times.
-
-    Without a column of times, a row is a sample, and the last row lasts for its sample, too. What sigrok writes in
-    comments is used: the samplerate, and the names of the channels.
+    levels are known, and the last row ends the recording. Without a column of times, a row is a sample, and the last
+    row lasts for its sample, too. Rows are pulses if `options` say so, or if there are only times.
 
     A channel is the name of a column or its number from 0, the time left out; `state[1]` is bit 1 of the whole numbers
-    in a column. `options` say what the text does not; the other arguments are as of `read_sr`.
-
-    Raises
-    ------
-    CaptureError
-        If the file is missing, empty, or has no names of its columns, nor numbers that are given; for an unknown
-        channel; if its rows cannot be dated; for a row with too few or too many fields, a time that is not a number or
-        decreases, or a level that is neither 0 nor 1.
+    in a column. Other arguments are as of `read_sr`. It raises CaptureError for a file or a row that is none of this.
     """
     path = Path(path)
     rows_are_pulses = options.pulse_times is not None or options.pulse_periods is not None
@@ -227,20 +217,9 @@ class _Changes:
 def write_csv(path: str | os.PathLike[str], recording: Recording) -> None:
     """Write a recording as text with the header `time,a,b`, and `z` and `tick_in` if it has these lines.
 
-    `read_csv`, given the names of these lines, returns the same changes and duration.
-
-    Times are the shortest decimals that read as the same float64, equal on every machine. A last row without a change
-    marks the end of the recording.
-
-    Parameters
-    ----------
-    path : path
-        Takes its new content only when all is written.
-
-    Raises
-    ------
-    CaptureError
-        If the file cannot be written.
+    `read_csv`, given the names of these lines, returns the same changes and duration: times are the shortest decimals
+    that read as the same float64. A last row without a change marks the end of the recording. The file takes its new
+    content only when all is written; CaptureError if it cannot be.
     """
     columns: list[NDArray[np.generic]] = [recording.time + 0.0, *recording.lines.values()]  # no -0.0
     if recording.duration > recording.time[-1]:
