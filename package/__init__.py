@@ -14,9 +14,9 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # else these are imported when they are asked for
-    from tachometry.api import Run, Tachometer, compare, generate, read_capture, replay, simulate
+    from tachometry.api import Run, Tachometer, compare, generate, plan, read_capture, replay, simulate
 
-__all__ = ["Run", "Tachometer", "__version__", "compare", "generate", "read_capture", "replay", "simulate"]
+__all__ = ["Run", "Tachometer", "__version__", "compare", "generate", "plan", "read_capture", "replay", "simulate"]
 
 __version__: str
 

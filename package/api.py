@@ -1,11 +1,16 @@
-"""The functions of a script or notebook make a core by its options, simulate, replay, compare and write it."""
+"""The functions of a script or notebook make a core by its options, plan, simulate, replay, compare and write it."""
+
+from __future__ import annotations
 
 import inspect
 import os
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +24,22 @@ from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
 from tachometry.sim.signals.progress import no_bar
 from tachometry.sim.signals.recording import Recording
+from tachometry.sim.signals.shown import Shown
 from tachometry.sim.studies.comparing.comparison import Comparison, Source, comparison
+from tachometry.sim.studies.plan import Plan, default_range, plan_at
 from tachometry.sim.studies.simulation import Axis, Simulation
 from tachometry.sim.studies.simulation import simulate as simulation_of
 from tachometry.spec import METHODS, CoreSpec, TachometerSpec, common_options, of_options, own_options
 from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.language.option import ParameterError, options_of, read_options
+from tachometry.spec.language.units import format_time
 
-__all__ = ["Run", "Tachometer", "compare", "generate", "read_capture", "replay", "simulate"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tachometry.options import CoreOptions, EncoderFaults
+
+__all__ = ["Run", "Tachometer", "compare", "generate", "plan", "read_capture", "replay", "simulate"]
 
 _OPTIONS = {
     about.name.replace("-", "_"): about
@@ -35,7 +48,7 @@ _OPTIONS = {
 _WORDS = [f"--{about.name}" for about in _OPTIONS.values()]
 
 
-def Tachometer(**options: object) -> AnySpec:  # a noun, as it makes what it says
+def Tachometer(**options: Unpack[CoreOptions]) -> AnySpec:  # a noun, as it makes what it says
     """Return a core, as `tachometry generate` makes it of options of these names, with _ for each - within a name.
 
     Parameters
@@ -59,8 +72,8 @@ def Tachometer(**options: object) -> AnySpec:  # a noun, as it makes what it say
         if name not in Tachometer.__signature__.parameters:  # type: ignore[attr-defined]
             near = [f": did you mean {one.lstrip('-').replace('-', '_')}" for one in meant(name, _WORDS)]
             raise ParameterError(name, f"must not be given, there is no such option{''.join(near[:1])}")
-    texts = {name.replace("_", "-"): _text(value) for name, value in options.items() if value is not None}
-    return of_options(texts)
+    with _in_python():
+        return of_options(_texts(options))
 
 
 Tachometer.__signature__ = inspect.Signature(  # type: ignore[attr-defined]  # editors complete the names
@@ -72,12 +85,34 @@ Tachometer.__signature__ = inspect.Signature(  # type: ignore[attr-defined]  # e
 )
 
 
-def _text(value: object) -> str:
-    return ("no", "yes")[value] if isinstance(value, bool) else str(value)
+def _texts(options: Mapping[str, object]) -> dict[str, str]:
+    """Return options as the command line has them."""
+    return {name.replace("_", "-"): _text(name, value) for name, value in options.items() if value is not None}
 
 
-@dataclass(frozen=True)
-class Run:
+def _text(name: str, value: object) -> str:
+    if isinstance(value, float) and (about := _OPTIONS.get(name)) and about.metavar == "TIME":
+        raise ParameterError(name, f'must have its unit, as in "{format_time(Fraction(str(value)))}", not {value}')
+    if isinstance(value, bool):
+        return ("no", "yes")[value]
+    return str(int(value) if isinstance(value, float) and value.is_integer() else value)
+
+
+@contextmanager
+def _in_python() -> Iterator[None]:
+    """Call options by their names in Python where a message has those of the command line."""
+    try:
+        yield
+    except ValueError as error:
+        said = [re.sub(r"--([a-z][\w-]*)", lambda one: one[1].replace("-", "_"), str(text)) for text in error.args]
+        if isinstance(error, ParameterError):
+            error.parameter, error.rest = error.parameter.replace("-", "_"), said[1]
+        error.args = tuple(said)
+        raise
+
+
+@dataclass(frozen=True, repr=False)
+class Run(Shown):
     """Holds what a core has shown, compared with its golden model in every bit.
 
     Parameters
@@ -121,15 +156,57 @@ class Run:
         """Position at each tick in counts, shape (m,)."""
         return self._axis.run.ticks.position
 
-    def plot(self, path: str | os.PathLike[str]) -> None:
-        """Draw velocity, error, pulse numbers and measurement times into a .png or .pdf."""
-        from tachometry.sim.plots.run import save_plot  # Matplotlib is slow to import
+    def plot(self, path: str | os.PathLike[str] | None = None) -> Figure | None:
+        """Draw velocity, error, pulse numbers and measurement times into a .png or .pdf; else return the figure."""
+        from tachometry.sim.plots.run import draw, save_plot  # Matplotlib is slow to import
 
         truth = self._axis.truth
-        save_plot(Path(path), self._axis.spec, self._axis.run, None if truth is None else truth.true_speed)
+        what = self._axis.spec, self._axis.run, None if truth is None else truth.true_speed
+        if path is None:
+            return draw(*what)
+        save_plot(Path(path), *what)
+        return None
+
+    def _repr_png_(self) -> bytes:
+        from tachometry.sim.plots.style import picture
+
+        return picture(lambda: self.plot(), ".png")  # type: ignore[arg-type,return-value]
+
+    def shown(self) -> tuple[str, list[list[str]]]:
+        """Return how long it is, how fast the shaft was, and how far the velocity is from it."""
+        axis, unit = self._axis, self._axis.spec.scale.shown_unit
+        rows = [["updates", str(len(axis.run.updates))], ["mismatches", str(self.n_mismatches)]]
+        rows.append(["counts", str(axis.counts_out)])
+        if len(self.velocity):
+            ends = " to ".join(f"{unit.of(value):.6g}" for value in (self.velocity.min(), self.velocity.max()))
+            rows.append(["velocity", f"{ends} {unit.name}"])
+        if axis.error is not None:
+            rows.append(["error, RMS", f"{unit.of(axis.error.rms):.4g} {unit.name}"])
+        return f"run of method {axis.spec.method}, {len(axis.run.ticks)} ticks", rows
 
 
-def simulate(spec: AnySpec, motion: str | Sequence[str], *, engine: str = "auto", **encoder: object) -> Run:
+def plan(spec: AnySpec, speeds: Sequence[float] | None = None) -> Plan:
+    """Return what a core measures at constant speeds of an ideal encoder, as `tachometry plan` prints it.
+
+    Parameters
+    ----------
+    spec : AnySpec
+    speeds : sequence of float or None, rad/s
+        None: eight speeds over the range of the core.
+
+    Examples
+    --------
+    >>> spec = Tachometer(ppr=500, clock="1MHz", tick="1ms", method="s")
+    >>> float(plan(spec, [10.0]).resolution[0]) < 0.2
+    True
+    """
+    core = spec.tachometer
+    return plan_at(core, np.geomspace(*default_range(core), 8) if speeds is None else speeds)
+
+
+def simulate(
+    spec: AnySpec, motion: str | Sequence[str], *, engine: str = "auto", **encoder: Unpack[EncoderFaults]
+) -> Run:
     """Run a core on a virtual encoder, against its golden model, as `tachometry simulate` does.
 
     Parameters
@@ -184,7 +261,7 @@ def replay(spec: AnySpec, *captures: str | os.PathLike[str] | Recording, engine:
     return _run(spec, "the capture", [with_last_tick(one, _core(spec)) for one in recordings], None, engine)
 
 
-def compare(specs: Sequence[TachometerSpec], motion: str, **encoder: object) -> Comparison:
+def compare(specs: Sequence[TachometerSpec], motion: str, **encoder: Unpack[EncoderFaults]) -> Comparison:
     """Compare cores on the same edges of a virtual encoder, as `tachometry compare` does.
 
     Parameters
@@ -265,15 +342,15 @@ def generate(
     return [*places.values()]
 
 
-def _recorded(spec: AnySpec, motion: str, axis: int, encoder: dict[str, Any]) -> Encoding:
+def _recorded(spec: AnySpec, motion: str, axis: int, encoder: Mapping[str, object]) -> Encoding:
     known = [about.name.replace("-", "_") for about in options_of(EncoderOptions)]
     for name in encoder:
         if name not in known:
             raise ParameterError(name, f"must be an option of the encoder: {', '.join(known)}")
-    texts = {name.replace("_", "-"): _text(value) for name, value in encoder.items()}
-    values = read_options(EncoderOptions, texts)
-    whole = VirtualEncoder.of_core(spec.tachometer, **values)
-    return replace(whole, seed=whole.seed + axis).record(parse_motion(motion))
+    with _in_python():
+        values = read_options(EncoderOptions, _texts(encoder))
+        whole = VirtualEncoder.of_core(spec.tachometer, **values)
+        return replace(whole, seed=whole.seed + axis).record(parse_motion(motion))
 
 
 def _run(spec: AnySpec, source: str, recordings: list[Recording], truths: list[Encoding] | None, engine: str) -> Run:

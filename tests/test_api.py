@@ -4,6 +4,7 @@ import doctest
 import inspect
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,9 +12,11 @@ from support.command import run as command
 
 import tachometry
 from tachometry import api
+from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.spec import ParameterError, TachometerSpec, of_manifest
+from tachometry.spec.language.option import options_of
 
-CORE = {"ppr": 500, "clock": "1MHz", "tick": "1ms", "max_time": "20ms"}
+CORE: dict[str, Any] = {"ppr": 500, "clock": "1MHz", "tick": "1ms", "max_time": "20ms"}
 
 
 def test_examples_of_docstrings() -> None:
@@ -45,7 +48,7 @@ def test_names_are_there_and_completed() -> None:
         ({"method": "m", "loop": True, "kp": 6400, "kv": 160}, "--method m --loop --kp 6400 --kv 160"),
     ],
 )
-def test_cores_and_their_files_are_those_of_the_command(options: dict[str, object], words: str, tmp_path: Path) -> None:
+def test_cores_and_their_files_are_those_of_the_command(options: dict[str, Any], words: str, tmp_path: Path) -> None:
     spec = tachometry.Tachometer(**CORE, max_speed="400rad/s", **options)
     common = "--ppr 500 --clock 1MHz --tick 1ms --max-time 20ms --max-speed 400rad/s"
     assert command("generate", *common.split(), *words.split(), "--name", "core", "-o", tmp_path / "command") == 0
@@ -78,15 +81,60 @@ def test_axes_have_their_own_runs() -> None:
 
 
 def test_a_picture_is_drawn(tmp_path: Path) -> None:
-    tachometry.simulate(tachometry.Tachometer(**CORE, method="s"), "constant:300rpm:30ms").plot(tmp_path / "p.png")
-    assert (tmp_path / "p.png").stat().st_size > 10_000
+    run = tachometry.simulate(tachometry.Tachometer(**CORE, method="s"), "constant:300rpm:30ms")
+    assert run.plot(tmp_path / "p.png") is None
+    assert (tmp_path / "p.png").read_bytes() == run._repr_png_()
+    figure = run.plot()
+    assert figure is not None
+    assert figure.axes[0].get_lines()
+
+
+def test_results_print_in_ten_lines() -> None:
+    spec = tachometry.Tachometer(**CORE, method="s")
+    cores = [tachometry.Tachometer(**CORE, method=method) for method in ("s", "m", "t", "mt", "rairan")]
+    assert isinstance(spec, TachometerSpec)
+    results: list[Any] = [
+        spec,
+        tachometry.plan(spec),
+        tachometry.simulate(spec, "constant:300rpm:30ms"),
+        tachometry.compare([core for core in cores if isinstance(core, TachometerSpec)], "constant:300rpm:30ms"),
+    ]
+    for result in results:
+        assert repr(result).count("\n") < 10
+    assert repr(results[1]).splitlines()[1].split("  ")[0] == "speed (rad/s)"
+    assert "mismatches  0\n" in repr(results[2])
+    assert [line.split()[0] for line in repr(results[3]).splitlines()[2:]] == ["s", "m", "t", "mt", "rairan"]
+    assert results[3]._repr_html_().count("<tr>") == 6
+
+
+def test_the_stub_has_every_option() -> None:
+    """If this fails, write what is compared into the file."""
+
+    def of(name: str, fields: list[str]) -> str:
+        return f"class {name}(TypedDict, total=False):\n" + "".join(fields)
+
+    named = inspect.signature(api.Tachometer).parameters
+    core = [f"    {name}: {'bool' if _is_flag(name) else 'Value'} | None\n" for name in named]
+    faults = [f"    {about.name.replace('-', '_')}: Value | None\n" for about in options_of(EncoderOptions)]
+    head = "from typing import TypeAlias, TypedDict\n\nValue: TypeAlias = str | int | float\n\n"
+    wanted = head + of("CoreOptions", core) + "\n" + of("EncoderFaults", faults)
+    stub = Path(__file__).parent.parent / "package" / "options.pyi"
+    assert stub.read_text(encoding="utf-8") == wanted
+
+
+def _is_flag(name: str) -> bool:
+    return name in ("parallel", "loop") or (name in api._OPTIONS and api._OPTIONS[name].flag)
 
 
 def test_what_is_wrong_is_said() -> None:
     spec = tachometry.Tachometer(**CORE, method="s")
     assert isinstance(spec, TachometerSpec)
     with pytest.raises(ParameterError, match="jiter must be an option of the encoder: vibration, jitter"):
-        tachometry.simulate(spec, "constant:300rpm:30ms", jiter=0.1)
+        tachometry.simulate(spec, "constant:300rpm:30ms", jiter=0.1)  # type: ignore[call-arg]
+    with pytest.raises(ParameterError, match=r'^tick must have its unit, as in "100us", not 0.0001$'):
+        tachometry.Tachometer(ppr=500, clock=48e6, tick=1e-4)
+    with pytest.raises(ParameterError, match=r"^bounds must be left out with axes: "):
+        tachometry.Tachometer(**CORE, method="s", axes=2, bounds=True)
     with pytest.raises(ValueError, match="motion must be one for each of 1 axes, not 2"):
         tachometry.simulate(spec, ["constant:300rpm:30ms"] * 2)
     with pytest.raises(ValueError, match="captures must be one for each of 1 axes, not 0"):
@@ -94,4 +142,4 @@ def test_what_is_wrong_is_said() -> None:
     with pytest.raises(ValueError, match="specs must be of different methods"):
         tachometry.compare([spec, spec], "constant:300rpm:30ms")
     with pytest.raises(ParameterError, match="there is no such option: did you mean ppr"):
-        tachometry.Tachometer(**CORE, method="s", pprr=3)
+        tachometry.Tachometer(**CORE, method="s", pprr=3)  # type: ignore[call-arg]

@@ -40,10 +40,11 @@ def save_plot(path: Path, spec: TachometerSpec, run: Run, true_speed: TrueSpeed 
     greatest and last of each column, which draws the same line. Without `true_speed`, in rad/s at times in seconds,
     there is no error panel.
     """
-    save_figure(path, lambda: _draw(spec, run, true_speed))
+    save_figure(path, lambda: draw(spec, run, true_speed))
 
 
-def _draw(spec: TachometerSpec, run: Run, true_speed: TrueSpeed | None) -> Figure:
+def draw(spec: TachometerSpec, run: Run, true_speed: TrueSpeed | None = None) -> Figure:
+    """Return the figure of a run, see `save_plot`."""
     seconds = run.n_clocks / spec.timing.clock_hz
     scale, unit = next(((k, u) for k, u in ((1, "s"), (1e3, "ms")) if seconds * k >= 1), (1e6, "µs"))
     heights = {name: height for name, height in _HEIGHTS.items() if true_speed or name != "error"}

@@ -52,13 +52,17 @@ COLUMNS = 1500  # about one for each pixel across
 
 def save_figure(path: Path, draw: Callable[[], Figure]) -> None:
     """Write what `draw` returns, in the style of this project; equal figures give equal files."""
-    suffix = path.suffix.lower()
+    path.write_bytes(picture(draw, path.suffix.lower()))
+
+
+def picture(draw: Callable[[], Figure], suffix: str) -> bytes:
+    """Return what `draw` returns as the bytes of a file."""
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_STYLE)
         drawn = BytesIO()  # on a full disk Matplotlib would say something else
         draw().savefig(drawn, format=suffix[1:], dpi=160, metadata=_METADATA[suffix])
-    path.write_bytes(drawn.getvalue())
+    return drawn.getvalue()
 
 
 def columns(x: FloatArray, y: NDArray[np.generic], n_columns: int = COLUMNS) -> NDArray[np.int64]:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tachometry.sim.signals.files import rows_of, write_csv
+from tachometry.sim.signals.shown import Shown
 from tachometry.sim.theory.performance import PERFORMANCES, disc_counts, disc_error, unknown
 from tachometry.sim.theory.tsuji import unit_velocity
 from tachometry.spec import METHODS, ParameterError, TachometerSpec, TrackTachometer
@@ -27,8 +28,8 @@ _BETTER, _SMALLER, _ALIKE = 10, 2, 1.5  # ratios: of errors that are much less, 
 _STEADY, _MULTIPLES, _DISTANCES = 1000, 200, 8  # samples: speeds, multiples of ω_u, distances from each of them
 
 
-@dataclass(frozen=True)
-class Plan:
+@dataclass(frozen=True, repr=False)
+class Plan(Shown):
     """Measurements to be expected at constant speeds of an ideal encoder, once the first two windows are over."""
 
     speed: NDArray[np.float64]  # shape (n,), rad/s
@@ -42,6 +43,12 @@ class Plan:
     forced: NDArray[np.bool_]  # shape (n,): the maximum time ends the measurement
     # shape (n,), rad/s: what a real disc adds to the error, see `sim.theory.performance.disc_error`
     disc: NDArray[np.float64]
+
+    def shown(self) -> tuple[str, list[list[str]]]:
+        """Return the resolution over the speed."""
+        heads = ["speed (rad/s)", "measurement time (s)", "resolution (rad/s)"]
+        columns = zip(self.speed, self.measurement_time, self.resolution, strict=True)
+        return "plan at constant speeds", [heads, *([f"{value:.4g}" for value in row] for row in columns)]
 
     @property
     def relative(self) -> NDArray[np.float64]:

@@ -11,6 +11,7 @@ from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.progress import Bar
 from tachometry.sim.signals.recording import PinTrace, Recording
+from tachometry.sim.signals.shown import Shown
 from tachometry.sim.studies.comparing.baseline_catalogue import baseline_model, settings, steps_curve
 from tachometry.sim.studies.comparing.baselines import Steps
 from tachometry.sim.studies.comparing.compare import (
@@ -51,8 +52,8 @@ class Source:
     true_speed: TrueSpeed | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class Comparison:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Comparison(Shown):
     """Holds what has come of all methods.
 
     Parameters
@@ -83,6 +84,15 @@ class Comparison:
     n_tried: dict[str, int] = field(default_factory=dict)
     costs: dict[str, list[Cost]] = field(default_factory=dict)
     rms_speed: float = 0.0
+
+    def shown(self) -> tuple[str, list[list[str]]]:
+        """Return the errors of all methods."""
+        unit = self.spec.scale.shown_unit
+        rows = [
+            [one.name, *("-" if value is None else f"{unit.of(value):.4g}" for value in (one.rms, one.max))]
+            for one in self.scores
+        ]
+        return f"comparison of {len(rows)} methods", [["method", f"RMS error ({unit.name})", "greatest"], *rows]
 
     @property
     def n_merged(self) -> int:
