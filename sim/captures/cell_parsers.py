@@ -16,7 +16,7 @@ QUANTITY = re.compile(rf"({NUMBER.pattern})\s*([A-Za-zµμ]+)", re.ASCII)  # a n
 CLOCK = re.compile(r"(\d{1,3}):(\d\d):(\d\d)(?:[.:](\d{1,9}))?", re.ASCII)  # a time of day
 DATE = re.compile(r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d(?:\.\d{1,9})?)(Z|[+-]\d\d:?\d\d)?", re.ASCII)
 HELD, BAD = -1, -2  # in place of a level: the one before holds; there is none in the cell
-WORDS = {"off": 0, "on": 1, "low": 0, "high": 1, "lo": 0, "hi": 1}
+WORDS = {"off": 0, "on": 1, "low": 0, "high": 1, "lo": 0, "hi": 1, "l": 0, "h": 1}
 _LEVELS = {"false": 0, "true": 1, "x": HELD, **WORDS}
 VOLTS = {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "millivolt": 1e-3, "millivolts": 1e-3}
 

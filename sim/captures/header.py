@@ -1,6 +1,7 @@
 """The head of a text says which columns it has, what separates them, and how its rows are dated."""
 
 import re
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -9,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.captures.cell_parsers import CLOCK, NUMBER, VOLTS, Threshold, origin_of, unit_of
+from tachometry.sim.captures.cell_parsers import BAD, CLOCK, NUMBER, VOLTS, Threshold, levels, origin_of, unit_of
 from tachometry.sim.captures.file import CaptureError, Channel, OptionError
 from tachometry.sim.captures.sigrok import agreed_samplerate, divide, parse_samplerate
 from tachometry.sim.captures.text_layout import Table, bare, is_comment, names_times, sniff, trimmed
@@ -128,7 +129,9 @@ def read_header(path: Path, lines: Sequence[str], options: TextOptions, samplera
     in_file = parse_samplerate(path, _of_sigrok(table.comments, r"Samplerate: (.*)")) or _increment(names)
     if column is None:
         if samplerate_hz is None and in_file is None:
-            hint = "or --time or --samplerate must be given"
+            rows = zip(names, table.first, strict=False)
+            times = [name for name, cell in rows if levels([cell])[0] == BAD or re.search("[.,]", cell)]
+            hint = f"or {f'--time {shlex.quote(times[0])}' if times else '--time or --samplerate'} must be given"
             raise CaptureError(f"header of {path} must have a column named time, {hint}, not {shown!r}")
         if options.unit is not None:
             raise OptionError("time_unit", f"must not be given for {path}: it has no times")

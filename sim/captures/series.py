@@ -113,7 +113,7 @@ def _with_unit(path: Path, header: Header) -> int:
         units = ", ".join((*SPEEDS, *ANGLES))
         raise CaptureError(
             f"{path} must have a column with a unit in its name, as speed_rpm: one of {units}, not "
-            f"{','.join(header.names)!r}"
+            f"{','.join(header.names)!r}; a log of counts is counts:{path}:TIME:COUNT"
         )
     return found[0]
 

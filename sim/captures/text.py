@@ -146,7 +146,7 @@ def _refuse_numbers(path: Path, source: Lines, header: Header) -> None:
     rows = [split(line, header.table.separator) for line in source.head[header.table.start :]]
     texts = [row[column] for row in rows if column < len(row)]
     hint = _option_for(name, unit_in(header, column), texts)(next(iter(texts), ""))
-    if "--count" in hint or "--angle" in hint or "--motion" in hint:
+    if hint and "[0]" not in hint and "--threshold" not in hint:
         raise CaptureError(f"{path} must have at least two logic channels, not {name} (0){hint}")
 
 
@@ -154,13 +154,14 @@ def _option_for(name: str, unit: str, texts: Sequence[str]) -> Callable[[str], s
     """Return a function of a bad cell of a column that names the option which reads the column."""
     value = cell_parsers.numbers(texts)
     whole = not np.any(value != np.rint(value), where=~np.isnan(value))
-    counts = np.any(np.abs(value) > 3) or re.search(r"count|cnt|tick|pos|pulse|enc", name, re.IGNORECASE)
+    counts = np.any(np.abs(value) > 3) or re.search(r"count|cnt|tick|pos|pulse", name, re.IGNORECASE)
+    angles = not whole and re.search(r"angle|theta|phi|pos|deg|turn", name, re.IGNORECASE)
 
     def option(cell: str) -> str:
         if not cell_parsers.NUMBER.fullmatch(cell) and not cell_parsers.unit_of(cell):
             return ""
-        if unit in ANGLES:
-            return f" (of an angle, --angle {shlex.quote(name)} takes it)"
+        if unit in ANGLES or angles:
+            return f" (of an angle, --angle {shlex.quote(name if unit else f'{name}:deg')} takes it)"
         if unit:
             return f" (a speed is a motion: simulate --motion csv:FILE:{shlex.quote(name)})"
         if whole and counts:

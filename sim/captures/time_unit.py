@@ -12,10 +12,11 @@ _WORDS = {
     "us": "us usec usecs micro micros microsec microsecond microseconds",
     "ns": "ns nsec nsecs nano nanos nanosec nanosecond nanoseconds",
     "ps": "ps picosecond picoseconds",
+    "min": "min minute minutes",
     "ticks": "tick ticks clock clocks cycle cycles sample samples sequence",
 }
 _UNIT_OF = {word: unit for unit, words in _WORDS.items() for word in words.split()}
-_PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "ps": 1e12, "ticks": 0.0}
+_PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "ps": 1e12, "min": 1 / 60, "ticks": 0.0}
 # Names that a column of times has, without its unit, in the order in which they are looked for.
 _NAMES = ("time", "timestamp", "timestamps", "t", "x-axis", "")
 

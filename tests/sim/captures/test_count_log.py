@@ -142,6 +142,8 @@ def test_rows_are_pulses(
         ("time_ms,pos_deg", [0, 1.5], "(of an angle, --angle pos_deg takes it)"),
         ("time_ms,speed [rpm]", [300, 301], "(a speed is a motion: simulate --motion csv:FILE:'speed [rpm]')"),
         ("time_ms,n,m", ["0,0", "1,9"], "(of a counter, --count m takes its counts)"),
+        ("time_ms,theta", [0.0, 1.5], "(of an angle, --angle theta:deg takes it)"),
+        ("n,Zeit (ms),a,b", ["0.0,0,0", "0.5,1,0"], "or --time 'Zeit (ms)' must be given, not 'n,Zeit (ms),a,b'"),
         ("time_ms,ab", [0, 1, 3], "lines in one number are --a ab[0] --b ab[1]"),
     ],
 )
