@@ -1,0 +1,1 @@
+"""Measure the disc of an encoder from captures."""
