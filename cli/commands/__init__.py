@@ -21,6 +21,7 @@ COMMANDS = {
     "generate": "Write a core as Verilog, with its manifest, constraints and FuseSoC file.",
     "simulate": "Run a core on a virtual encoder, against the golden model and the truth.",
     "replay": "Run a core on captured encoder signals, against the golden model.",
+    "calibrate": "Measure the disc of an encoder from captures.",
     "compare": "Compare methods on the same edges.",
     "sweep": "Run methods over ranges of options and speeds, on all processors.",
     "loop": "Close a velocity loop about a core: motor, observer, controller.",

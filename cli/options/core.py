@@ -231,6 +231,19 @@ OPTIONAL_CORE_OPTIONS = Group(_of_core("that of the board"), _read_core)
 """As `core_options`, but none must be given; handed over as `core`, of `CoreTexts`."""
 
 
+_CAPTURED = ("ppr", "lines", "cpr", "pole-pairs", "decoding", "sensor", "reverse", "invert", "index", "index-at")
+
+
+def _captured() -> tuple[click.Option, ...]:
+    return _made_common(tuple(about for about in common_options() if about.name in _CAPTURED))
+
+
+CAPTURED_OPTIONS = Group(
+    [later("encoder-options", _captured)], lambda **given: dict(spec=of_texts("s", _taken(given)), **given)
+)
+"""What captured lines must be known of, handed over as `spec`; all else of it does not matter."""
+
+
 def core_click_options() -> dict[str, click.Option]:
     """Return all options of cores and methods by their names."""
     return {option.opts[0].removeprefix("--"): option for option in (*_common(), *own_click_options())}

@@ -369,12 +369,12 @@ def _suffix(*allowed: str) -> Callable[[click.Context, click.Parameter, Path | N
     return check
 
 
-def output(name: str, *, help: str, suffixes: tuple[str, ...] = ()) -> Callable[[Any], Any]:
+def output(name: str, *others: str, help: str, suffixes: tuple[str, ...] = ()) -> Callable[[Any], Any]:
     """Decorate a command with an option that names a file to be written, with one of some suffixes."""
     callback = _suffix(*suffixes) if suffixes else None
     if len(suffixes) > 1 and suffixes[0] not in help:
         help = f"{help} {', '.join(suffixes[:-1])} or {suffixes[-1]}."
-    return option(_OUTPUTS, name, type=FilePath(), metavar="FILE", callback=callback, help=help)
+    return option(_OUTPUTS, name, *others, type=FilePath(), metavar="FILE", callback=callback, help=help)
 
 
 def output_folder(default: str, *, help: str) -> Callable[[Any], Any]:

@@ -25,7 +25,7 @@ RECOMPUTED = {"encoder.md", "encoder.svg", "figures.md", "sweep.md"}  # as a who
 # Speeds, routings, proofs and samples of wrong cores.
 RUNS = {"bench.md", "estimate.md", "formal.md", "mutation.md", "upset.md", "verify.md"}
 OTHERS = {f"docs/measured/{name}" for name in RECOMPUTED | RUNS}
-OTHERS |= {"docs/demo.png"}  # tests/test_readme.py draws it
+OTHERS |= {"docs/demo.png", "docs/guides/disc.png"}  # tests/test_readme.py and test_calibrate.py draw them
 OTHERS |= {"docs/overview.svg", "docs/guides/wiring.svg"}  # by hand
 
 

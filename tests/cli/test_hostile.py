@@ -155,7 +155,7 @@ BEFORE = {
     "sweep": f"sweep {CORE} --motion stop:1ms --methods s",
     "loop": f"loop {CORE} --motion stop:80ms --from 40ms",
 }
-COMMANDS = (*BEFORE, "verify", "build", "program", "monitor", "explore")
+COMMANDS = (*BEFORE, "calibrate", "verify", "build", "program", "monitor", "explore")
 
 _MEMORY = 1 << 30  # bytes beyond those of a process that has everything imported
 _PROCESSOR = 900  # seconds

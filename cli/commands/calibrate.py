@@ -1,0 +1,90 @@
+"""`tachometry calibrate`: the map of a disc, from captures of a shaft that coasts down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from tachometry.cli.files import Outputs
+from tachometry.cli.options.capture import CAPTURE_OPTIONS
+from tachometry.cli.options.core import CAPTURED_OPTIONS
+from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
+from tachometry.cli.reports.calibrate import print_calibration
+from tachometry.cli.reports.terminal import progress_bar
+from tachometry.sim.signals.recording import Recording
+from tachometry.sim.studies.calibrating.calibrate import calibrate as calibration_of
+from tachometry.spec import TachometerSpec
+from tachometry.spec.core.disc import MOST_BYTES, Disc
+from tachometry.spec.language.files import read_text
+
+
+@click.command(
+    cls=GroupedCommand,
+    epilog="""\b
+Examples:
+  tachometry calibrate coast.sr --ppr 500 --index -o disc.json --plot disc.png
+  tachometry calibrate coast1.csv coast2.csv --ppr 500
+  tachometry calibrate later.sr --ppr 500 --index --against disc.json""",
+)
+@click.argument("capture", type=FilePath(), nargs=-1, required=True, metavar="CAPTURE…")
+@CAPTURED_OPTIONS
+@CAPTURE_OPTIONS
+@option(
+    "Map",
+    "--one-speed",
+    is_flag=True,
+    help="Accept captures at one speed. Ripple of the torque in step with the turn is then part of the map.",
+)
+@option(
+    "Map",
+    "--against",
+    type=FilePath(),
+    metavar="FILE",
+    help="Check that it is the encoder of this map. Without --index, edges are then counted as there.",
+)
+@output("-o", "--output", "table", suffixes=(".json",), help="Write the map of the disc.")
+@output("--plot", suffixes=(".png", ".pdf", ".svg"), help="Draw the disc as it is, and with the map.")
+def calibrate(
+    spec: TachometerSpec,
+    capture: tuple[Path, ...],
+    read: Callable[[Path, TachometerSpec], Recording],
+    one_speed: bool,
+    against: Path | None,
+    **targets: Path | None,
+) -> int:
+    """Measure the disc of an encoder from captures of its lines.
+
+    Turn the shaft fast, let it coast, and record A, B and, if there is one, the index, until it has half the speed. A
+    CAPTURE is a file as `tachometry replay` takes it, but no --count. Several captures, in both directions, make the
+    map better.
+
+    The map has the place of every edge: lines that are uneven, a disc off centre, errors of phase and duty. Ripple of
+    the torque, which depends on the speed, is shown, and is not in the map. A map that is not certain is refused with
+    the reasons, exit status 2, and no file is written. Equal captures give equal files.
+    """
+    known = None if against is None else _read_disc(against)
+    inputs = [*capture, *([against] if against else [])]
+    outputs = Outputs({"-o": targets["table"], "--plot": targets["plot"]}, inputs)
+    recordings = ((str(path), read(path, spec)) for path in capture)
+    with outputs:
+        found = calibration_of(recordings, spec, one_speed=one_speed, against=known, bar=progress_bar)
+        if found.reasons:
+            print_calibration(found, spec)
+            raise ValueError(f"the map is refused: {'; '.join(found.reasons)}")
+        if path := outputs.get("-o"):
+            path.write_text(found.disc.text, encoding="utf-8")
+        if path := outputs.get("--plot"):
+            from tachometry.sim.plots.disc import save_disc  # Matplotlib is slow to import
+
+            save_disc(path, found)
+    print_calibration(found, spec)
+    return 0
+
+
+def _read_disc(path: Path) -> Disc:
+    try:
+        return Disc.parse(read_text(path, MOST_BYTES))
+    except ValueError as error:
+        raise ValueError(f"--against {path} {error}") from error

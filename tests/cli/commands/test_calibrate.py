@@ -1,0 +1,67 @@
+"""`tachometry calibrate` from a capture to the files, as docs/guides/disc.md has it, and nothing where it refuses."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from matplotlib.image import imread
+from support import docs
+from support.command import run
+
+from tachometry.sim.captures.sigrok import write_sr
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.spec.core.disc import Disc
+
+PAGE = docs.page("guides/disc.md")
+COMMANDS = [shlex.split(line) for line in re.findall(r"^tachometry (.*)", PAGE, re.MULTILINE)]
+ENCODER = VirtualEncoder(24, index=True, seed=7, jitter=0.05, nonuniformity=0.1, eccentricity=0.25)
+
+
+def save(path: Path, motion: str) -> None:
+    recording = ENCODER.record(parse_motion(motion)).recording
+    write_sr(path, recording.place(2_000_000), 2_000_000)
+
+
+def test_commands_of_the_guide_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In order; the report and the picture of the page are those that they make."""
+    monkeypatch.chdir(tmp_path)
+    for words in COMMANDS:
+        capsys.readouterr()
+        assert run(*words) == 0, words
+        if words[:2] == ["calibrate", "build/coast.sr"] and "--plot" in words:
+            report = [line.rstrip() for line in capsys.readouterr().out.splitlines()]
+    shown = PAGE.partition("```text\n")[2].partition("```")[0]
+    assert report == shown.splitlines()
+    made, drawn = (imread(path) for path in (tmp_path / "build/disc.png", docs.DOCS / "guides/disc.png"))
+    assert abs(made - drawn).mean() < 0.01, "put build/disc.png into docs/guides"
+
+
+def test_a_map_and_a_picture_are_written_or_neither(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    save(tmp_path / "coast.sr", "ramp:150rad/s:60rad/s:3s")
+    save(tmp_path / "even.sr", "constant:100rad/s:2s")
+    files = ["--ppr", "24", "--index", "-o", "out/disc.json", "--plot", "out/disc.svg"]
+    capsys.readouterr()
+    assert run("calibrate", "even.sr", *files) == 2
+    told = capsys.readouterr()
+    assert re.search(r"^verdict +refused", told.out, re.MULTILINE)
+    assert told.err.startswith("tachometry: error: the map is refused: there is one speed")
+    assert len(told.err.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+    assert run("calibrate", "even.sr", *files, "--one-speed") == 0
+    assert Disc.parse((tmp_path / "out/disc.json").read_text()).one_speed
+    assert run("calibrate", "coast.sr", *files) == 0
+    first = [(tmp_path / "out" / name).read_bytes() for name in ("disc.json", "disc.svg")]
+    assert run("calibrate", "coast.sr", *files) == 0
+    assert [(tmp_path / "out" / name).read_bytes() for name in ("disc.json", "disc.svg")] == first
+    disc = Disc.parse(first[0].decode())
+    assert (disc.counts_per_rev, disc.index_place, disc.one_speed) == (96, 2, False)
+    capsys.readouterr()
+    assert run("calibrate", "coast.sr", "--ppr", "24", "--against", "out/disc.json") == 0
+    assert re.search(r"^since --against +0\.00\d\d counts RMS", capsys.readouterr().out, re.MULTILINE)
