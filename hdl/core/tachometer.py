@@ -7,7 +7,7 @@ from amaranth import Cat, Module, Signal, Value
 from amaranth.lib import stream, wiring
 
 from tachometry.hdl.arithmetic.idle import Idle, idle_of
-from tachometry.hdl.extras import gates_of, place
+from tachometry.hdl.extras import check_inputs, gates_of, place
 from tachometry.hdl.front_end.conditioner import InputConditioner
 from tachometry.hdl.front_end.decoder import decoder_of
 from tachometry.hdl.front_end.external_tick import ExternalTick
@@ -139,7 +139,7 @@ class Tachometer(wiring.Component):
         self._place(m)
         self._index(m)
         self._compare(m)
-        place(m, self, self.extras, self._taps(m))
+        self._extend(m)
         if isinstance(self.sampling_clock, ExternalTick):
             m.d.comb += [
                 self.sampling_clock.tick_in.eq(self.tick_in),
@@ -289,6 +289,12 @@ class Tachometer(wiring.Component):
             follow(m, self, state, (WIDE, MISSED))
             level, ready = state.index, state.ready
         return level, ready
+
+    def _extend(self, m: Module) -> None:
+        """Put the extras into the core."""
+        taps = self._taps(m)
+        check_inputs(self._spec, self.extras, {*self.signature.members, *taps})
+        place(m, self, self.extras, taps)
 
     def _taps(self, m: Module) -> dict[str, Value]:
         """Lead inputs of extras through the conditioner, and return what else they may be given, by name.

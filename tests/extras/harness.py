@@ -149,8 +149,9 @@ def _accesses(case: Case, registers: RegisterMap, trace: PinTrace) -> list[Acces
     read = {*_own(case, registers), "VELOCITY", "INTERRUPTS"}
     reads = np.array([4 if register.name in read else 1 for register in registers], dtype=float)
     without = golden.tables(replace(spec, extras=()), trace)
-    events = [table.clock for name, table in golden.tables(spec, trace).items() if name not in without]
-    aimed = set((rng.choice(np.concatenate(events), 100) + rng.integers(-3, 2, 100)).tolist())
+    events = np.concatenate([table.clock for name, table in golden.tables(spec, trace).items() if name not in without])
+    assert len(events), "nothing happens: give the case more edges, or another seed"
+    aimed = set((rng.choice(events, 100) + rng.integers(-3, 2, 100)).tolist())
     accesses = []
     for clock in range(trace.n_clocks - 2):
         if clock in aimed or rng.random() < 0.04:

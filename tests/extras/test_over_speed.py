@@ -2,9 +2,13 @@
 
 import math
 
+import pytest
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In
 from extras.harness import Case, agreeing, in_icarus, on_a_bus, refused
 from support.simulate import clock_by_clock
 
+from tachometry.hdl.extras import check_inputs
 from tachometry.hdl.extras.over_speed import Gates
 
 CASES = (Case("s", "over-speed=2000rad/s"), Case("m", "over-speed=3000rpm unit=rpm"), Case("mt", "over-speed=40000rpm"))
@@ -44,3 +48,9 @@ def test_every_velocity() -> None:
     for row, seen in zip(rows, clock_by_clock(Gates(20, 6), rows, ["over_speed"]), strict=True):
         assert seen["over_speed"] == tripped, row
         tripped = not row["clear"] and (tripped or (bool(row["velocity_valid"]) and abs(row["velocity"]) > 20))
+
+
+def test_an_input_that_nothing_drives_is_an_error() -> None:
+    boxes = {"over_speed": wiring.Component({"velocity": In(6), "clear": In(1), "speed": In(1)})}
+    with pytest.raises(LookupError, match="over_speed has inputs that nothing drives: speed"):
+        check_inputs(CASES[0].spec, boxes, {"velocity"})
