@@ -46,7 +46,7 @@ def _index(spec: TachometerSpec, steps: Steps, index: Table) -> tuple[Ints, Ints
     size = 1 << spec.position_width
     turn = np.where(back[1:], -spec.encoder.counts_per_rev, spec.encoder.counts_per_rev)
     off = (way - turn + size // 2) % size - size // 2
-    presets = places(steps.presets, steps.index, "right")  # a turn with one of them is not checked
+    presets = places(steps.presets, steps.index[: len(index)], "right")  # a turn with one of them is not checked
     wrong = (presets[1:] == presets[:-1]) & (back[1:] == back[:-1]) & (way % size != 0) & (off != 0)
     return index.clock[1:][wrong] + 1, off[wrong]
 
