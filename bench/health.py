@@ -111,10 +111,10 @@ def told(example: Example, seed: int) -> float:
     if not is_wire:
         begin = wrong_from(recording, record(spec, motion, REAL, seed), example.onset)
     faults = golden.tables(spec, PinTrace.of(recording, spec))["fault"]
-    later = np.flatnonzero(faults.clock / spec.timing.clock_hz > begin)
+    later = np.flatnonzero((shown := (faults.clock + 1) / spec.timing.clock_hz) > begin)
     if not len(later) or faults.code[later[0]] != Fault[example.code]:
         raise ValueError(f"{example.option}, seed {seed}: {faults.code[later[:1]]} instead of {example.code}")
-    return float(faults.clock[later[0]] / spec.timing.clock_hz - begin)
+    return float(shown[later[0]] - begin)
 
 
 def faulty(example: Example, seeds: int = SEEDS) -> list[str]:
