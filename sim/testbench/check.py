@@ -79,7 +79,7 @@ def manifests(places: Sequence[Path]) -> list[Path]:
 
 def _is_manifest(path: Path) -> bool:
     try:
-        return {"module", "options"} <= set(json.loads(read_text(path, MOST_JSON)))
+        return path.is_file() and {"module", "options"} <= set(json.loads(read_text(path, MOST_JSON)))
     except (ValueError, TypeError, RecursionError):
         return False
 

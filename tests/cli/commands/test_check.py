@@ -186,6 +186,7 @@ def test_the_core_that_lies_there_is_simulated(generated: Generated, capsys: pyt
 def test_what_is_no_core_is_refused(
     text: str | None, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    (tmp_path / "link.json").symlink_to(tmp_path / "gone.json")
     if text is not None:
         (tmp_path / "core.json").write_text(text)
     assert run("check", tmp_path) == 2
