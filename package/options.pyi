@@ -3,77 +3,77 @@ from typing import TypeAlias, TypedDict
 Value: TypeAlias = str | int | float
 
 class CoreOptions(TypedDict, total=False):
-    method: Value | None
-    ppr: Value | None
-    lines: Value | None
-    cpr: Value | None
-    pole_pairs: Value | None
-    decoding: Value | None
-    sensor: Value | None
-    reverse: bool | None
-    invert: Value | None
-    missing_teeth: Value | None
-    clock: Value | None
-    tick: Value | None
-    pwm: Value | None
-    dt: Value | None
-    max_time: Value | None
-    unit: Value | None
-    frac_bits: Value | None
-    lsb: Value | None
-    velocity_width: Value | None
-    max_speed: Value | None
-    position_width: Value | None
-    filter: Value | None
-    index: bool | None
-    index_reset: bool | None
-    index_at: Value | None
-    index_once: bool | None
-    preset: Value | None
-    position_modulo: Value | None
-    external_tick: bool | None
-    max_tick_period: Value | None
+    adaptive: Value | None
     age: bool | None
+    average: Value | None
+    axes: Value | None
+    bound_decay: bool | None
     bounds: bool | None
+    cancel: bool | None
+    clock: Value | None
+    command: Value | None
+    compare: Value | None
+    complements: Value | None
+    control_period: Value | None
+    cpr: Value | None
+    current_limit: Value | None
+    current_width: Value | None
+    decoding: Value | None
+    dt: Value | None
     edge_error: Value | None
-    lowpass: Value | None
+    estimate: Value | None
+    external_tick: bool | None
+    filter: Value | None
+    fine_bits: Value | None
+    frac_bits: Value | None
+    gains: Value | None
     health: bool | None
     health_edges: Value | None
     health_errors: Value | None
-    complements: Value | None
-    over_speed: Value | None
-    probe: Value | None
-    compare: Value | None
-    stream: Value | None
-    cancel: bool | None
-    reciprocal: Value | None
-    average: Value | None
-    timer: Value | None
-    bound_decay: bool | None
-    paper_exact: bool | None
-    min_time: Value | None
-    whole_cycles: bool | None
-    estimate: Value | None
-    adaptive: Value | None
-    max_memory: Value | None
-    multiplier: Value | None
-    fine_bits: Value | None
+    index: bool | None
+    index_at: Value | None
+    index_once: bool | None
+    index_reset: bool | None
     inertia: Value | None
-    torque_constant: Value | None
+    invert: Value | None
     kp: Value | None
     kv: Value | None
-    observer: Value | None
-    velocity_filter: Value | None
-    current_limit: Value | None
-    control_period: Value | None
-    synchronised: bool | None
-    current_width: Value | None
-    loop_multiplier: Value | None
-    command: Value | None
-    gains: Value | None
-    axes: Value | None
-    parallel: bool | None
+    lines: Value | None
     loop: bool | None
+    loop_multiplier: Value | None
+    lowpass: Value | None
+    lsb: Value | None
+    max_memory: Value | None
+    max_speed: Value | None
+    max_tick_period: Value | None
+    max_time: Value | None
+    method: Value | None
+    min_time: Value | None
+    missing_teeth: Value | None
+    multiplier: Value | None
+    observer: Value | None
+    over_speed: Value | None
+    paper_exact: bool | None
+    parallel: bool | None
+    pole_pairs: Value | None
+    position_modulo: Value | None
+    position_width: Value | None
+    ppr: Value | None
+    preset: Value | None
+    probe: Value | None
+    pwm: Value | None
+    reciprocal: Value | None
+    reverse: bool | None
+    sensor: Value | None
+    stream: Value | None
+    synchronised: bool | None
+    tick: Value | None
+    timer: Value | None
+    torque_constant: Value | None
+    unit: Value | None
+    velocity_filter: Value | None
+    velocity_width: Value | None
+    whole_cycles: bool | None
 
 class EncoderFaults(TypedDict, total=False):
     vibration: Value | None

@@ -113,7 +113,7 @@ def test_the_stub_has_every_option() -> None:
     def of(name: str, fields: list[str]) -> str:
         return f"class {name}(TypedDict, total=False):\n" + "".join(fields)
 
-    named = inspect.signature(api.Tachometer).parameters
+    named = sorted(inspect.signature(api.Tachometer).parameters)
     core = [f"    {name}: {'bool' if _is_flag(name) else 'Value'} | None\n" for name in named]
     faults = [f"    {about.name.replace('-', '_')}: Value | None\n" for about in options_of(EncoderOptions)]
     head = "from typing import TypeAlias, TypedDict\n\nValue: TypeAlias = str | int | float\n\n"
