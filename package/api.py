@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.option_aliases import meant
 from tachometry.hdl.export import export
+from tachometry.sim.captures.count_log import read_angle_log, read_count_log
+from tachometry.sim.captures.header import TextOptions
 from tachometry.sim.captures.read import read_capture, with_last_tick
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.options import EncoderOptions
@@ -45,6 +47,7 @@ _OPTIONS = {
     about.name.replace("-", "_"): about
     for about in (*common_options(), *(one for method in METHODS for one in own_options(method)), *options_of(LoopSpec))
 }
+_TIMES = [name for name, about in _OPTIONS.items() if about.metavar == "TIME"] + ["index_skew"]
 _WORDS = [f"--{about.name}" for about in _OPTIONS.values()]
 
 
@@ -91,7 +94,7 @@ def _texts(options: Mapping[str, object]) -> dict[str, str]:
 
 
 def _text(name: str, value: object) -> str:
-    if isinstance(value, float) and (about := _OPTIONS.get(name)) and about.metavar == "TIME":
+    if isinstance(value, float) and name in _TIMES:
         raise ParameterError(name, f'must have its unit, as in "{format_time(Fraction(str(value)))}", not {value}')
     if isinstance(value, bool):
         return ("no", "yes")[value]
@@ -239,7 +242,13 @@ def simulate(
     return _run(spec, "motion", [truth.recording for truth in truths], truths, engine)
 
 
-def replay(spec: AnySpec, *captures: str | os.PathLike[str] | Recording, engine: str = "auto") -> Run:
+def replay(
+    spec: AnySpec,
+    *captures: str | os.PathLike[str] | Recording,
+    engine: str = "auto",
+    count: str | None = None,
+    angle: str | None = None,
+) -> Run:
     """Run a core on captured signals, one capture for each axis, as `tachometry replay` does.
 
     Parameters
@@ -249,13 +258,24 @@ def replay(spec: AnySpec, *captures: str | os.PathLike[str] | Recording, engine:
         Files whose channels are found by their names; or what `read_capture` reads, which takes the names of others.
     engine : str
         As of `--engine`.
+    count, angle : str or None
+        Column of a log, as of the command.
 
     Raises
     ------
     ValueError
         If a capture is not what it must be.
     """
-    recordings = [one if isinstance(one, Recording) else read_capture(one) for one in captures]
+    text = TextOptions(slowest_s=float(spec.tachometer.tick.seconds(spec.tachometer.times.longest)))
+
+    def read(path: str | os.PathLike[str]) -> Recording:
+        if (column := count or angle) is None:
+            return read_capture(path, text=text)
+        log = (read_count_log if count else read_angle_log)(Path(path), column, text)
+        return log.recording(spec.tachometer.encoder)
+
+    with _in_python():
+        recordings = [one if isinstance(one, Recording) else read(one) for one in captures]
     if len(recordings) != (spec.axes or 1):
         raise ValueError(f"captures must be one for each of {spec.axes or 1} axes, not {len(recordings)}")
     return _run(spec, "the capture", [with_last_tick(one, _core(spec)) for one in recordings], None, engine)

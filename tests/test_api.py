@@ -69,6 +69,17 @@ def test_a_capture_is_replayed(tmp_path: Path) -> None:
         assert np.allclose(abs(run.velocity[-5:]), 1000 * 2 * np.pi / 2000)
 
 
+def test_a_log_is_replayed(tmp_path: Path) -> None:
+    spec = tachometry.Tachometer(**CORE, method="m")
+    rows = "".join(f"{5 * k},{10 * k},{1.8 * k % 360:.1f}\n" for k in range(300))
+    (tmp_path / "log.csv").write_text(f"time_ms,n,shaft_deg\n{rows}")
+    for options in ({"count": "n"}, {"angle": "shaft_deg"}):
+        run = tachometry.replay(spec, tmp_path / "log.csv", **options)
+        assert abs(run.position[-1] - 2990) <= 2
+    with pytest.raises(ValueError, match=r"\(of a counter, count n takes its counts\)$"):
+        tachometry.replay(spec, tmp_path / "log.csv")
+
+
 def test_axes_have_their_own_runs() -> None:
     spec = tachometry.Tachometer(**CORE, method="s", axes=2)
     assert spec.scale == spec.tachometer.scale

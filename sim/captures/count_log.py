@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tachometry.sim.captures.file import CaptureError, Channel, OptionError
 from tachometry.sim.captures.header import PLAIN, TextOptions
 from tachometry.sim.captures.rows import COUNTERS
-from tachometry.sim.captures.series import ANGLES, read_series, unit_named
+from tachometry.sim.captures.series import ANGLES, read_series, unit_named, wraps_at
 from tachometry.sim.signals.recording import MAX_EDGES, Recording, quadrature
 from tachometry.sim.signals.source import Source
 from tachometry.spec import Encoder
@@ -97,10 +97,7 @@ def read_angle_log(path: Path, angle: str, text: TextOptions = PLAIN, wrap: int 
             "angle", f"must have a unit, as {series.name}:deg: one of {', '.join(ANGLES)}, not {unit or angle!r}"
         )
     turn = round(2 * math.pi / ANGLES[unit], 9)  # 360 and 1 are exact
-    least, most = series.value.min(), series.value.max()
-    within = -0.51 * turn <= least <= most <= 0.51 * turn or -0.01 * turn <= least <= most <= 1.01 * turn
-    wraps_at = turn if wrap is None and within and np.abs(np.diff(series.value)).max() > turn / 2 else 0.0
-    place, wraps = _unwrapped(series.value, wraps_at)
+    place, wraps = _unwrapped(series.value, turn if wrap is None and wraps_at(series.value, turn) else 0.0)
     notes = [f"the angle wraps at {turn:.6g} {unit}, {wraps} times here; --wrap 0 says that it does not"]
     return _log(series.time, place * ANGLES[unit], series.name, (*series.notes, *notes[: bool(wraps)]), angles=True)
 

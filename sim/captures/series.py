@@ -107,6 +107,13 @@ def read_series(
     return Series(seconds, rows[last, 1], header.names[column], tuple(notes)), unit_in(header, column)
 
 
+def wraps_at(angle: Floats, turn: float) -> bool:
+    """Return whether angles wrap at a turn: all are within one, and some steps are more than half of it."""
+    least, most = angle.min(), angle.max()
+    within = -0.51 * turn <= least <= most <= 0.51 * turn or -0.01 * turn <= least <= most <= 1.01 * turn
+    return bool(within and np.abs(np.diff(angle)).max() > turn / 2)
+
+
 def _with_unit(path: Path, header: Header) -> int:
     found = [column for column in range(len(header.names)) if column != header.time and unit_in(header, column)]
     if not found:

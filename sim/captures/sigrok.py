@@ -61,13 +61,8 @@ def read_sr(
     `Recording.place` on a clock that is a multiple of the samplerate finds sample k at clock k * multiple, exactly.
 
     A channel is a name or a number: N is sigrok's D<N>, bit N of a sample. `others` are channels of further lines, by
-    the names of these; the other arguments are as of `read_capture`.
-
-    Raises
-    ------
-    CaptureError
-        If the file is missing, damaged, not a session or beyond the limits above, if it has no samples, for an unknown
-        channel, or for a samplerate that is missing or is not the one in the file.
+    the names of these; the other arguments are as of `read_capture`. It raises CaptureError if the file is none, for an
+    unknown channel, or for a samplerate that is missing or is not the one in the file.
     """
     path = Path(path)
     if samplerate_hz is not None and not 0 < samplerate_hz < float("inf"):
@@ -91,23 +86,9 @@ def write_sr(path: str | os.PathLike[str], trace: Trace, clock_hz: int, *, _chun
 
     Of many axes the channels are A0, B0, then those of axis 1, and so on.
 
-    Equal traces give equal files, byte for byte, with the same zlib: zlib promises what its output unpacks to, not
-    which bytes it is. Read back and placed on the same clock, the file gives the same trace.
-
-    Parameters
-    ----------
-    path : path
-        Takes its new content only when all is written.
-    trace : PinTrace or AxesTrace
-    clock_hz : int, Hz
-        Clock of the trace, hence the samplerate of the session.
-
-    Raises
-    ------
-    CaptureError
-        If the file cannot be written.
-    ValueError
-        If `clock_hz` or the number of clocks is below 1.
+    Equal traces give equal files, byte for byte, with the same zlib. Read back and placed on the same clock, which is
+    the samplerate, the file gives the same trace. It takes its new content only when all is written. CaptureError if it
+    cannot be; ValueError if `clock_hz` or the number of clocks is below 1.
     """
     if clock_hz < 1:
         raise ValueError(f"clock_hz must be at least 1, not {clock_hz}")

@@ -54,17 +54,10 @@ class Names:
 
 
 class Changes:
-    """Makes a recording of changes of variables.
+    """Recording in the making, from changes of variables.
 
-    It begins when all lines have first been 0 or 1. What is neither, later on, is as before.
-
-    Parameters
-    ----------
-    path : Path
-        File that messages name.
-    a, b, others
-        As of `choose_channels`; numbers count the variables of one bit. When not given: the variables whose names
-        without scopes are a and b, if there is one of each, else the first two.
+    It begins when all lines have first been 0 or 1. What is neither, later on, is as before. Lines are given as to
+    `choose_channels`; numbers count the variables of one bit.
     """
 
     def __init__(

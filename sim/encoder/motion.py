@@ -322,13 +322,17 @@ def _loaded(start: float, acceleration: float, rate: float, duration: float) -> 
 
 def _read_csv(text: str) -> Motion:
     from tachometry.sim.captures.header import PLAIN as AS_IT_IS
-    from tachometry.sim.captures.series import ANGLES, SPEEDS, read_series
+    from tachometry.sim.captures.series import ANGLES, SPEEDS, read_series, wraps_at
 
     file, column = file_of(text)
     series, unit = read_series(Path(file), column, "motion", AS_IT_IS)
     if unit in ANGLES:
         with np.errstate(all="ignore"):  # Motion refuses what is not finite
-            return Motion.of_table(series.time, series.value * ANGLES[unit])
+            angle = series.value * ANGLES[unit]
+            # A sensor's steps are small, and a few are not; what is commanded may turn by most of a turn in one.
+            if wraps_at(angle, 2 * math.pi) and np.median(np.abs(np.diff(angle))) < math.pi / 2:
+                angle = np.unwrap(angle)
+            return Motion.of_table(series.time, angle)
     if not unit:
         units = ", ".join((*SPEEDS, *ANGLES))
         raise ParameterError("motion", f"must have a unit in the name of column {series.name} of {file}: {units}")

@@ -185,6 +185,8 @@ def test_csv_as_a_spreadsheet_writes_it(tmp_path: Path) -> None:
         ("t;n [rev/s];a_deg\n0,0;0;0\n1,0;1;99\n3,0;1;9\n", "", math.pi, 5 * math.pi),
         ("t;n [rev/s];a_deg\n0,0;0;0\n1,0;1;90\n3,0;1;180\n", ":a_deg", math.pi / 2, math.pi),
         ("time,v\ns,deg/s\n0.0,360\n3.0,360\n", "", 2 * math.pi, 6 * math.pi),
+        ("t,a_deg\n0,0\n1,80\n2,160\n3,240\n4,320\n5,40\n", "", math.radians(80), math.radians(240)),
+        ("t,a_deg\n0,0\n1,300\n3,0\n", "", math.radians(300), 0),
     ],
 )
 def test_csv_of_speeds_or_angles(tmp_path: Path, content: str, column: str, speed: float, angle: float) -> None:
