@@ -57,8 +57,8 @@ def calibrate(
     """Measure the disc of an encoder from captures of its lines.
 
     Turn the shaft fast, let it coast, and record A, B and, if there is one, the index, until it has half the speed. A
-    CAPTURE is a file as `tachometry replay` takes it, but no --count. Several captures, in both directions, make the
-    map better.
+    CAPTURE is a file as `tachometry replay` takes it, but no log of counts or angles. Several captures, in both
+    directions, make the map better.
 
     The map has the place of every edge: lines that are uneven, a disc off centre, errors of phase and duty. Ripple of
     the torque, which depends on the speed, is shown, and is not in the map. A map that is not certain is refused with

@@ -35,8 +35,8 @@ def runs_of(recording: Recording, spec: TachometerSpec, number: int = 0) -> tupl
     Without an index, losses are seen where both lines change, and `number` tells the origins of captures apart. It
     raises ValueError if an index is expected, and does not come once a turn.
     """
-    if recording.source is not None and "count" in recording.source.lines:
-        raise ValueError("must have the edges of the lines, not a --count")
+    if recording.source is not None and {"count", "angle"} & recording.source.lines.keys():
+        raise ValueError("must have the edges of the lines: --count and --angle show no disc")
     encoder, n = spec.encoder, spec.encoder.counts_per_rev
     step, wrong = counted(encoder, recording.lines)
     position, row = np.cumsum(step), np.flatnonzero(step)
