@@ -33,7 +33,7 @@ def _draw(found: Calibration) -> Figure:
     for left, title, error, colour in panels:
         axes = figure.add_axes((left, 0.27, 0.44, 0.58), projection="polar")
         assert isinstance(axes, PolarAxes)
-        _draw_turn(axes, error, reach, colour, smooth=error is before)
+        _draw_turn(axes, error, reach, colour, smooth=error is before and n > 4 * _SMOOTH)
         text = f"{title}: {np.std(error):.2g}' RMS, {np.abs(error).max():.2g}' at most"
         axes.set_title(text, fontsize=12, pad=10, color=colour, weight="bold")
     _draw_waves(figure.add_axes((0.08, 0.07, 0.39, 0.13)), before, after)
@@ -43,7 +43,7 @@ def _draw(found: Calibration) -> Figure:
     lines = (
         "A dot is an edge, and its distance from the grey circle its error in arc-minutes (').",
         "Outside: passed too late by a shaft that turns forward, which is clockwise.",
-        f"Inside: too early. 0° is {zero}. One count is {arc:.3g}'.",
+        f"Inside: too early. 0° is {zero}. One count is {arc:.4g}'.",
         f"Off centre by {off * arc:.2g}', {micrometres:.2g} um for each {_RADIUS_MM} mm of radius.",
         "Blue: turns that the map has not seen.",
         f"In addition, an edge jitters by {fit.jitter * arc:.2g}' RMS from turn to turn.",
