@@ -32,9 +32,10 @@ def print_calibration(found: Calibration, spec: TachometerSpec) -> None:
     if fit.ripple is not None:
         most = int(np.argmax(np.abs(fit.ripple)))
         ripple = f"{abs(fit.ripple[most]):.3f} counts at the greatest speed, {most + 1} a turn; not in the map"
-    text = "edges are counted from it"
-    if found.disc.index_place is None:
-        text = "none: edge 0 is any edge, and a core must be aligned"
+    indexed = found.disc.index_place is not None
+    text = "edges are counted from it" if indexed else "none: edge 0 is any edge, and a core must be aligned"
+    gains = np.std(fit.unseen - fit.seen) < np.std(fit.unseen)
+    verdict = "the map can be used" if gains else "the disc is better than the map: there is nothing to gain"
     slips = "both lines changed" if spec.index is None else "counts were lost in"
     rows += [
         ("worst edge", f"{worst}: {table[worst]:+.3f} counts, {table[worst] * arc:+.3g}'"),
@@ -46,6 +47,6 @@ def print_calibration(found: Calibration, spec: TachometerSpec) -> None:
         ("index", text + (f"; {slips} {plural(found.slips, 'turn' if spec.index else 'time')}" * (found.slips > 0))),
         *([] if found.change is None else [("since --against", f"{found.change:.4f} counts RMS of change")]),
         ("certain to", f"{fit.error:.4f} counts RMS, {fit.error * arc:.2g}', by the two halves of the turns"),
-        ("verdict", "refused" if found.reasons else "the map can be used"),
+        ("verdict", "refused" if found.reasons else verdict),
     ]
     print_rows(rows)

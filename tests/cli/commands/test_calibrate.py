@@ -2,6 +2,7 @@
 
 import re
 import shlex
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,11 +17,12 @@ from tachometry.spec.core.disc import Disc
 
 PAGE = docs.page("guides/disc.md")
 COMMANDS = [shlex.split(line) for line in re.findall(r"^tachometry (.*)", PAGE, re.MULTILINE)]
-ENCODER = VirtualEncoder(24, index=True, seed=7, jitter=0.05, nonuniformity=0.1, eccentricity=0.25)
+EVEN = VirtualEncoder(24, index=True, seed=7, jitter=0.05)
+ENCODER = replace(EVEN, nonuniformity=0.1, eccentricity=0.25)
 
 
-def save(path: Path, motion: str) -> None:
-    recording = ENCODER.record(parse_motion(motion)).recording
+def save(path: Path, motion: str, encoder: VirtualEncoder = ENCODER) -> None:
+    recording = encoder.record(parse_motion(motion)).recording
     write_sr(path, recording.place(2_000_000), 2_000_000)
 
 
@@ -65,3 +67,9 @@ def test_a_map_and_a_picture_are_written_or_neither(
     capsys.readouterr()
     assert run("calibrate", "coast.sr", "--ppr", "24", "--against", "out/disc.json") == 0
     assert re.search(r"^since --against +0\.00\d\d counts RMS", capsys.readouterr().out, re.MULTILINE)
+
+
+def test_a_disc_without_faults_gains_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    save(tmp_path / "even.sr", "ramp:150rad/s:60rad/s:3s", EVEN)
+    assert run("calibrate", tmp_path / "even.sr", "--ppr", "24", "--index") == 0
+    assert "the disc is better than the map: there is nothing to gain" in capsys.readouterr().out
