@@ -16,6 +16,7 @@ from tachometry.hdl.export.registers.files import REGISTER_FILES, register_files
 from tachometry.hdl.export.targets.target import TARGETS, bus_for, check_core, target_files
 from tachometry.hdl.export.verilog import WRITERS, verilog_of, yosys_text
 from tachometry.spec.control import AnySpec
+from tachometry.spec.language.port import arranged
 from tachometry.spec.language.provenance import entries
 from tachometry.spec.registers.buses import Bus, bus_of, manifest_on, ports_on, registers_on
 from tachometry.spec.registers.manifest import manifest
@@ -68,7 +69,7 @@ def core_files(
     described = _described(spec, name, on, target)
     files = {} if on is None else register_files(registers_on(spec, on), name)
     core = {
-        f"{name}.v": verilog_of(top_of(spec, on), described, ports_on(spec, on), writer),
+        f"{name}.v": verilog_of(top_of(spec, on), described, arranged(ports_on(spec, on)), writer),
         f"{name}.json": json.dumps(described, indent=2) + "\n",
     }
     core |= kit(spec, name, on) | files
@@ -82,7 +83,7 @@ def top_of(spec: AnySpec, bus: Bus | None) -> wiring.Component:
 
 def both_texts(spec: AnySpec, name: str, on: Bus | None) -> tuple[str, Written]:
     """Return the text of a core by Yosys, and by tachometry, which are proven to be the same circuit."""
-    return yosys_text(top_of(spec, on), name), write(top_of(spec, on), name, ports_on(spec, on))
+    return yosys_text(top_of(spec, on), name), write(top_of(spec, on), name, arranged(ports_on(spec, on)))
 
 
 def file_names(name: str) -> list[str]:

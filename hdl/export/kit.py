@@ -3,7 +3,7 @@
 from tachometry.hdl.export.render import render_files
 from tachometry.spec import AxesSpec, Encoder, TachometerSpec
 from tachometry.spec.control import AnySpec
-from tachometry.spec.language.port import Port
+from tachometry.spec.language.port import Port, arranged
 from tachometry.spec.registers.buses import Bus, ports_on
 
 # The files, and what --help says of them.
@@ -22,7 +22,7 @@ _TURNS, _FEW_TURNS = (40, 16), (8, 4)
 
 def kit(spec: AnySpec, name: str, bus: Bus | None = None) -> dict[str, str]:
     """Return texts by file name, those of `KIT`."""
-    ports = ports_on(spec, bus)
+    ports = arranged(ports_on(spec, bus))
     return render_files(
         KIT,
         name,
@@ -31,6 +31,7 @@ def kit(spec: AnySpec, name: str, bus: Bus | None = None) -> dict[str, str]:
         bus=bus,
         inputs=[port for port in ports if port.direction == "input"],
         outputs=[port for port in ports if port.direction == "output"],
+        scales=_scales(spec),
         help=_help,
         paths=_synchronizers(spec, bus),
         bits="" if spec.axes is None else "*",
@@ -38,6 +39,13 @@ def kit(spec: AnySpec, name: str, bus: Bus | None = None) -> dict[str, str]:
         idle={**(bus.idle if bus else {}), **_first_levels(spec)},
         **(_axes_bench(spec) if spec.kind == "axes" else _bench(spec.tachometer)),
     )
+
+
+def _scales(spec: AnySpec) -> dict[str, str]:
+    """Return the scales of outputs, to be copied into a program, by their names."""
+    velocity, counts = spec.tachometer.velocity, spec.tachometer.encoder.counts_per_rev
+    lsb = f"{velocity.rad_per_s_per_lsb!r} rad/s"
+    return {"velocity": f"2^-{velocity.frac_bits} {spec.tachometer.unit} = {lsb}", "position": f"2*pi/{counts} rad"}
 
 
 def _help(port: Port) -> str:

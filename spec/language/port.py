@@ -6,6 +6,7 @@ documents. A port that is added here, and driven by hardware and golden model, a
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 TICK, UPDATE, INDEX, COMPARE = "tick", "velocity_valid", "index_valid", "compare_valid"
@@ -59,6 +60,15 @@ def strobe(name: str, help: str) -> Port:
 def held(by: str, name: str, width: int = 1, *, signed: bool = False, unit: str = "", help: str) -> Port:
     """Return an output that is read in the clocks of the strobe `by`."""
     return Port(name, "output", width, signed, by, unit, help)
+
+
+def arranged(ports: Iterable[Port]) -> list[Port]:
+    """Return ports in the order of all files: inputs as they come, then outputs, those of one strobe together."""
+    every = [*ports]
+    groups = [*dict.fromkeys(port.held_by or port.name for port in every)]
+    outputs = [port for port in every if port.direction == "output"]
+    outputs.sort(key=lambda port: (groups.index(port.held_by or port.name), not port.is_strobe))
+    return [port for port in every if port.direction == "input"] + outputs
 
 
 class Ports(tuple[Port, ...]):

@@ -7,7 +7,7 @@ from typing import Any
 from tachometry.hdl.export.registers.values import is_whole, sentences
 from tachometry.hdl.export.render import render_files
 from tachometry.spec.control import AnySpec
-from tachometry.spec.language.port import STREAM
+from tachometry.spec.language.port import STREAM, arranged
 from tachometry.spec.registers.buses import Bus, ports_on, registers_on
 
 _MADE = ("NAME_ip/component.xml", "NAME_ip/NAME_ip.v")
@@ -57,7 +57,7 @@ def _holes(spec: AnySpec, bus: Bus | None) -> dict[str, Any]:
 
 def vivado(spec: AnySpec, name: str, bus: Bus | None, made: Mapping[str, str]) -> dict[str, str]:
     """Return an IP in the folder `NAME_ip`, whose module contains the core, with copies, as `Target.files` says."""
-    ports = ports_on(spec, bus)
+    ports = arranged(ports_on(spec, bus))
     there = _INTERFACES[bus.name] if bus else None
     outer = {port.name: port.name for port in ports}
     kinds = {STREAM: "axis"} if spec.tachometer.ports.streamed else {}

@@ -88,9 +88,14 @@ def test_the_smoke_test_includes_the_template_and_passes(method: str, bus: str, 
     unit, fastest, within = FASTEST[method]
     assert float(passed[1]) <= 0 < float(passed[2]) == pytest.approx(fastest, rel=within)
     assert passed[3] == unit
-    described = json.loads(files["spindle.json"])["ports"]
-    ports = [port["name"] for direction in ("input", "output") for port in described if port["direction"] == direction]
+    (top,) = re.findall(r"^module spindle \($.*?^\);", files["spindle.v"], re.MULTILINE | re.DOTALL)
+    ports = re.findall(r"^    (?:in|out)put +(?:reg|wire) +(?:\[\d+:0\] +)?(\w+)", top, re.MULTILINE)
+    assert ports[:3] == ["clk", "rst", "a"]
+    assert {port["name"] for port in json.loads(files["spindle.json"])["ports"]} == {*ports}
     assert re.findall(r"^  \.(\w+)\(\1\)", files["spindle_inst.v"], re.MULTILINE) == ports
+    assert re.findall(r"^      (\w+) : (?:in|out) ", files["spindle_pkg.vhd"], re.MULTILINE) == ports
+    declared = re.findall(r"^(?://   )?wire (?:signed )?(?:\[\d+:0\] )?(\w+);", files["spindle_inst.v"], re.MULTILINE)
+    assert declared == ports
 
 
 def test_the_smoke_test_fails_on_a_wrong_core(tmp_path: Path) -> None:
