@@ -55,7 +55,8 @@ def ports() -> str:
     """Return the page of all ports of all methods."""
     found: dict[str, Port] = {}
     has: dict[str, dict[str, None]] = {}
-    always = {port.name for method in METHODS for port in of_texts(method, {"ppr": "500"}).ports}
+    own = {method: {port.name: port.help for port in of_texts(method, {"ppr": "500"}).ports} for method in METHODS}
+    always = {name for helps in own.values() for name in helps}
     every = [(method, port) for method in METHODS for spec in _cores(method) for port in spec.ports]
     for method, port in every:
         found.setdefault(port.name, port)
@@ -64,6 +65,9 @@ def ports() -> str:
     for name, port in found.items():
         only = "" if len(has[name]) == len(METHODS) else f" Methods: {', '.join(has[name])}."
         *cells, meaning = _described(port)
+        if name in ("interval", "forced"):
+            texts = {helps[name]: [one for one in own if own[one][name] == helps[name]] for helps in own.values()}
+            meaning = " ".join(f"{text.rstrip('.')} ({', '.join(methods)})." for text, methods in texts.items())
         rows.append([*cells, meaning + only + ("" if name in always else " Only with its option.")])
     alone = {port.name for port in _STREAM.ports} - {port.name for port in replace(_STREAM, extras=()).ports}
     kinds, stream = ("unsigned", "signed"), Stream.of(_STREAM.extras)

@@ -17,12 +17,9 @@ def ports_of(spec: Core, own: Iterable[Port]) -> Iterator[Port]:
     text = "Measured velocity; multiplied by rad_per_s_per_lsb of the manifest it is in rad/s."
     yield held(UPDATE, "velocity", spec.velocity.width, signed=True, unit=unit, help=text)
     yield strobe(UPDATE, "One clock for every update of the velocity.")
-    text = "Length of the measurement: m_s in ticks (s), the number of averaged ticks (m), timer periods (t, mt), "
-    text += "Ndt1 in sampling periods dt (rairan), or ticks since the last one with counts (track)."
+    text = f"Length of the measurement: {spec.facts.interval}."
     yield held(UPDATE, "interval", spec.widths.interval, unit=f"{spec.times.interval_unit} clocks", help=text)
-    text = "No count or alteration caused this update: the maximum time passed, the velocity decayed, or the tick "
-    text += "held no count (track)."
-    yield held(UPDATE, "forced", help=text)
+    yield held(UPDATE, "forced", help=spec.facts.forced)
     yield strobe(TICK, "One clock for every sampling period.")
     text = "m_e, the counts of this period."
     yield held(TICK, "pulse_count", spec.widths.count, signed=True, unit="counts", help=text)

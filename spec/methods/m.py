@@ -91,7 +91,12 @@ class MTachometer(TachometerSpec):
     )
 
     method = "m"
-    facts = Facts(title="M", summary="counts the pulses of one tick, or of several", update_by="tick")
+    facts = Facts(
+        title="M",
+        summary="counts the pulses of one tick, or of several",
+        update_by="tick",
+        interval="the number of averaged ticks",
+    )
 
     @cached_property
     def form(self) -> MForm:

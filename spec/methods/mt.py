@@ -75,7 +75,13 @@ class MTTachometer(TimedTachometer):
     )
 
     method = "mt"
-    facts = Facts(title="M/T", summary="takes the time of many counts", update_by="count", rest_tenths=22)
+    facts = Facts(
+        title="M/T",
+        summary="takes the time of many counts",
+        update_by="count",
+        interval="timer periods",
+        rest_tenths=22,
+    )
     equation = 13
     one_count = False
 

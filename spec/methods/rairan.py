@@ -191,6 +191,7 @@ class RairanTachometer(TachometerSpec):
         title="Rairán's",
         summary="begins its ticks with a count (Rairán 2013)",
         update_by="count",
+        interval="Ndt1 in sampling periods dt",
         own_ticks=True,
         last_at_rest=True,
     )

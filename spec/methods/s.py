@@ -142,6 +142,7 @@ class STachometer(TachometerSpec):
         title="S",
         summary="averages in step with the alterations of the pulse number",
         update_by="alteration",
+        interval="m_s in ticks",
         pairs_all=True,
     )
 

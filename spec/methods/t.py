@@ -15,6 +15,12 @@ class TTachometer(TimedTachometer):
     """
 
     method = "t"
-    facts = Facts(title="T", summary="takes the time between two counts", update_by="count", rest_tenths=22)
+    facts = Facts(
+        title="T",
+        summary="takes the time between two counts",
+        update_by="count",
+        interval="timer periods",
+        rest_tenths=22,
+    )
     equation = 9
     one_count = True

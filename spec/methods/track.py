@@ -111,6 +111,8 @@ class TrackTachometer(TachometerSpec):
         title="Tracking",
         summary="tracks position, velocity and acceleration",
         update_by="tick",
+        interval="ticks since the last one with counts",
+        forced="The tick held no count.",
         bounds=False,
         awaits_count=True,
         stalls_with=UPDATE,
