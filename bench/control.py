@@ -109,7 +109,7 @@ def weights(seeds: int, jobs: int | None) -> str:
 
 
 def assumptions(seeds: int, jobs: int | None) -> str:
-    """Return what is changed against the real disc, ticks of 1 ms and 20 µs, k_v = 40 and 80."""
+    """Return the changes against the real disc, ticks of 1 ms and 20 µs, k_v = 40 and 80."""
     rows: dict[str, list[str]] = {}
     for kv, seconds in ((40.0, 1e-3), (80.0, 20e-6)):
         base = setting(KINDS[0], kv, seconds, REAL)

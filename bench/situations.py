@@ -46,7 +46,7 @@ class Cell:
 
     @staticmethod
     def of(name: str, errors: list[float]) -> "Cell":
-        """Return of the errors with all seeds."""
+        """Return the row of the errors with all seeds."""
         mean = sum(errors) / len(errors)
         if len(errors) == 1:
             return Cell(name, mean, None)

@@ -27,7 +27,7 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Tell how long the tests of each folder took."""
+    """Print the seconds that the tests of each folder took."""
     seconds: Counter[str] = Counter()
     for report in (report for reports in terminalreporter.stats.values() for report in reports):
         folder = getattr(report, "nodeid", "").partition("::")[0].removeprefix("tests/").split("/")[0]

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 from amaranth import Array, C, Cat, Module, Mux, Signal, Value, signed
 
+_Chosen = tuple[Value, Value, Value]  # a term, a factor and a base
+
 
 @dataclass(frozen=True)
 class Product:
@@ -51,21 +53,20 @@ class Multiplier:
             with m.If(last):
                 m.d.sync += number.eq(number + 1)
         columns = ([one.term for one in products], [one.factor for one in products], [one.base for one in products])
-        term, factor, base = (Array(column)[number] for column in columns)
-        result, whole = (self._in_block if self.block else self._serially)(m, clock, term, factor, base, ends)
+        chosen = tuple(Array(column)[number] for column in columns)
+        result, whole = (self._in_block if self.block else self._serially)(m, clock, chosen, ends)
         for at, one in enumerate(products):
             if one.kept is not None:
                 with m.If(last & (number == at)):
                     m.d.sync += one.kept.eq(result)
         return begins, last & ends, whole
 
-    def _serially(
-        self, m: Module, clock: Signal, term: Value, factor: Value, base: Value, ends: Value
-    ) -> tuple[Value, Value]:
+    def _serially(self, m: Module, clock: Signal, chosen: _Chosen, ends: Value) -> tuple[Value, Value]:
         """Let the sum move down as the factor does, whose last bit is its sign; then add the base to it.
 
         The last product begins with its base.
         """
+        term, factor, base = chosen
         held, left, signs, adds = Signal(signed(self.width)), Signal(signed(self.bits)), Signal(), Signal()
         sum_, high = Signal(signed(self.width + self.bits)), Signal(signed(self.width + 1))
         addend = Mux(left[0], held ^ signs.replicate(self.width), 0)
@@ -81,10 +82,9 @@ class Multiplier:
             m.d.sync += [held.eq(term), left.eq(factor), sum_.eq(Cat(C(0, self.bits), begun))]
         return (sum_ >> self.bits)[: self.shown], sum_[: self.shown]
 
-    def _in_block(
-        self, m: Module, clock: Signal, term: Value, factor: Value, base: Value, ends: Value
-    ) -> tuple[Value, Value]:
+    def _in_block(self, m: Module, clock: Signal, chosen: _Chosen, ends: Value) -> tuple[Value, Value]:
         """Multiply between two registers."""
+        term, factor, base = chosen
         held, left = Signal(signed(self.width)), Signal(signed(self.bits))
         product, result = Signal(signed(self.width + self.bits)), Signal(self.shown)
         whole = Mux(ends, product, (product + (1 << self.bits - 1)) >> self.bits)

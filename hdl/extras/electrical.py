@@ -2,7 +2,7 @@
 
 from typing import Self
 
-from amaranth import Module, Signal, Value, signed
+from amaranth import C, Module, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -11,8 +11,8 @@ from tachometry.hdl.output.counted_angle import CountedAngle
 from tachometry.hdl.output.tracked_angle import TrackedAngle
 from tachometry.hdl.wires.delay import delay
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.extras.electrical import REFUSED_BITS, ElectricalAngle
-from tachometry.spec.formats.electrical import LEAD_BITS, PLACE_BITS, SHOWN_BITS, Carried, Counted
+from tachometry.spec.core.extras.electrical import REFUSED, REFUSED_BITS, ElectricalAngle
+from tachometry.spec.formats.angles import LEAD_BITS, PLACE_BITS, SHOWN_BITS, Carried, Counted
 
 
 class Gates(wiring.Component):
@@ -26,15 +26,22 @@ class Gates(wiring.Component):
         Clocks from a step to the position that has it.
     widths : mapping of str to int
         Bits of the outputs of the method that are taken.
-    corrects : bool
-        An index behind the first may show lost counts.
+    marks : tuple of str
+        Inputs for an index: `index_rises`, and `home_rises` where it is taken once. `angle_refused`: one behind the
+        first may show lost counts.
     """
 
     def __init__(
-        self, phases: Carried | Counted, latency: int, widths: dict[str, int], extra: ElectricalAngle, *, corrects: bool
+        self,
+        phases: Carried | Counted,
+        latency: int,
+        widths: dict[str, int],
+        extra: ElectricalAngle,
+        marks: tuple[str, ...] = (),
     ) -> None:
-        self._latency, self._corrects, self._offset = latency, corrects, extra.offset
-        self.count = CountAngle(phases.electrical, corrects=corrects)
+        corrects = REFUSED in marks
+        self._latency, self._marks, self._corrects, self._offset = latency, marks, corrects, extra.offset
+        self.count = CountAngle(phases.angles, corrects=corrects)
         velocity = widths["new_velocity"]
         self.phase: TrackedAngle | CountedAngle
         if isinstance(phases, Carried):
@@ -44,7 +51,7 @@ class Gates(wiring.Component):
         super().__init__(
             {
                 "step": In(signed(2)),
-                **dict.fromkeys(("tick", "update", "index_rises", "home_rises", "angle_set"), In(1)),
+                **dict.fromkeys(("tick", "update", "angle_set", *(mark for mark in marks if mark != REFUSED)), In(1)),
                 "position": In(PLACE_BITS),
                 **{name: In(signed(width)) for name, width in widths.items()},
                 "angle_value": In(SHOWN_BITS),
@@ -52,7 +59,7 @@ class Gates(wiring.Component):
                 "angle_lead": In(LEAD_BITS, init=extra.lead),
                 "angle": Out(SHOWN_BITS),
                 "angle_valid": Out(1),
-                **({"angle_refused": Out(REFUSED_BITS)} if corrects else {}),
+                **({REFUSED: Out(REFUSED_BITS)} if corrects else {}),
             }
         )
 
@@ -63,7 +70,9 @@ class Gates(wiring.Component):
         if spec.tracked is not None:
             taken = {port.name: port.width for port in spec.method_ports}
             widths |= {f"new_{name}": taken[name] for name in ("acceleration", "position_fine")}
-        return cls(extra.phases(spec), spec.latency.tick, widths, extra, corrects=extra.corrects(spec))
+        marks = ("index_rises",) * (spec.index is not None) + ("home_rises",) * spec.front_end.index_once
+        marks += (REFUSED,) * extra.corrects(spec)
+        return cls(extra.phases(spec), spec.latency.tick, widths, extra, marks)
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
@@ -72,8 +81,10 @@ class Gates(wiring.Component):
         (step,) = delay(m, self.step, clocks=self._latency - 1)
         indexed, sets = Signal(), Signal()
         m.d.sync += sets.eq(self.angle_set)
-        m.d.comb += [count.step.eq(step), count.zero.eq(self.index_rises)]
-        with m.If(self.index_rises):
+        rises = self.index_rises if "index_rises" in self._marks else C(0)
+        home = self.home_rises if "home_rises" in self._marks else C(0)
+        m.d.comb += [count.step.eq(step), count.zero.eq(rises)]
+        with m.If(rises):
             m.d.sync += [indexed.eq(1), self.angle_valid.eq(1)]
         if self._corrects:
             m.d.comb += count.anew.eq(~indexed)
@@ -81,14 +92,18 @@ class Gates(wiring.Component):
                 m.d.sync += self.angle_refused.eq(self.angle_refused + 1)
         with m.If(sets):
             m.d.sync += self.angle_valid.eq(1)
-        with m.If(self.home_rises):
+        with m.If(home):
             m.d.sync += [indexed.eq(0), self.angle_valid.eq(0)]
         if isinstance(phase, TrackedAngle):
             self._track(m, phase)
         else:
             m.d.comb += [phase.at.eq(count.angle), phase.step.eq(step), phase.moves.eq(count.clears)]
-        m.d.comb += [phase.update.eq(self.update), phase.velocity.eq(self.new_velocity), phase.lead.eq(self.angle_lead)]
-        self._shift(m, phase.angle[-SHOWN_BITS:], sets, self.index_rises & ~indexed)
+        m.d.comb += [
+            phase.update.eq(self.update),
+            phase.velocity.eq(self.new_velocity),
+            phase.ahead.eq(self.angle_lead),
+        ]
+        self._shift(m, phase.angle[-SHOWN_BITS:], sets, rises & ~indexed)
         return m
 
     def _track(self, m: Module, phase: TrackedAngle) -> None:

@@ -5,7 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.wires.ports import only_if
-from tachometry.spec.formats.electrical import Electrical
+from tachometry.spec.formats.angles import Angles
 
 
 class CountAngle(wiring.Component):
@@ -21,22 +21,22 @@ class CountAngle(wiring.Component):
         zero before; else it is refused.
     """
 
-    def __init__(self, electrical: Electrical, *, corrects: bool = False) -> None:
-        self._electrical, self._corrects = electrical, corrects
+    def __init__(self, angles: Angles, *, corrects: bool = False) -> None:
+        self._angles, self._corrects = angles, corrects
         super().__init__(
             {
                 "step": In(signed(2)),
                 "zero": In(1),
                 **only_if(corrects, anew=In(1), refused=Out(1)),  # of a `zero` that is taken whatever the angle is
                 "clears": Out(1),  # n is 0 in the next clock but for the step of this one
-                "angle": Out(electrical.bits, init=electrical.zero),
+                "angle": Out(angles.bits, init=angles.zero),
             }
         )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        counts, origin = self._electrical.counts, self._electrical.zero
-        quotient, remainder = self._electrical.count
+        counts, origin = self._angles.counts, self._angles.zero
+        quotient, remainder = self._angles.count
         zero, rest, back = Signal(), Signal(range(counts)), self.step[1]
         m.d.sync += zero.eq(self.zero)
         clears = self.clears

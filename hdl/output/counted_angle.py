@@ -6,7 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.products import Multiplier, Product
 from tachometry.hdl.output.debt import owed
-from tachometry.spec.formats.electrical import LEAD_BITS, Counted
+from tachometry.spec.formats.angles import LEAD_BITS, Counted
 
 
 class CountedAngle(wiring.Component):
@@ -23,7 +23,7 @@ class CountedAngle(wiring.Component):
 
     def __init__(self, counted: Counted, velocity_width: int) -> None:
         self._counted = counted
-        bits = counted.electrical.bits
+        bits = counted.angles.bits
         wide = max(velocity_width + counted.velocity.shift, bits + 1)
         self._multiplier = Multiplier(wide, counted.factor_bits, bits, counted.block)
         super().__init__(
@@ -33,7 +33,7 @@ class CountedAngle(wiring.Component):
                 "moves": In(1),  # something else moves `at` in the next clock
                 "velocity": In(signed(velocity_width)),  # from `update` on
                 "update": In(1),
-                "lead": In(LEAD_BITS),  # clocks, with `update`
+                "ahead": In(LEAD_BITS),  # clocks, with `update`
                 "angle": Out(bits),
             }
         )
@@ -41,14 +41,14 @@ class CountedAngle(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         counted, half = self._counted, self._counted.half
-        bits = counted.electrical.bits
+        bits = counted.angles.bits
         s, slope = Signal(counted.factor_bits), Signal(signed(bits))
         shift = counted.velocity.shift
         term = self.velocity << shift if shift >= 0 else self.velocity >> -shift
         products = (Product(term, counted.velocity.number, C(0), slope), Product(slope, s, C(0), None))
         begins, done, far = self._multiplier.take(m, self.update, products)
         with m.If(begins):
-            m.d.sync += s.eq(self.lead + counted.late)
+            m.d.sync += s.eq(self.ahead + counted.late)
         near = half.bit_length() + 1
         grows, place, ahead = Signal(signed(near)), Signal(signed(near)), Signal(bits)
         with m.If(done):
@@ -59,7 +59,7 @@ class CountedAngle(wiring.Component):
         phase, coming, moved = Signal(bits), Signal(bits), Signal()
         m.d.comb += coming.eq(self.at + place + ahead)
         m.d.sync += [phase.eq(coming), moved.eq(done | self.step[0] | self.moves)]
-        debt = owed(m, counted.electrical, moved, (phase - coming)[:bits])
+        debt = owed(m, counted.angles, moved, (phase - coming)[:bits])
         m.d.comb += self.angle.eq(phase + debt)
         return m
 

@@ -6,7 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.products import Multiplier, Product
 from tachometry.hdl.output.debt import owed
-from tachometry.spec.formats.electrical import LEAD_BITS, PLACE_BITS, SLOPE_BITS, Carried, Factor
+from tachometry.spec.formats.angles import LEAD_BITS, PLACE_BITS, SLOPE_BITS, Carried, Factor
 
 
 class TrackedAngle(wiring.Component):
@@ -23,7 +23,7 @@ class TrackedAngle(wiring.Component):
 
     def __init__(self, carried: Carried, velocity_width: int, acceleration_width: int) -> None:
         self._carried = carried
-        bits, place = carried.electrical.bits, carried.tracked.fine_bits + PLACE_BITS
+        bits, place = carried.angles.bits, carried.tracked.fine_bits + PLACE_BITS
         self._curve = Signal(signed(max(acceleration_width + carried.acceleration.shift, 2)))
         factors = (
             (place, carried.fine),
@@ -40,7 +40,7 @@ class TrackedAngle(wiring.Component):
                 "velocity": In(signed(velocity_width)),
                 "acceleration": In(signed(acceleration_width)),
                 "update": In(1),
-                "lead": In(LEAD_BITS),  # clocks, with `update`
+                "ahead": In(LEAD_BITS),  # clocks, with `update`
                 "angle": Out(bits),
             }
         )
@@ -48,7 +48,7 @@ class TrackedAngle(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         carried, curve = self._carried, self._curve
-        bits, half = carried.electrical.bits, carried.electrical.tick >> 1
+        bits, half = carried.angles.bits, carried.angles.tick >> 1
         s, target = Signal(carried.factor_bits), Signal(bits)
         slope, now = Signal(signed(bits)), Signal(signed(bits))
         bent = curve << carried.factor_bits - SLOPE_BITS
@@ -65,9 +65,9 @@ class TrackedAngle(wiring.Component):
             ),
         )
         with m.If(begins):
-            m.d.sync += s.eq(self.lead + carried.span)
+            m.d.sync += s.eq(self.ahead + carried.span)
         phase, run, grows, begun = Signal(bits), Signal(bits), Signal(signed(bits)), Signal()
-        debt = owed(m, carried.electrical, done, (run - start)[:bits])
+        debt = owed(m, carried.angles, done, (run - start)[:bits])
         m.d.comb += [run.eq(phase + grows), self.angle.eq(phase + debt)]
         m.d.sync += phase.eq(Mux(done, start, run))
         with m.If(done):

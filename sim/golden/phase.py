@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim import build
-from tachometry.spec.formats.electrical import Carried, Counted, Electrical, wrapped
+from tachometry.spec.formats.angles import Angles, Carried, Counted, wrapped
 
 _Ints = NDArray[np.int64]
 # A debt of 2^spread·q falls by q a clock until it is below that: all these clocks are one step.
@@ -85,10 +85,10 @@ def _owed(gaps: _Ints, clocks: _Ints, spread: int, bits: int) -> _Ints:
     return found
 
 
-def angles(electrical: Electrical, counts: _Ints) -> _Ints:
+def angles_of(angles: Angles, counts: _Ints) -> _Ints:
     """Return the angles of counts since the zero."""
-    turn = counts % electrical.counts * electrical.pole_pairs % electrical.counts
-    return ((turn << electrical.bits) // electrical.counts + electrical.zero) % (1 << electrical.bits)
+    turn = counts % angles.counts * angles.pole_pairs % angles.counts
+    return ((turn << angles.bits) // angles.counts + angles.zero) % (1 << angles.bits)
 
 
 _NONE = 1 << 62
@@ -136,9 +136,9 @@ class CountedPhases:
     rows: _Ints
 
     @property
-    def electrical(self) -> Electrical:
+    def angles(self) -> Angles:
         """How angles are counted."""
-        return self.counted.electrical
+        return self.counted.angles
 
     @classmethod
     def of(cls, counted: Counted, moves: tuple[_Ints, _Ints, _Ints], updates: tuple[_Ints, _Ints, _Ints]) -> Self:
@@ -147,7 +147,7 @@ class CountedPhases:
         moves : clocks, angles from these clocks on, and steps, 0 for what is no count.
         updates : clocks in which their products begin, their velocity and lead.
         """
-        bits = counted.electrical.bits
+        bits = counted.angles.bits
         taken = [counted.carried(*each) for each in zip(*(one.tolist() for one in updates[1:]), strict=True)]
         slopes, ahead = (
             (np.array([wrapped(one, bits) for one in each], np.int64) for each in zip(*taken, strict=True))
@@ -159,21 +159,21 @@ class CountedPhases:
         rows = np.zeros((len(clock), 5), np.int64)
         at, of = (np.searchsorted(each, clock, side="right") for each in (moves[0], begun))
         rows[:, 0] = clock
-        rows[:, 1] = np.append(counted.electrical.zero, moves[1])[at] + np.append(0, ahead)[of]
+        rows[:, 1] = np.append(counted.angles.zero, moves[1])[at] + np.append(0, ahead)[of]
         rows[:, 2] = np.append(0, slopes)[of]
         steps = np.flatnonzero(moves[2])
         rows[1:, 3] = _NONE
         rows[np.searchsorted(clock, moves[0][steps]), 3] = -moves[2][steps] * counted.half
-        return cls(counted, _counted(rows, counted.half, counted.electrical.spread, bits))
+        return cls(counted, _counted(rows, counted.half, counted.angles.spread, bits))
 
     def at(self, clock: _Ints) -> _Ints:
         """Return the angle in each of these clocks, N bits; 0 in the first."""
-        electrical, half = self.counted.electrical, self.counted.half
+        angles, half = self.angles, self.counted.half
         before = clock - 1
         row = self.rows[np.maximum(np.searchsorted(self.rows[:, 0], before, side="right") - 1, 0)].T
         since = np.maximum(before - row[0], 0)
-        found = row[1] + np.clip(row[3] + row[2] * since, -half, half) + _pay(row[4], since, electrical.spread)
-        return np.where(before < 0, 0, found % (1 << electrical.bits))
+        found = row[1] + np.clip(row[3] + row[2] * since, -half, half) + _pay(row[4], since, angles.spread)
+        return np.where(before < 0, 0, found % (1 << angles.bits))
 
 
 @dataclass(frozen=True)
@@ -184,23 +184,23 @@ class Phases:
     rows: _Ints
 
     @property
-    def electrical(self) -> Electrical:
+    def angles(self) -> Angles:
         """How angles are counted."""
-        return self.carried.electrical
+        return self.carried.angles
 
     @classmethod
     def of(cls, carried: Carried, update: _Ints, columns: tuple[_Ints, ...]) -> Self:
         """Return the phases of updates; columns: what `Carried.phase` takes, in its order."""
-        electrical = carried.electrical
+        angles = carried.angles
         found = [carried.phase(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
-        half = 1 << electrical.bits - 1
-        start, slope = (np.array([wrapped(row[part], electrical.bits) for row in found], np.int64) for part in range(2))
+        half = 1 << angles.bits - 1
+        start, slope = (np.array([wrapped(row[part], angles.bits) for row in found], np.int64) for part in range(2))
         clock = update + carried.clocks
         spans = np.diff(clock, prepend=clock[:1])
         # The old phase in the clock of the new one; nothing is paid in the clock before that.
         gaps = np.append(0, start[:-1] + slope[:-1] * spans[1:])[: len(start)] - start
         gaps[:1] = 0
-        debt = _owed((gaps + half) % (2 * half) - half, spans - 1, electrical.spread, electrical.bits)
+        debt = _owed((gaps + half) % (2 * half) - half, spans - 1, angles.spread, angles.bits)
         return cls(carried, np.column_stack((clock, start, slope, debt)))
 
     def at(self, clock: _Ints) -> _Ints:
@@ -210,5 +210,5 @@ class Phases:
         which = np.searchsorted(self.rows[:, 0], clock, side="right") - 1
         first, start, slope, debt = self.rows[np.maximum(which, 0)].T
         since = np.maximum(clock - first, 0)
-        found = start + slope * since + _pay(debt, since, self.electrical.spread)
-        return np.where(which < 0, 0, found % (1 << self.electrical.bits))
+        found = start + slope * since + _pay(debt, since, self.angles.spread)
+        return np.where(which < 0, 0, found % (1 << self.angles.bits))

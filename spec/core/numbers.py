@@ -11,7 +11,7 @@ from tachometry.spec.core.recovery import Recovery
 from tachometry.spec.core.tick import Scale, Tick
 from tachometry.spec.core.times import Times, Widths
 from tachometry.spec.core.velocity import Bound, Velocity
-from tachometry.spec.formats.electrical import Tracked
+from tachometry.spec.formats.angles import Tracked
 from tachometry.spec.language.port import Port, Ports
 
 

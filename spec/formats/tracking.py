@@ -147,7 +147,7 @@ class Tracking:
 
     @cached_property
     def constants(self) -> dict[str, int]:
-        """Constants of the listing, lead aside."""
+        """Constants of the listing, ahead aside."""
         one, t = 1 << PLACE_BITS, self.time_bits
         v, a = self.velocity_bits, self.acceleration_bits
         order = fixed_log(12 - 2 * PLACE_BITS + 2 * a + 4 * t)

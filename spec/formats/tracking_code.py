@@ -312,7 +312,7 @@ class Program:
         return assembled(apart=self.times.apart, ports=self.times.ports)
 
     @property
-    def lead(self) -> int:
+    def ahead(self) -> int:
         """Clocks by which the shown velocity is ahead of the tick."""
         return self.delay + self.clocks
 
@@ -329,7 +329,7 @@ class Program:
     @cached_property
     def constants(self) -> dict[str, int]:
         """Constants by name."""
-        return {**self.form.constants, "lead": self.lead << self.form.time_bits}
+        return {**self.form.constants, "ahead": self.ahead << self.form.time_bits}
 
     @cached_property
     def words(self) -> dict[str, int]:

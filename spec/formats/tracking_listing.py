@@ -98,7 +98,7 @@ heard:
     minus_D4 s+ e; if pos goto alone
     mu = mu + ~ keep
     block log_dt + log_45 exp
-    since + lead by
+    since + ahead by
     minus_D3 s+ mu s+ mu; if neg goto calm
     serial log_dt + log_45 exp
     T = memory - ~ lo+ ~
@@ -289,7 +289,7 @@ alone:
     mu = mu + ~
     slips = slips min zero
     block log_dt + log_8 exp
-    since + lead by
+    since + ahead by
     serial log_dt + log_8 exp
     T = memory - ~ lo+ ~ log
     slow_T = zero
@@ -333,7 +333,7 @@ silent:
     sum - max_time out stalled + max_time - forget; if pos goto rest
     phase; if neg goto nothing
 show:
-    since + lead by
+    since + ahead by
     as product velocity
     block since by
     velocity = vs + ~
@@ -360,7 +360,7 @@ sure:
     t = t - count - count - count - count
     if neg goto still
 trusted:
-    quiet + lead log
+    quiet + ahead log
     w = zero
     t - half; if neg goto whole
     w = log_5_8

@@ -14,8 +14,8 @@ from tachometry.spec.core.tick import Scale
 from tachometry.spec.core.timing import Timing, parse_clocks
 from tachometry.spec.core.velocity import Velocity
 from tachometry.spec.core.words import Words
+from tachometry.spec.formats.angles import Tracked
 from tachometry.spec.formats.carrying import Carrying
-from tachometry.spec.formats.electrical import Tracked
 from tachometry.spec.formats.tracking import MOST_MEMORY, RESULT_BITS, WIDTH, Tracking
 from tachometry.spec.formats.tracking_code import Program
 from tachometry.spec.formats.tracking_units import BLOCK, Serial

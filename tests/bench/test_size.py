@@ -60,7 +60,7 @@ REPORT = {
 
 
 def results(**changed: float) -> dict[tuple[str, str], Any]:
-    """Return of the reference on all targets, at its bars but for what is changed on HX8K."""
+    """Return the results of the reference on all targets, at its bars but for what is changed on HX8K."""
     found = {
         "ECP5": {"COMB": 265, "FF": 260, "DP16KD": 0, "MULT": 0, "Fmax": 190.0, "latency": 4},
         "HX8K": {"LC": 340, "RAM": 0, "Fmax": 130.0, "latency": 4} | changed,

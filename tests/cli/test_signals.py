@@ -136,7 +136,7 @@ def living(session: int) -> list[str]:
 
 
 def wrong(line: str, folder: Path, outcome: Outcome) -> str | None:
-    """Return what is wrong with what a command has left."""
+    """Return the faults of the files that a command has left."""
     told = [text for text in outcome.err.splitlines() if not text.startswith("tachometry: connected to ")]
     if outcome.status not in (0, 130) or len(told) > 1 or (told and not told[0].startswith("tachometry: interrupted")):
         return f"status {outcome.status}, {outcome.err[-2000:]!r}"

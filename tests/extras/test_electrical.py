@@ -12,7 +12,7 @@ from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.spec import of_texts
-from tachometry.spec.formats.electrical import Electrical
+from tachometry.spec.formats.angles import Angles
 
 TRACK = "tick=2000clk max-time=8000clk"
 SLOW = "tick=200clk max-time=1000clk"
@@ -76,10 +76,10 @@ def test_the_angle_is_that_of_the_motor_at_its_use(method: str, motion: str, rms
 
 @pytest.mark.parametrize(("counts", "pole_pairs"), [(97, 18), (10, 3), (20_000, 21)])
 def test_counts_have_their_exact_angle(counts: int, pole_pairs: int) -> None:
-    electrical, rng = Electrical(counts, pole_pairs, 400, 400), random.Random(counts)
+    angles, rng = Angles(counts, pole_pairs, 400, 400), random.Random(counts)
     rows = [{"step": rng.choice((-1, 0, 1, 1)), "zero": rng.random() < 0.002} for _ in range(4000)]
     number, zero = 0, False
-    for row, seen in zip(rows, clock_by_clock(CountAngle(electrical), rows, ["angle"]), strict=True):
-        turns = number * pole_pairs * 2**electrical.bits // counts
-        assert seen["angle"] == (turns + electrical.zero) % 2**electrical.bits
+    for row, seen in zip(rows, clock_by_clock(CountAngle(angles), rows, ["angle"]), strict=True):
+        turns = number * pole_pairs * 2**angles.bits // counts
+        assert seen["angle"] == (turns + angles.zero) % 2**angles.bits
         number, zero = (0 if zero else number) + int(row["step"]), bool(row["zero"])

@@ -177,7 +177,7 @@ def ticks_of(settings: Settings, front: Front, ends: list[int], most: int, held:
 
 
 def wrapped(number: int, bits: int) -> int:
-    """Return in two's complement."""
+    """Return a number in two's complement."""
     return (number + (1 << bits - 1)) % (1 << bits) - (1 << bits - 1)
 
 

@@ -28,7 +28,7 @@ def small(
 
 
 def motions(spec: AxesSpec, n_clocks: int = 2000) -> AxesTrace:
-    """Return of each axis another one: counts, reversals, both lines at once, standstill; index lines are high at
+    """Return another motion for each axis: counts, reversals, both lines at once, standstill; index lines are high at
     first.
     """
     each = [stress(spec.tachometer, seed=7 + axis, n_edges=5 + 3 * axis) for axis in range(spec.axes)]

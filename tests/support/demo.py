@@ -38,7 +38,7 @@ def manifest_of(registers: DemoMap) -> dict[str, Any]:
 
 @cache
 def compiled(method: str = "m") -> BoardSimulation:
-    """Return it is shared: whoever uses it leaves it without telemetry."""
+    """Return the compiled demo. It is shared: stop telemetry after use."""
     return BoardSimulation(demo_map(method), uart())
 
 

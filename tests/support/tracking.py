@@ -35,7 +35,7 @@ class Interpreter:
         self.program = program
         self.words = dict(program.words)
         self.met: Counter[int] = Counter()
-        self._unit = Recursion(program.form, program.lead)
+        self._unit = Recursion(program.form, program.ahead)
 
     def tick(self, *row: int) -> tuple[int, ...]:
         """Take what `Windows.rows` yields."""
@@ -183,7 +183,7 @@ def in_float(spec: TrackTachometer, trace: PinTrace, updates: NDArray[np.int64])
     """Return the velocities in rad/s that the independent model shows for the updates in these clocks."""
     form, steps = spec.form, decoded(spec, trace)
     memory, forget, longest = (form.constants[name] >> form.time_bits for name in ("most_memory", "forget", "max_time"))
-    model = Tracker(memory, forget, longest, spec.program.lead)
+    model = Tracker(memory, forget, longest, spec.program.ahead)
     ends = updates - spec.latency.datapath
     counted = steps.step != 0
     clocks, ways = steps.clock[counted], steps.step[counted]

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.extras import View
-from tachometry.sim.golden.phase import CountedPhases, Phases, angles, begins
+from tachometry.sim.golden.phase import CountedPhases, Phases, angles_of, begins
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.electrical import REFUSED_BITS, ElectricalAngle
-from tachometry.spec.formats.electrical import PLACE_BITS, SHOWN_BITS, Carried, Electrical
+from tachometry.spec.formats.angles import PLACE_BITS, SHOWN_BITS, Angles, Carried
 
 Ints = NDArray[np.int64]
 _TURN = 1 << SHOWN_BITS
@@ -57,7 +57,7 @@ def _at(table: Table, clock: Ints) -> Ints:
 def _angle(phases: Phases | CountedPhases, shift: Table, clock: Ints) -> Ints:
     """Return the angle at the port: a phase is in a register with what is added to it."""
     before = clock - 1
-    top = phases.at(before) >> phases.electrical.bits - SHOWN_BITS
+    top = phases.at(before) >> phases.angles.bits - SHOWN_BITS
     return np.where(before < 0, 0, (top + _at(shift, before)) % _TURN)
 
 
@@ -73,7 +73,7 @@ def _written(trace: PinTrace, name: str, clock: Ints, value: int) -> Ints:
 class _Counts:
     """Angles of counts: those since the latest index that was taken."""
 
-    electrical: Electrical
+    angles: Angles
     latency: int
     clock: Ints  # of the steps
     step: Ints
@@ -82,16 +82,16 @@ class _Counts:
 
     @classmethod
     def of(cls, extra: ElectricalAngle, view: View) -> "_Counts":
-        steps, electrical, latency = view.steps, extra.electrical(view.spec), view.spec.latency.tick
+        steps, angles, latency = view.steps, extra.angles(view.spec), view.spec.latency.tick
         counted = steps.step != 0
         clock, step = steps.clock[counted], steps.step[counted].astype(np.int64)
         if not extra.corrects(view.spec):
-            return cls(electrical, latency, clock, step, steps.index)
+            return cls(angles, latency, clock, step, steps.index)
         sums = np.append(0, np.cumsum(step))[np.searchsorted(clock, steps.index, side="right")].tolist()
-        bits, before = electrical.bits, 0
+        bits, before = angles.bits, 0
         taken, refused, origin = list[int](), list[int](), 0
         for at, total in zip(steps.index.tolist(), sums, strict=True):
-            angle = int(angles(electrical, np.array([total - origin]))[0])
+            angle = int(angles_of(angles, np.array([total - origin]))[0])
             near = (angle + (1 << bits - 4)) % (1 << bits) < 1 << bits - 3
             if not taken or near or angle == before:
                 taken.append(at)
@@ -99,7 +99,7 @@ class _Counts:
             else:
                 refused.append(at + latency + 1)
             before = angle
-        return cls(electrical, latency, clock, step, *(np.array(each, np.int64) for each in (taken, refused)))
+        return cls(angles, latency, clock, step, *(np.array(each, np.int64) for each in (taken, refused)))
 
     def at(self, clock: Ints) -> Ints:
         """Return the angle that the gates have in each of these clocks."""
@@ -107,7 +107,7 @@ class _Counts:
         origins = np.append(0, sums[np.searchsorted(self.clock, self.taken, side="right")])
         zeros = np.searchsorted(self.taken + self.latency + 1, clock, side="right")
         counts = sums[np.searchsorted(self.clock + self.latency, clock, side="right")] - origins[zeros]
-        return angles(self.electrical, counts)
+        return angles_of(self.angles, counts)
 
     def moves(self) -> tuple[Ints, Ints, Ints]:
         """Return clocks from which the angle differs, the angles, and the steps."""
@@ -153,7 +153,7 @@ def _shifts(extra: ElectricalAngle, view: View, phases: Phases | CountedPhases) 
             value = int(_written(trace, "angle_value", np.array([at]), 0)[0])
             before = differences[bisect_right(clocks, at - 2) - 1] if at > 1 else None
             added = 0 if before is None else before + int(_at(offset, np.array([at - 2]))[0])
-            top = int(phases.at(np.array([at - 1]))[0]) >> phases.electrical.bits - SHOWN_BITS
+            top = int(phases.at(np.array([at - 1]))[0]) >> phases.angles.bits - SHOWN_BITS
             difference += value - (top + added) % _TURN
         elif kind == 1 and not indexed:
             difference = 0

@@ -51,7 +51,7 @@ struct Recursion : Tables {
     return gains[number * GAINS + std::max<int64_t>(0, std::min<int64_t>(GAINS - 1, place))];
   }
   int64_t shift(int64_t n) const { return bits_of(n) - (k.factor_bits - CHANCE_BITS); }
-  int64_t ahead() const { return shown_v + product(shown_a, since + k.lead, k.velocity); }
+  int64_t ahead() const { return shown_v + product(shown_a, since + k.ahead, k.velocity); }
   int64_t place() const {
     return p + product(shown_v + product(shown_a, since, k.half_velocity), since, k.place);
   }
@@ -199,7 +199,7 @@ struct Recursion : Tables {
     beyond -= margin + lost;
     if (beyond >= 0) {
       int64_t share = beyond - k.half >= 0 ? k.log_5_8 : 0;
-      int64_t bound = k.of_speed - log2(quiet + k.lead) - share;
+      int64_t bound = k.of_speed - log2(quiet + k.ahead) - share;
       velocity = sign * std::min(sign * velocity, power(bound, 1));
       least = power(bound + k.of_bound, 1);
     }

@@ -96,7 +96,7 @@ def rows(form: Tracking, lead: int) -> Rows:
 
 def constants_of(form: Tracking, lead: int) -> dict[str, int]:
     """Return what the C++ text takes of a form, by names."""
-    bits = {"lead": lead << form.time_bits, "time_bits": form.time_bits, "factor_bits": form.factor_bits}
+    bits = {"ahead": lead << form.time_bits, "time_bits": form.time_bits, "factor_bits": form.factor_bits}
     return {**form.constants, **form.shifts, **bits}
 
 
@@ -145,7 +145,7 @@ class Model:
     def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
         """Return all updates below `n_clocks` clocks, with the velocity in counts per tick as the datapath has it."""
         spec = self._spec
-        shown = (compiled(tuple(constants_of(spec.form, spec.program.lead))) or rows)(spec.form, spec.program.lead)
+        shown = (compiled(tuple(constants_of(spec.form, spec.program.ahead))) or rows)(spec.form, spec.program.ahead)
         unused, shift = 64 - spec.position_width - spec.fine_bits, PLACE_BITS - spec.fine_bits
         n, most = len(ticks), spec.timing.max_ticks
         names = ("velocity", "interval", "forced", "acceleration", "quality", "position_fine", "stalled")

@@ -9,12 +9,13 @@ from tachometry.spec.core.extras.extra import Extra
 from tachometry.spec.core.front_end import Pin
 from tachometry.spec.core.numbers import Numbers
 from tachometry.spec.core.timing import parse_filter
-from tachometry.spec.formats.electrical import LEAD_BITS, SHOWN_BITS, Carried, Counted, Electrical
+from tachometry.spec.formats.angles import LEAD_BITS, SHOWN_BITS, Angles, Carried, Counted
 from tachometry.spec.language.field import Draft, Field
 from tachometry.spec.language.option import REQUIRED, ParameterError, option, parse_whole
 from tachometry.spec.language.port import TICK, Port, held, pin
 
 MOST_POLE_PAIRS = 512
+REFUSED = "angle_refused"
 REFUSED_BITS = 16  # of the number of refused indices, which stays at its end
 SHOW_CLOCKS = 1  # from a phase to the angle at the port
 
@@ -59,7 +60,7 @@ class ElectricalAngle(Extra):
     )
     offset: int = option(
         0,
-        "Electrical angle that is added, as 12.3deg. Or a number of 2^-16 turns. With --bus, register ANGLE_OFFSET "
+        "Angles angle that is added, as 12.3deg. Or a number of 2^-16 turns. With --bus, register ANGLE_OFFSET "
         "begins with it.",
         name="electrical-offset",
         metavar="ANGLE",
@@ -75,16 +76,16 @@ class ElectricalAngle(Extra):
         tests=("", "1.5tick"),
     )
 
-    def electrical(self, spec: Numbers) -> Electrical:
+    def angles(self, spec: Numbers) -> Angles:
         """Return how angles are counted."""
-        return Electrical(spec.encoder.counts_per_rev, self.pole_pairs, spec.timing.tick_cycles, spec.tick.longest)
+        return Angles(spec.encoder.counts_per_rev, self.pole_pairs, spec.timing.tick_cycles, spec.tick.longest)
 
     def phases(self, spec: Numbers) -> Carried | Counted:
         """Return how places become angles of every clock: of method track, or of counts and velocities."""
         bits, late = spec.velocity.native_frac_bits, spec.latency.pin_to_count + spec.latency.tick
         if spec.tracked is None:
-            return Counted(self.electrical(spec), bits, late + SHOW_CLOCKS + 1, block=False)
-        return Carried(self.electrical(spec), spec.tracked, bits, late + spec.latency.datapath, SHOW_CLOCKS)
+            return Counted(self.angles(spec), bits, late + SHOW_CLOCKS + 1, block=False)
+        return Carried(self.angles(spec), spec.tracked, bits, late + spec.latency.datapath, SHOW_CLOCKS)
 
     def check(self, spec: Numbers) -> None:
         if spec.encoder.sensor == "hall":
@@ -116,13 +117,13 @@ class ElectricalAngle(Extra):
 
     def ports(self, spec: Numbers) -> Iterable[Port]:
         unit = f"2^-{SHOWN_BITS} electrical turns"
-        text = "Electrical angle, ANGLE_LEAD clocks after this one. It is new in every clock."
+        text = "Angles angle, ANGLE_LEAD clocks after this one. It is new in every clock."
         yield held(TICK, "angle", SHOWN_BITS, unit=unit, help=text)
         text = "The angle is that of the motor: an index was taken, or the angle was set, since reset and home."
         yield held(TICK, "angle_valid", help=text)
         if self.corrects(spec):
             text = "Indices that were refused: the angle was off by more than 1/16 turn. It stays at 65535."
-            yield held(TICK, "angle_refused", REFUSED_BITS, unit="indices", help=text)
+            yield held(TICK, REFUSED, REFUSED_BITS, unit="indices", help=text)
 
     def registers(self, spec: Numbers) -> Iterable[Draft]:
         unit = f"2^-{SHOWN_BITS} electrical turns"

@@ -43,7 +43,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def refused(capsys: pytest.CaptureFixture[str], folder: Path, *words: object) -> str:
-    """Return what is said of a command that is refused; it leaves nothing."""
+    """Return the error of a refused command, which leaves nothing."""
     assert run(*words) == 2
     out, err = capsys.readouterr()
     assert out == ""

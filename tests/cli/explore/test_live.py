@@ -37,7 +37,7 @@ def attached(told: ToldBoard, tmp_path: Path) -> Iterator[tuple[Live, str]]:
 
 
 def until(live: Live, session: str, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-    """Return what is told when it is as wanted."""
+    """Return the first message that fits."""
     while not wanted(found := live.frames(session, "-1")):
         pass
     return found

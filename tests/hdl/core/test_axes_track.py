@@ -55,7 +55,7 @@ def test_each_axis_is_ahead_by_its_place_in_the_turn() -> None:
     for axis in range(2):
         own = spec.at(axis)
         assert isinstance(own, TrackAxis)
-        assert own.program.lead == own.latency.pin_to_count + round(spec.delay(axis) / spec.slots)
+        assert own.program.ahead == own.latency.pin_to_count + round(spec.delay(axis) / spec.slots)
 
 
 @pytest.mark.parametrize(("axes", "tick"), [(1, 960), (8, 1920), (32, 4800), (64, 9600), (64, 960)])

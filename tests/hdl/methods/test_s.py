@@ -22,7 +22,7 @@ def datapath_spec(*, cancel: bool = True, serial: bool = True, frac_bits: int = 
 
 
 def run(spec: STachometer, m_e: list[int]) -> list[dict[str, int]]:
-    """Return what is shown from the first tick on."""
+    """Return the outputs from the first tick on."""
     pause = [{"tick": 0}] * (spec.timing.tick_cycles - 2)
     rows: list[dict[str, int]] = []
     for number in m_e:

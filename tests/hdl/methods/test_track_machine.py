@@ -91,7 +91,7 @@ def test_gains_end_with_their_table(name: str) -> None:
     for log_x in range(-2 * 4096 - 1, -13 * 4096, -1777):
         for number in range(3):
             operations.append((Instruction(start=Start.GAIN, how=str(number)), log_x))
-            state = Recursion(program.form, program.lead)
+            state = Recursion(program.form, program.ahead)
             state.log_share = log_x
             right.append(state._gain(number))
     assert results(program, operations, 12) == right

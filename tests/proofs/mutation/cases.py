@@ -51,7 +51,7 @@ class Pins:
         return self.places[-1][0] + 1
 
     def words(self, n_clocks: int, levels: Mapping[str, NDArray[Any]]) -> NDArray[np.uint64]:
-        """Return what is played, shape (n_clocks, n_words), from the level of each input in every clock; others are
+        """Return the played words, shape (n_clocks, n_words), from the level of each input in every clock; others are
         0.
         """
         found = np.zeros((n_clocks, self.n_words), dtype=np.uint64)
@@ -93,7 +93,7 @@ class Case:
         return Tachometer(self.spec)
 
     def play(self, n_clocks: int) -> Stimulus:
-        """Return what is played on the mutants."""
+        """Return the words that are played on the mutants."""
         return stimulus(self.spec, n_clocks)
 
     def right(self, trace: Any) -> Run:

@@ -61,7 +61,7 @@ class CommandedTrace:
     commands: dict[str, NDArray[np.int64]]  # with the clock from which each is there as `clock`
 
     def command(self, clock: NDArray[np.int64]) -> Sequence[Command]:
-        """Return what is commanded in these clocks."""
+        """Return the commands in these clocks."""
         row = np.searchsorted(self.commands["clock"], clock, side="right") - 1
         rows = zip(*(self.commands[name][row].tolist() for name in _COMMANDS), strict=True)
         return [Command(*command) for command in rows]
@@ -122,7 +122,7 @@ class _Right:
         return cls(clock, control(spec, clock, places.position + away, updates, trace.command(clock)))
 
     def dense(self, first: int, n: int) -> NDArray[np.int64]:
-        """Return in every one of these clocks, 0 where nothing strobes."""
+        """Return a value for each of these clocks, 0 where nothing strobes."""
         found = np.zeros((n, len(_COMPARED)), dtype=np.int64)
         for place, clock in enumerate((self.ticks, self.currents.clock)):
             found[clock[(clock >= first) & (clock < first + n)] - first, place] = 1

@@ -75,7 +75,7 @@ def slow_shaft(method: str, **texts: str) -> tuple[TachometerSpec, PinTrace]:
 
 
 def slow(method: str) -> tuple[TachometerSpec, PinTrace]:
-    """Return of the method, or of one with ticks so long that they are counted."""
+    """Return a core of the method, or one with ticks so long that they are counted."""
     return slow_shaft("s", tick="5ms", **{"max-time": "50ms"}) if method == "long" else slow_shaft(method)
 
 

@@ -94,7 +94,7 @@ def test_the_fastest_filter_is_2_pi_times_the_clock() -> None:
 
 
 def silence(max_ticks: int, tick: int) -> int:
-    """Return what counts the ticks of a silence may wrap first."""
+    """Return the counter of the ticks of a silence that may wrap first."""
     return (2 ** max_ticks.bit_length() + 1) * tick
 
 

@@ -25,7 +25,7 @@ MOTIONS = [(CORES[0], 5, 1100), (CORES[1], 4, 300), (CORES[2], 5, 300), (CORES[3
 
 def run(spec: TrackTachometer, seed: int, n_ticks: int) -> Counter[int]:
     """Run the program; how often each instruction was met."""
-    machine, state = Interpreter(spec.program), Recursion(spec.form, spec.program.lead)
+    machine, state = Interpreter(spec.program), Recursion(spec.form, spec.program.ahead)
     for nth, row in enumerate(windows(spec, seed, n_ticks).rows()):
         assert machine.tick(*row) == state.tick(*row), f"seed {seed}, tick {nth}"
         assert machine.words["T"] == state.memory, f"seed {seed}, tick {nth}"
@@ -62,7 +62,7 @@ def test_what_outlives_a_rest_is_held_if_it_was_upset(word: str, upset: int, hel
 @pytest.mark.parametrize("grows", [1, -1])
 def test_a_memory_of_the_most_events_shrinks_or_stays(grows: int) -> None:
     form, program = CORES[0].form, CORES[0].program
-    machine, state, half = Interpreter(program), Recursion(form, program.lead), form.tick_cycles // 2
+    machine, state, half = Interpreter(program), Recursion(form, program.ahead), form.tick_cycles // 2
     rows = [(1, half, 1, half, 1, nth % 4, 0, (nth + 1) % 4, 2 * half) for nth in range(4)]
     assert [machine.tick(*row) for row in rows] == [state.tick(*row) for row in rows]
     state.memory = machine.words["T"] = 10_000 * form.tick_cycles << form.time_bits
@@ -80,7 +80,7 @@ def test_a_memory_of_the_most_events_shrinks_or_stays(grows: int) -> None:
 def test_a_memory_of_a_clock_does_not_shrink(number: int, multiplier: str) -> None:
     """Half of it is rounded up, so it would be negative after some events, and grow to that side."""
     program, tick = replace(CORES[2], multiplier=multiplier).program, CORES[2].form.tick_cycles
-    machine, state = Interpreter(program), Recursion(program.form, program.lead)
+    machine, state = Interpreter(program), Recursion(program.form, program.ahead)
     row = (number, number * tick // 2, number**2, tick // 4, number, 0, 0, 0, tick)
     for _ in range(40):
         assert machine.tick(*row) == state.tick(*row)

@@ -32,9 +32,9 @@ CORES = {
 
 def compiled(spec: TrackTachometer, held: track.Windows) -> NDArray[np.int64]:
     """Return what the twin in C++ shows."""
-    found = track.compiled(tuple(track.constants_of(spec.form, spec.program.lead)))
+    found = track.compiled(tuple(track.constants_of(spec.form, spec.program.ahead)))
     assert found
-    return found(spec.form, spec.program.lead)(held)
+    return found(spec.form, spec.program.ahead)(held)
 
 
 @pytest.mark.parametrize("name", CORES)
@@ -42,7 +42,7 @@ def test_twins(name: str) -> None:
     """The C++ shows what the Python shows, bit by bit, and all of it changes."""
     spec = CORES[name]
     held = windows(spec, 1, 1500)
-    right = track.rows(spec.form, spec.program.lead)(held)
+    right = track.rows(spec.form, spec.program.ahead)(held)
     assert np.array_equal(compiled(spec, held), right)
     assert all(len(np.unique(column)) > 30 for column in right.T[:4])
 
@@ -65,7 +65,7 @@ def test_what_is_shown_fits_the_ports(name: str) -> None:
 def test_states_stay_within_their_words(seed: int) -> None:
     """In 10^5 ticks, from one to the next."""
     spec = CORES[[*CORES][seed % len(CORES)]]
-    state, held = Recursion(spec.form, spec.program.lead), windows(spec, seed, 10_000)
+    state, held = Recursion(spec.form, spec.program.ahead), windows(spec, seed, 10_000)
     words = [name for name, value in vars(state).items() if isinstance(value, int)]
     for row in held.rows():
         state.tick(*row)
@@ -77,7 +77,7 @@ def test_states_stay_within_their_words(seed: int) -> None:
 def test_the_fine_position_stays_at_an_edge_that_no_count_has_shown(seed: int) -> None:
     """In ticks without a count, on all motions; the place of the edge is the one that was learned."""
     spec = CORES["default"]
-    state, held = Recursion(spec.form, spec.program.lead), 0
+    state, held = Recursion(spec.form, spec.program.ahead), 0
     for row in windows(spec, seed, 3000).rows():
         number, end = row[0], row[7]
         place = state.tick(*row)[1]
@@ -246,7 +246,7 @@ def check_upsets(words: Iterable[str | int], bits: Iterable[int]) -> None:
     steps = Steps(clock, np.ones(n, np.int8), none, none, none)
     last = np.arange(spec.timing.tick_cycles - 1, clock[-1], spec.timing.tick_cycles)
     rows = list(track.Windows.of(steps, last, spec.form.most_number).rows())
-    state = Recursion(spec.form, spec.program.lead)
+    state = Recursion(spec.form, spec.program.ahead)
     for row in rows[: 3 * _SETTLED]:
         state.tick(*row)
     right = pytest.approx(np.full(3 * (_END - _RIGHT) - 9, 2.0**spec.form.velocity_out / 3), rel=1e-3)

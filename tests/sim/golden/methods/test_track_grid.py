@@ -69,7 +69,7 @@ def search(spec: TrackTachometer, clocks: NDArray[np.int64], rate: float) -> NDA
     Every second cell turns backward. It raises NoCompiler.
     """
     form, found = spec.form, np.empty((len(clocks), 2))
-    constants = np.array(list(track.constants_of(form, spec.program.lead).values()))
+    constants = np.array(list(track.constants_of(form, spec.program.ahead).values()))
     tables = np.concatenate((LOGS, POWERS, np.ravel(form.gains)), dtype=np.int64)
     backward = np.arange(len(clocks), dtype=np.int64) % 2
     places = [ctypes.c_void_p(array.ctypes.data) for array in (constants, tables, clocks, backward, found)]

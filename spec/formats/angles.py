@@ -41,7 +41,7 @@ def rounded(product: int, bits: int) -> int:
 
 
 @dataclass(frozen=True)
-class Electrical:
+class Angles:
     """Angles are fractions of an electrical turn, in 2^-N, modulo 2^N."""
 
     counts: int  # in a turn
@@ -88,7 +88,7 @@ class Tracked:
 class Carried:
     """How the place of a tracking update becomes a phase, new in every clock."""
 
-    electrical: Electrical
+    angles: Angles
     tracked: Tracked
     velocity_bits: int  # fraction bits of the velocity, in counts per tick
     late: int  # clocks from the end of a tick at the pins to the update
@@ -99,7 +99,7 @@ class Carried:
     @property
     def factor_bits(self) -> int:
         """Bits of a signed factor: times are at most half of a tick, the latency and a lead."""
-        most = self.late + 256 + (1 << LEAD_BITS) + self.electrical.tick // 2
+        most = self.late + 256 + (1 << LEAD_BITS) + self.angles.tick // 2
         return max(_FACTOR_BITS, most.bit_length() + 1)
 
     @property
@@ -120,17 +120,17 @@ class Carried:
     @cached_property
     def fine(self) -> Factor:
         """An LSB of the fine position, as an angle."""
-        return Factor.of(self.electrical.per_count / (1 << self.tracked.fine_bits), self.factor_bits)
+        return Factor.of(self.angles.per_count / (1 << self.tracked.fine_bits), self.factor_bits)
 
     @cached_property
     def velocity(self) -> Factor:
         """An LSB of the velocity, as an angle a clock."""
-        return Factor.of(self.electrical.per_count / (self.electrical.tick << self.velocity_bits), self.factor_bits)
+        return Factor.of(self.angles.per_count / (self.angles.tick << self.velocity_bits), self.factor_bits)
 
     @cached_property
     def acceleration(self) -> Factor:
         """An LSB of the acceleration, in 2^-`SLOPE_BITS` of an angle per clock²."""
-        return Factor.of(self.electrical.per_count * self.tracked.slope * (1 << SLOPE_BITS), self.factor_bits)
+        return Factor.of(self.angles.per_count * self.tracked.slope * (1 << SLOPE_BITS), self.factor_bits)
 
     def phase(self, at: int, fine: int, velocity: int, acceleration: int, lead: int) -> tuple[int, int]:
         """Return the phase of an update in its first clock, and how much it grows in a clock; neither is wrapped.
@@ -140,7 +140,7 @@ class Carried:
         s, bits, slope = self.span + lead, self.factor_bits, self.velocity.times(velocity)
         curve = self.acceleration.times(acceleration) << bits - SLOPE_BITS
         mean = slope + rounded(curve * ((s >> 1) - self.late), bits)
-        now = slope + rounded(curve * (s + (self.electrical.tick >> 1) - self.late), bits)
+        now = slope + rounded(curve * (s + (self.angles.tick >> 1) - self.late), bits)
         return at + self.fine.times(fine) + mean * s, now
 
 
@@ -154,7 +154,7 @@ def wrapped(angle: int, bits: int) -> int:
 class Counted:
     """How a count and the velocity become a phase, new in every clock: the place is at an edge after each count."""
 
-    electrical: Electrical
+    angles: Angles
     velocity_bits: int  # fraction bits of the velocity, in counts per tick
     late: int  # clocks from the pins to the angle of a count
     block: bool  # whether a multiplier of the FPGA makes products
@@ -174,12 +174,12 @@ class Counted:
     @property
     def half(self) -> int:
         """The angle of half a count, the furthest place from a position."""
-        return self.electrical.count[0] >> 1
+        return self.angles.count[0] >> 1
 
     @cached_property
     def velocity(self) -> Factor:
         """An LSB of the velocity, as an angle a clock."""
-        return Factor.of(self.electrical.per_count / (self.electrical.tick << self.velocity_bits), self.factor_bits)
+        return Factor.of(self.angles.per_count / (self.angles.tick << self.velocity_bits), self.factor_bits)
 
     def carried(self, velocity: int, lead: int) -> tuple[int, int]:
         """Return how much the place grows in a clock, at most half a count, and how far the phase is ahead of it."""
