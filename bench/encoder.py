@@ -73,7 +73,7 @@ def row(example: str) -> list[str]:
         f"`{example}`" if faults else example,
         f"{run.ticks.position[-1] - true} of {true}",
         str(len(run.errors)),
-        str(int(run.ticks.get("swallowed_edges")[-1])),
+        str(int(run.ticks.get("filtered_edges")[-1])),
         " ".join(map(str, run.ticks.pulse_count[SHOWN])),
         velocity_errors(spec, *fast),
         velocity_errors(spec, *slow),
@@ -82,21 +82,27 @@ def row(example: str) -> list[str]:
 
 def table() -> str:
     """Return the table of imperfections."""
-    heads = ["encoder and core", "position off (counts)", "`decode_error`", "`swallowed_edges`"]
+    heads = ["encoder and core", "position off (counts)", "`decode_error`", "`filtered_edges`"]
     heads += [f"{what} at {FAST} counts per tick" for what in ("m_e", "velocity error, RMS (mean),")]
     return markdown([*heads, f"and at {SLOW}"], list(map(row, EXAMPLES)))
 
 
 def pulses(motion: str, disc: Mapping[str, str], fine: bool) -> str:
     """Return how far pulses of the compare output are from their places, in counts: the mean, and RMS about it."""
-    spec = of_texts("track", PULSES["core"] | {"compare": PULSES["compare"][fine]})
+    spec = of_texts("track", PULSES["core"] | {"position-compare": PULSES["compare"][fine]})
     assert isinstance(spec, TrackTachometer)
     encoder = VirtualEncoder(500, start_angle_rad=math.pi / 2000, **values_of(disc, SEED))  # amid position 0
     moved = parse_motion(motion)
-    found = golden.run(spec, encoder.record(moved).recording.place(spec.timing.clock_hz)).tables["compare_valid"]
+    found = golden.run(spec, encoder.record(moved).recording.place(spec.timing.clock_hz)).tables[
+        "position_compare_valid"
+    ]
     seconds = found.clock / spec.timing.clock_hz
     # A position begins at an edge, half a count before the place of its name.
-    wanted = found.compare_position / (1 << spec.fine_bits) if fine else found.compare_position - 0.5
+    wanted = (
+        found.position_compare_position / (1 << spec.position_fine_bits)
+        if fine
+        else found.position_compare_position - 0.5
+    )
     off = (moved.angle(seconds) * 1000 / math.pi - wanted)[seconds > SETTLED_S]
     return f"{off.mean():+.3f} ± {off.std():.4f}"
 

@@ -47,7 +47,7 @@ class Example:
     @property
     def within_s(self) -> float:
         """The time within which it must be reported."""
-        return self.pulses * PULSE_S + (2e-6 if "complements" in self.core else 0)
+        return self.pulses * PULSE_S + (2e-6 if "differential" in self.core else 0)
 
 
 EXAMPLES = tuple(Example(**each) for each in _DATA["fault"])
@@ -82,7 +82,7 @@ def skewed(recording: Recording) -> Recording:
 def clean(name: str, repeated: int = REPEATED) -> list[str]:
     """Return a row of the table of good encoders."""
     faults = faults_of(DISCS[name])
-    spec = core_of(faults.pop("ppr"), "index complements=1us index-at=A=1,B=1")
+    spec = core_of(faults.pop("ppr"), "index differential=1us index-at=A=1,B=1")
     trace = PinTrace.of(skewed(record(spec, f"{repeated}*({MOTION})", faults, 7)), spec)
     tables = golden.tables(spec, trace)
     edges = np.count_nonzero(np.diff(trace.a)) + np.count_nonzero(np.diff(trace.b))

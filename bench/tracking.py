@@ -31,16 +31,16 @@ GENTLE = Situation("gentle S-curve", "constant:100rad/s:300ms+s-curve:100rad/s:0
 
 
 class Errors(NamedTuple):
-    """Errors of all updates of a situation, in rad/s, and what `quality` shows there."""
+    """Errors of all updates of a situation, in rad/s, and what `velocity_std` shows there."""
 
     core: NDArray[np.float64]
-    quality: NDArray[np.float64]
+    velocity_std: NDArray[np.float64]
     model: NDArray[np.float64] | None  # of the independent model in floating point
 
     @property
     def covered(self) -> float:
-        """Updates whose error is within `quality`, in %."""
-        return 100 * float(np.mean(np.abs(self.core) <= self.quality))
+        """Updates whose error is within `velocity_std`, in %."""
+        return 100 * float(np.mean(np.abs(self.core) <= self.velocity_std))
 
 
 def errors(spec: TachometerSpec, situation: Situation, seed: int, beside: bool = False) -> Errors:
@@ -53,7 +53,7 @@ def errors(spec: TachometerSpec, situation: Situation, seed: int, beside: bool =
     judged = (seconds > situation.start_s) & (seconds <= truth.recording.duration)
     right, lsb = truth.true_speed(seconds[judged]), spec.velocity.rad_per_s_per_lsb
     model = in_float(spec, trace, updates.clock)[judged] - right if beside else None
-    return Errors(updates.velocity[judged] * lsb - right, updates.quality[judged] * lsb, model)
+    return Errors(updates.velocity[judged] * lsb - right, updates.velocity_std[judged] * lsb, model)
 
 
 def rms(wrong: NDArray[np.float64] | None) -> float:
@@ -62,7 +62,7 @@ def rms(wrong: NDArray[np.float64] | None) -> float:
 
 
 def row(situation: Situation, n_seeds: int, beside: bool = True) -> list[str]:
-    """Return a situation's row: at each tick the error, that of floating point, and the share within `quality`."""
+    """Return a situation's row: at each tick the error, that of floating point, and the share within `velocity_std`."""
     seeds = range(FIRST_SEED, FIRST_SEED + (n_seeds if situation.random else 1))
     cells = [situation.name]
     for tick in TICKS:
@@ -148,7 +148,7 @@ def table(seeds: int, runs: int) -> str:
     """Return the table of errors in all situations."""
     heads = ["situation"]
     for tick in TICKS:
-        heads += [f"ticks of {tick[:-2]} µs", "in float", "within quality (%)"]
+        heads += [f"ticks of {tick[:-2]} µs", "in float", "within velocity_std (%)"]
     return markdown(heads, [row(situation, seeds) for situation in (*SITUATIONS, *OTHERS, GENTLE)])
 
 

@@ -12,13 +12,12 @@ class CoreOptions(TypedDict, total=False):
     cancel: bool | None
     clock: Value | None
     command: Value | None
-    compare: Value | None
-    complements: Value | None
     control_period: Value | None
     cpr: Value | None
     current_limit: Value | None
     current_width: Value | None
     decoding: Value | None
+    differential: Value | None
     dt: Value | None
     edge_error: Value | None
     electrical: Value | None
@@ -26,7 +25,6 @@ class CoreOptions(TypedDict, total=False):
     estimate: Value | None
     external_tick: bool | None
     filter: Value | None
-    fine_bits: Value | None
     frac_bits: Value | None
     gains: Value | None
     health: bool | None
@@ -59,6 +57,8 @@ class CoreOptions(TypedDict, total=False):
     paper_exact: bool | None
     parallel: bool | None
     pole_pairs: Value | None
+    position_compare: Value | None
+    position_fine_bits: Value | None
     position_modulo: Value | None
     position_width: Value | None
     ppr: Value | None

@@ -61,7 +61,7 @@ def check(words: tuple[str, ...], folder: Path, motions: int, left: int) -> None
     assert np.count_nonzero(~updates.forced) > (5 if rare else 100)
     if "--paper-exact" not in words:  # a velocity that does not decay has one where the shaft rests
         assert spec.method == "m" or np.count_nonzero(updates.forced) > ("--no-bound-decay" not in words)
-    assert actual.tables[spec.facts.stalls_with].stalled.any()
+    assert actual.tables[spec.facts.rests_with].standstill.any()
     assert bool(len(actual.errors)) == (spec.encoder.sensor != "pulses") or bool(spec.filter_clocks)
     assert bool(len(actual.index.clock)) == (spec.index is not None)
     assert bool(len(actual.tick_errors)) == spec.external_tick

@@ -16,7 +16,7 @@ ARTY_A7_35 = Board(
         ),
         Header(
             "JD",
-            pins("spi_cs_n:1 spi_mosi:2 spi_miso:3 spi_sck:4 drive:7 enable:8"),
+            pins("spi_cs_n:1 spi_mosi:2 spi_miso:3 spi_sck:4 current_pdm:7 enable:8"),
             ("pmod", 3),
         ),
     ),

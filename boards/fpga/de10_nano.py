@@ -13,7 +13,7 @@ DE10_NANO = Board(
             "JP1",
             pins(
                 "a:1 b:3 z:5 tick_in:7 emulated_a:2 emulated_b:4 emulated_z:6 capture:8 spi_cs_n:13 spi_mosi:14 "
-                "spi_miso:15 spi_sck:16 drive:17 enable:18"
+                "spi_miso:15 spi_sck:16 current_pdm:17 enable:18"
             ),
             ("gpio", 0),
         ),

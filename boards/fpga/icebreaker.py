@@ -17,7 +17,7 @@ ICEBREAKER = Board(
         ),
         Header(
             "PMOD1B",
-            pins("spi_cs_n:1 spi_mosi:2 spi_miso:3 spi_sck:4 drive:7 enable:8"),
+            pins("spi_cs_n:1 spi_mosi:2 spi_miso:3 spi_sck:4 current_pdm:7 enable:8"),
             ("pmod", 1),
         ),
     ),

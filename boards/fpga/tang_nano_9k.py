@@ -17,7 +17,7 @@ TANG_NANO_9K = Board(
             "pin",
             pins(
                 "a:25 b:26 z:27 tick_in:28 capture:29 emulated_a:30 emulated_b:33 emulated_z:34 spi_cs_n:40 "
-                "spi_mosi:35 spi_miso:41 spi_sck:42 drive:51 enable:53"
+                "spi_mosi:35 spi_miso:41 spi_sck:42 current_pdm:51 enable:53"
             ),
         ),
     ),

@@ -16,7 +16,7 @@ def _board(size: int, die: int) -> Board:
                 "J1",
                 pins(
                     "a:0+ b:1+ z:2+ tick_in:3+ emulated_a:0- emulated_b:1- emulated_z:2- capture:3- spi_cs_n:4+ "
-                    "spi_mosi:4- spi_miso:5+ spi_sck:5- drive:6+ enable:6-"
+                    "spi_mosi:4- spi_miso:5+ spi_sck:5- current_pdm:6+ enable:6-"
                 ),
                 ("gpio", 0),
             ),

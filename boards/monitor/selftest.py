@@ -50,7 +50,7 @@ def steps(registers: DemoMap) -> list[Step]:
     """Return speeds, reversals, standstill, illegal edges, an encoder with all its faults, and lines at fault."""
     spec = registers.spec
     highest = min(spec.max_speed.rad_per_s if spec.max_speed else math.inf, fastest(spec))
-    silence = 2.5 * spec.times.stalled_after_ticks * spec.timing.tick_cycles / spec.timing.clock_hz
+    silence = 2.5 * spec.times.standstill_after_ticks * spec.timing.tick_cycles / spec.timing.clock_hz
 
     def at(part: float) -> int:
         return speed_of(spec, part * highest)

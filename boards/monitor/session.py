@@ -68,7 +68,7 @@ class Session:
     settings : mapping of str to int
         What the emulator is set to after each connection, see `DemoBoard.set`.
     told : callable of str
-        Is told what has changed: a line.
+        Called with one line when the state changes.
     timeout : float
         Seconds in which an answer must come.
     """

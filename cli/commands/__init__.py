@@ -18,21 +18,21 @@ from tachometry.sim.signals.temporary import PREFIX
 
 COMMANDS = {
     "plan": "Show what a core can measure: resolution and time over speed.",
-    "generate": "Write a core as Verilog, with its manifest, constraints and FuseSoC file.",
-    "simulate": "Run a core on a virtual encoder, against the golden model and the truth.",
-    "replay": "Run a core on captured encoder signals, against the golden model.",
+    "generate": "Write a core as Verilog, with the files of its use.",
+    "simulate": "Run a core on a virtual encoder, and compare it.",
+    "replay": "Run a core on captured signals, and compare it.",
     "calibrate": "Measure the disc of an encoder from captures.",
     "compare": "Compare methods on the same edges.",
-    "sweep": "Run methods over ranges of options and speeds, on all processors.",
-    "loop": "Close a velocity loop about a core: motor, observer, controller.",
-    "verify": "Hold all engines against the golden models, in many configurations.",
-    "check": "Check that generated cores are what their manifests say, and do what the golden model does.",
-    "build": "Build a core for a board: a bitstream, or a project for the vendor's tools.",
+    "sweep": "Run methods over ranges of options and speeds.",
+    "loop": "Simulate a velocity loop: core, motor, controller.",
+    "verify": "Compare all engines with the golden models.",
+    "check": "Check generated cores against manifest and model.",
+    "build": "Build a bitstream or vendor project for a board.",
     "program": "Load a bitstream into a board.",
-    "monitor": "Show, record and test what a board measures, also a simulated one.",
-    "explore": "Configure a core in a page of the browser, with its curves, its files and a live board.",
-    "completion": "Let the shell complete commands and options.",
-    "help": "Say all there is to say of a command, or of one of its options.",
+    "monitor": "Show, record and test the measurements of a board.",
+    "explore": "Configure a core in the browser, with its curves.",
+    "completion": "Print a script for completion in the shell.",
+    "help": "Explain a command, or one of its options.",
 }
 _COMPLETE = "_TACHOMETRY_COMPLETE"  # the variable that click's scripts of the shells set
 
@@ -82,8 +82,8 @@ Examples:
       --motion ramp:0:40rad/s:500ms --plot ramp.png --save-capture ramp.sr
   tachometry replay ramp.sr --ppr 500 --clock 200kHz --tick 1ms --trace v.csv
 
-tachometry COMMAND -h has what most need, --help all options, and
-tachometry help COMMAND all there is to say.""",
+tachometry COMMAND -h has the most common options, --help all of them, and
+tachometry help COMMAND explains each.""",
 )
 @click.version_option(package_name="tachometry", message="%(prog)s %(version)s")
 @click.pass_context

@@ -49,15 +49,14 @@ Examples:
     "-o",
     "directory",
     type=FilePath(file_okay=False),
-    help="Directory to write to; it is made if it does not exist, and files in it are overwritten. "
-    "[default: build/BOARD]",
+    help="Folder of all files; files in it are overwritten. It is made if it does not exist. [default: build/BOARD]",
 )
 @option(
     "Files",
     "--bus",
     type=click.Choice(_SERIAL, case_sensitive=False),
     default=_SERIAL[0],
-    help="How the registers are read; "
+    help="Registers on a serial bus. "
     + "; ".join(f"{name}: {BUSES[name].help}" for name in _SERIAL)
     + ". A UART is on the USB of the board, where the board has one.",
 )
@@ -67,8 +66,8 @@ def build(
 ) -> int:
     """Build a core for a board: with its registers on a UART or on SPI, and an emulated encoder beside it.
 
-    With --loop --gains inputs the current of the control loop is on the pin `drive`, as a stream of bits, unless the
-    pin `enable` is low or LOOP.enable is not set.
+    With --loop --gains inputs the current of the control loop is on the pin `current_pdm`, as a stream of bits, unless
+    the pin `enable` is low or LOOP.enable is not set.
 
     \b
     DIR/NAME.bin, .bit or .fs  bitstream, where open tools make one

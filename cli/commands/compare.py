@@ -28,7 +28,7 @@ from tachometry.spec.core.extras import EXTRAS
 from tachometry.spec.language.units import parse_time
 
 # Options of a core that change its size alone.
-_NO_VELOCITY = ("preset", "index-once", "position-modulo", "compare")
+_NO_VELOCITY = ("preset", "index-once", "position-modulo", "position-compare")
 
 
 @click.command(
@@ -61,9 +61,8 @@ Examples:
     "Methods",
     "--tune",
     is_flag=True,
-    help="In place of each float model without options, and of mt without options, show the best of many settings: the "
-    "one with the least RMS error. Its name has the options, and can be given to --methods. All other cores are as "
-    "they are given. It needs --motion.",
+    help="Show the best of many settings for float models and mt. It replaces those without options by the "
+    "setting with the least RMS error, whose name can be given to --methods. It needs --motion.",
 )
 @OPTIONAL_MOTION_OPTIONS
 @option(
@@ -71,20 +70,20 @@ Examples:
     "--replay CAPTURE",
     "capture",
     type=FilePath(),
-    help="Captured lines instead of a --motion: a session, text or waveform, as `tachometry replay` takes it.",
+    help="Captured lines instead of a --motion. A session, text or waveform, as `tachometry replay` takes it.",
 )
 @CAPTURE_OPTIONS
 @option(
     "Methods",
     "--from TIME",
     "start",
-    help="Leave out errors before this time, in s, ms, us or ns. [default: until every method has a value]",
+    help="Leave out errors before TIME (s, ms, us or ns). [default: until every method has a value]",
 )
 @option(
     "Methods",
     "--until TIME",
-    help="Leave out errors after this time, in s, ms, us or ns. With --from, --plot shows a part of a long capture. "
-    "[default: the end]",
+    help="Leave out errors after TIME (s, ms, us or ns). With --from, --plot shows a part of a long "
+    "capture. [default: the end]",
 )
 @read_delay("Methods")
 @option(
@@ -94,17 +93,17 @@ Examples:
     help="Also measure the cores on an ECP5: COMB, FF, Fmax. It takes half a minute a core, and needs the extra "
     "`size`.",
 )
-@output("--plot", suffixes=(".png", ".pdf", ".svg"), help="Figure of all velocities and of the error of each.")
+@output("--plot", suffixes=(".png", ".pdf", ".svg"), help="Figure of all velocities and errors.")
 @output("--csv", help="CSV with a row per method: the table.")
 @output(
     "--tradeoff",
     suffixes=(".png", ".pdf", ".svg", ".csv"),
-    help="Figure of error over delay, with a curve per method: those of all settings of the float "
-    "models, of m over --average, and of mt over --min-time, than which no other has both less error and less delay. "
-    "The error is that of --motion, such as a constant speed with a real disc. The delay is that of another motion "
-    "with an ideal encoder, whose speed goes to and fro between half the RMS speed of --motion and all of it, 10 times "
-    "a second: the RMS error over the RMS acceleration, which is the delay of an otherwise perfect method with that "
-    "error. Or .csv: the numbers of all settings. It needs --motion.",
+    help="Figure of error over delay, a curve per method. A curve has the settings of a float model, of m "
+    "over --average, or of mt over --min-time that no other setting beats in both error and delay. "
+    "The error is that of --motion, such as a constant speed with a real disc. The delay is measured "
+    "with an ideal encoder whose speed goes to and fro between half the RMS speed of --motion and all "
+    "of it, 10 times a second: the RMS error over the RMS acceleration. A .csv has the numbers of all "
+    "settings. It needs --motion.",
 )
 def compare(
     make: Make,

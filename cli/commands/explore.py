@@ -21,7 +21,8 @@ Examples:
     "Page",
     "--manifest FILE",
     type=FilePath(dir_okay=False),
-    help="What `tachometry build` has written for the board at a serial PORT, which the page can then show live.",
+    help="Manifest that `tachometry build` wrote for the board. The page can then show the board at a "
+    "serial PORT live.",
 )
 @option(
     "Page",

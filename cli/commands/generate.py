@@ -129,8 +129,9 @@ ASKED = Group(
             "Files",
             "--testbench",
             type=click.Choice(["cocotb"], case_sensitive=False),
-            help="Also write a bench that checks the core in Icarus, Verilator and others: python DIR/test_NAME.py. "
-            "Without a --motion the shaft goes fast and slow, to and fro, and stops, at speeds that fit the core.",
+            help="Also write a test bench in cocotb. It checks the core in Icarus, Verilator and others: python "
+            "DIR/test_NAME.py. Without a --motion the shaft goes fast and slow, to and fro, and stops, at "
+            "speeds that fit the core.",
         ),
         BUS,
         BAUD,
@@ -140,14 +141,14 @@ ASKED = Group(
             "--writer",
             type=click.Choice(WRITERS, case_sensitive=False),
             default=WRITERS[0],
-            help="What writes the Verilog; yosys: Amaranth's Yosys, with more names and no comments.",
+            help="Writer of the Verilog. yosys is Amaranth's Yosys, with more names and no comments.",
         ),
         option(
             "Files",
             "--irq",
             is_flag=True,
-            help="With a --bus: an interrupt, the output irq, with registers that enable and clear its events: index, "
-            "overflow (faster than --max-speed), stall, error, and with --health and --over-speed what they watch.",
+            help="Add output irq and interrupt registers (with --bus). Its events are index, overflow (faster than "
+            "--max-speed), stall, error, and with --health and --over-speed what they watch.",
         ),
         option(
             "Files",
@@ -155,7 +156,7 @@ ASKED = Group(
             "target",
             type=click.Choice(["none", *TARGETS], case_sensitive=False),
             default="none",
-            help="Also write what a framework needs; "
+            help="Also write the files of a framework. "
             + "; ".join(f"{name}: {target.help}" for name, target in TARGETS.items())
             + ".",
         ),
@@ -163,8 +164,8 @@ ASKED = Group(
             "Files",
             "--ci",
             type=click.Choice(HOSTS),
-            help="Also write DIR/NAME_github.yml or DIR/NAME_gitlab.yml, a job that runs tachometry check and a linter "
-            "on all cores of the repository; the file says where it goes.",
+            help="Also write a CI job that checks all cores of the repository. DIR/NAME_github.yml or "
+            "DIR/NAME_gitlab.yml runs tachometry check and a linter; the file has its place in a comment.",
         ),
         OPTIONAL_MOTION_OPTIONS,
     ],
@@ -199,7 +200,7 @@ Examples:
     "directory",
     type=FilePath(),
     required=True,
-    help="Directory to write to; it is made if it does not exist, and files in it are overwritten.",
+    help="Folder of all files; files in it are overwritten. It is made if it does not exist.",
 )
 def generate(asked: Asked, directory: Path) -> int:
     """Write a core as Verilog, with its manifest and all that it takes to build it into a design."""

@@ -1,4 +1,4 @@
-"""`tachometry help`: all there is to say of a command, or of one of its options."""
+"""`tachometry help`: a command or one of its options, explained."""
 
 import click
 
@@ -19,7 +19,7 @@ Examples:
 @click.argument("name", required=False, metavar="[--OPTION]")
 @click.pass_context
 def help(context: click.Context, command: str | None, name: str | None) -> int:
-    """Say all there is to say of a command, or of one of its options."""
+    """Explain a command, or one of its options."""
     parent = context.parent
     assert parent is not None
     assert isinstance(parent.command, click.Group)

@@ -43,16 +43,16 @@ Examples:
     "Sweep",
     "--vary NAME=VALUES",
     multiple=True,
-    help="An axis: the name of an option of core, controller, motor or encoder, and its values with commas between. "
-    "LO..HI:N stands for N values, evenly spaced, and LO..HI:Nlog for N whose logarithms are. It may be given several "
-    "times: all combinations are run.",
+    help="Option and its values: --vary kv=20,40. An option of core, controller, motor or encoder. "
+    "LO..HI:N are N values, evenly spaced, LO..HI:Nlog are spaced by a factor. It may be given "
+    "several times: all combinations are run.",
 )
 @option(
     "Sweep",
     "--methods LIST",
     default=AUTO,
-    help="Methods to run: auto, which chooses one as --method does, all, or names with commas between, with options "
-    "as in mt:timer=tick.",
+    help="Methods to run: auto, all, or names with commas between. auto chooses one as --method does. "
+    "Names may have options, as in mt:timer=tick.",
 )
 @option("Sweep", "--seeds N", type=int, default=6, help="Runs of each loop, with seeds from --seed on.")
 @JOBS
@@ -60,10 +60,9 @@ Examples:
 @output(
     "--plot",
     suffixes=(".png", ".pdf", ".svg"),
-    help="Figure: speed, error and current of the run with the first seed, or of several loops what the "
-    "table has, over the first axis.",
+    help="Figure of speed, error, current of the first seed. With several loops: the table, over the first axis.",
 )
-@output("--log", help="CSV of the run with the first seed of the only loop: a row every 100 µs.")
+@output("--log", help="CSV of the first seed, a row every 100 µs. It needs a single loop.")
 @output("--csv", help="CSV with a row per loop: the table.")
 @click.pass_obj
 def loop(

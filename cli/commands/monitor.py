@@ -69,43 +69,41 @@ Examples:
     _GROUP,
     "--manifest FILE",
     type=FilePath(dir_okay=False),
-    help="What `tachometry build` has written for the board at a serial port: the options of its core.",
+    help="Manifest that `tachometry build` wrote for the board. It has the options of the core at a serial port.",
 )
 @option(
     _GROUP,
     "--set NAME=VALUE",
     "words",
     multiple=True,
-    help="Set the emulated encoder, which the board measures from then on if its speed is set; can be given several "
-    "times. All names are listed below.",
+    help="Set the emulated encoder; it may be given several times. The board measures it from the time on "
+    "when its speed is set. All names are listed below.",
 )
 @option(
     _GROUP,
     "--every TIME",
     default="10ms",
-    help="Time from a frame of telemetry to the next, rounded to whole ticks; what the line cannot carry is lost.",
+    help="Time between frames of telemetry, in whole ticks. Frames that the line cannot carry are lost.",
 )
-@option(_GROUP, "--duration TIME", help="End after this time of the board. [default: at Ctrl-C]")
-@option(
-    _GROUP, "--plain", is_flag=True, help="Print a line a second, as without a terminal, in place of the live view."
-)
+@option(_GROUP, "--duration TIME", help="End after TIME of the board. [default: at Ctrl-C]")
+@option(_GROUP, "--plain", is_flag=True, help="Print a line a second in place of the live view.")
 @option(
     _GROUP,
     "--selftest",
     is_flag=True,
-    help="Let the emulated encoder go fast and slow, to and fro, stop, and make errors, and compare every frame with "
-    "the golden model.",
+    help="Test the board with its emulated encoder. It goes fast and slow, to and fro, stops, and makes "
+    "errors; every frame is compared with the golden model.",
 )
 @option(
     _GROUP,
     "--serve FILE",
     type=FilePath(dir_okay=False),
-    help="Only run a simulated board for other programs: print its serial port, and write its manifest to FILE.",
+    help="Run a simulated board for other programs. Its serial port is printed, and its manifest written to FILE.",
 )
 @output(
     "--record",
     suffixes=(".csv", ".parquet"),
-    help="Table with a row for each frame: time, and everything that the core shows; .csv or .parquet.",
+    help="Record a row for each frame: time and all outputs. .csv or .parquet.",
 )
 @OPTIONAL_CORE_OPTIONS
 def monitor(

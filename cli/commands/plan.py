@@ -36,20 +36,20 @@ Examples:
 @option(
     "Range",
     "--speeds LO:HI",
-    help="Speeds of the tables, in rad/s, rev/s or rpm; a LO without unit has that of HI. They are shown in "
-    "--unit, or for count/tick in the unit of HI. "
-    "[default: one count in the maximum time to --max-speed, or to ten counts per tick]",
+    help="Range of speeds, in rad/s, rev/s or rpm. A LO without unit has that of HI. The tables are in "
+    "--unit, or for count/tick in the unit of HI. [default: one count in the maximum time to "
+    "--max-speed, or to ten counts per tick]",
 )
 @option(
     "Range",
     "--methods LIST",
-    help="Methods to compare beside each other: all, or names with commas between, with options as in m:average=10.",
+    help="Methods to compare: all, or names with commas between. They may have options, as in m:average=10.",
 )
 @BUS
 @BAUD
 @FAMILY
 @output("--plot", suffixes=(".png", ".pdf", ".svg"), help="Figure of resolution and measurement time.")
-@output("--csv", help="CSV with a row per speed, densely sampled: what the figure is drawn from.")
+@output("--csv", help="CSV with a row per speed: the data of the figure.")
 def plan(
     spec: CoreSpec,
     make: Make,

@@ -27,7 +27,7 @@ Examples:
     "Board",
     "--flash",
     is_flag=True,
-    help="Write to the flash memory of the board, so that it stays there without power.",
+    help="Write to the flash memory of the board, to stay.",
 )
 def program(board: Board, place: Path | None, flash: bool) -> int:
     """Load a bitstream into a board, which is connected by USB: FILE, or that of DIR, which is build/BOARD if nothing

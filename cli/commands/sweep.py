@@ -53,30 +53,30 @@ Examples:
     "Sweep",
     "--vary NAME=VALUES",
     multiple=True,
-    help="An axis: the name of an option of cores, methods, motion or encoder, or a name in braces within --motion, "
-    "and its values with commas between. LO..HI:N stands for N values, evenly spaced, and LO..HI:Nlog for N whose "
-    "logarithms are; none leaves the option out. It may be given several times: all combinations are run.",
+    help="Option and its values: --vary method=s,mt. An option of cores, methods, motion or encoder, or a "
+    "name in braces within --motion. LO..HI:N are N values, evenly spaced, LO..HI:Nlog are spaced by "
+    "a factor; none leaves the option out. It may be given several times: all combinations are run.",
 )
 @option(
     "Sweep",
     "--methods LIST",
     default=AUTO,
-    help="Methods to run: auto, which chooses one for each point as --method does, all, or names with commas between, "
-    "with options as in m:average=10.",
+    help="Methods to run: auto, all, or names with commas between. auto chooses one for each point, as "
+    "--method does. Names may have options, as in m:average=10.",
 )
 @option(
     "Sweep",
     "--from TIME",
     "start",
-    help="Leave out errors before this time, in s, ms, us or ns. [default: until there is a value]",
+    help="Leave out errors before TIME (s, ms, us or ns). [default: until there is a value]",
 )
 @read_delay("Sweep")
 @option(
     "Sweep",
     "--engine",
     type=click.Choice(["auto", "pysim", "cxxrtl", "verilator"], case_sensitive=False),
-    help="Also run the hardware, as simulate does, in lockstep with the golden model. [default: only the golden model, "
-    "which the hardware equals bit for bit]",
+    help="Also run the hardware, in lockstep with the golden model. [default: only the golden model, which "
+    "the hardware equals bit for bit]",
 )
 @JOBS
 @SCHEDULER
@@ -92,7 +92,7 @@ Examples:
     "--metric METRIC",
     type=click.Choice(list(METRICS), case_sensitive=False),
     default="relative-error",
-    help=f"What the heat map shows, the median over all other axes: {', '.join(METRICS)}.",
+    help=f"Value of the heat map, the median over all other axes. It is one of {', '.join(METRICS)}.",
 )
 @click.pass_obj
 def sweep(

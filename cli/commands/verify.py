@@ -33,23 +33,22 @@ later ones find them in the cache.""",
     _VERIFICATION,
     "--methods LIST",
     default="all",
-    help=lambda: f"Methods to verify: all, or names with commas between, of {', '.join(METHODS)}.",
+    help=lambda: f"Methods to verify: all, or names with commas between. They are {', '.join(METHODS)}.",
 )
 @option(
     _VERIFICATION,
     "--engines LIST",
     default="all",
-    help="Engines to verify, with commas between: pysim, cxxrtl, verilator; all are those that can be used here. With "
-    "cxxrtl-every-clock, which is not among all, CXXRTL skips no clock.",
+    help="Engines to verify: all, or names with commas between. pysim, cxxrtl, verilator; all are those of "
+    "this machine. cxxrtl-every-clock, not among all, is CXXRTL that skips no clock.",
 )
 @option(
     _VERIFICATION,
     "--clocks N",
     type=click.IntRange(min=0),
     default=0,
-    help="Clocks that each engine simulates, spread over the configurations; pysim simulates a thousandth of them. "
-    "Every "
-    "configuration runs one motion at least.",
+    help="Clocks to simulate on each engine. They are spread over the configurations; pysim simulates a "
+    "thousandth of them. Every configuration runs at least one motion.",
 )
 @option(_VERIFICATION, "--seed N", type=click.IntRange(min=0), default=1, help="Seed of the first motion.")
 @option(
@@ -58,7 +57,7 @@ later ones find them in the cache.""",
     type=click.IntRange(min=1),
     help="Number of processes. [default: one for each core of the computer]",
 )
-@output_folder("build/verify", help="Folder of the captures of failing motions; it is made if a motion fails.")
+@output_folder("build/verify", help="Folder of the captures of failing motions.")
 def verify(methods: str, engines: str, clocks: int, seed: int, jobs: int | None, directory: Path) -> int:
     """Hold all engines against the golden models, in many configurations.
 

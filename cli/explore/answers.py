@@ -106,7 +106,7 @@ def answer(name: str, args: Mapping[str, Any], functions: Mapping[str, Callable[
                 raise ValueError(f"{one} must be of texts")
         inspect.signature(function).bind(**args)
     except (TypeError, ValueError) as error:
-        return {"error": f"the page must ask as it is written: {error}", "field": ""}
+        return {"error": f"invalid request: {error}", "field": ""}
     try:
         return function(**args)
     except Refused as error:

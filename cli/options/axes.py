@@ -14,14 +14,14 @@ _OPTIONS = [
         _AXES,
         "--axes N",
         type=int,
-        help=f"Measure N encoders, up to {MAX_AXES}, which have a datapath of method s or track in turn: a and b have "
-        "N bits, and what is measured comes with the number of its axis. Without it: one encoder, and no such number.",
+        help=f"Measure N encoders, up to {MAX_AXES}, with one datapath in turn. Its method is s or track. a and b "
+        "have N bits, and results come with the number of their axis.",
     ),
     option(
         _AXES,
         "--parallel",
         is_flag=True,
-        help="With --axes: outputs for each axis, which hold its values. A --bus and --for rio add them.",
+        help="Add held outputs for each axis (with --axes). A --bus and --for rio add them as well.",
     ),
 ]
 

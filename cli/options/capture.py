@@ -20,21 +20,23 @@ _OPTIONS = [
     *plain_options(
         _CAPTURE,
         {
-            "--a CHANNEL": "Channel of line A: its name, or its number from 0. With --axes one for each axis, with "
-            "commas between, as of --b and --z; then these are a0, a1 and so on, b0, z0, if they are not given.",
+            "--a CHANNEL": "Channel of line A: its name, or its number from 0. With --axes one for each "
+            "axis, with commas between, also for --b and --z; without them a0, a1 and so on, "
+            "b0, z0.",
             "--b CHANNEL": "Channel of line B. [default of --a and --b: the channels named A and B, else the first "
             "two]",
             "--c CHANNEL": "Channel of line C of halls. [default: c with --sensor hall]",
             "--z CHANNEL": "Channel of line Z, the index. [default: z with --index, else none]",
             "--tick-in CHANNEL": "Channel of the external tick. [default: tick_in with --external-tick, else none]",
-            "--time COLUMN": "Column of the times in a text: its name, or its number from 0. [default: the column "
+            "--time COLUMN": "Column of the times in a text: a name, or a number from 0. [default: the column "
             "named time]",
-            "--time-unit UNIT": "Unit of the times in a text: s, ms, us, ns, or the rate of what counts them, such as "
-            "16MHz. [default: as the name of the column ends, such as time_ms or Time [us], else s]",
-            "--threshold V[:V]": "Voltage from which on a line is high, for the columns of an oscilloscope, and by how "
-            "much it must fall below where it rose, as in 1.65V:200mV. [default: levels are 0 or 1]",
-            "--count COLUMN": "Column of the counts in a text that logs time and count: its name, or its number from "
-            "0. Between two rows the shaft turns evenly; a count is one of --ppr and --decoding. With --axes as --a.",
+            "--time-unit UNIT": "Unit of the times in a text, or their clock as 16MHz. s, ms, us or ns. [default: "
+            "as the name of the column ends, such as time_ms or Time [us], else s]",
+            "--threshold V[:V]": "Voltage above which a line is high, as 1.65V:200mV. For columns of an "
+            "oscilloscope; the second voltage is the hysteresis. [default: levels are 0 or 1]",
+            "--count COLUMN": "Column of counts in a text of times and counts. A name, or a number from 0. "
+            "Between two rows the shaft turns evenly; a count is one of --ppr and --decoding. "
+            "With --axes as --a.",
             "--angle COLUMN[:UNIT]": "Column of the shaft's angle in a text. Its unit is rad, deg or turn, in its "
             "name, in the line of units or typed. Between two rows the shaft turns evenly. With --axes as --a.",
             "--pulse-times COLUMN": "Read each row of a text as a pulse at this time. Needs --sensor pulses. [default: "
@@ -46,14 +48,13 @@ _OPTIONS = [
         _CAPTURE,
         "--wrap N",
         type=click.IntRange(0, 1 << 53),
-        help="The counter of --count goes from N-1 to 0; 0: it does not wrap. [default: 65536 or 4294967296 where it "
-        "jumps by more than half of that, else 0]",
+        help="Counts after which --count wraps to 0; 0: it does not. [default: 65536 or "
+        "4294967296 where it jumps by more than half of that, else 0]",
     ),
     option(
         _CAPTURE,
         "--samplerate FREQUENCY",
-        help="Samplerate of a .sr file or a text that contains neither it nor times, in Hz (plain number), kHz, MHz or "
-        "GHz.",
+        help="Samplerate of a capture without times, such as 24MHz. For a .sr file or a text.",
     ),
 ]
 
@@ -92,7 +93,7 @@ def _read(
             if column is None:
                 continue
             more = {"sensor": None if alone.encoder.plain else sensor, "index": alone.index}
-            _refuse_lines(name, {**lines, **more, "complements": alone.front_end.complemented or None})
+            _refuse_lines(name, {**lines, **more, "differential": alone.front_end.complemented or None})
             read_log = read_count_log if name == "count" else read_angle_log
             log = read_log(capture, _of_axis(name, column, axis, axes) or "", text, wrap)
             return with_last_tick(log.recording(alone.encoder), spec)

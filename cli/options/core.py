@@ -24,7 +24,7 @@ from tachometry.spec import (
 from tachometry.spec.language import option as declaration
 from tachometry.spec.language.option import options_of
 from tachometry.spec.language.units import parse_frequency
-from tachometry.spec.registers.buses import BUSES, DEFAULT_BAUD
+from tachometry.spec.registers.buses import BUSES
 
 _PREFIX = "core_"
 _CLOCK = "clock"
@@ -36,8 +36,8 @@ Make = Callable[[str, Mapping[str, str]], TachometerSpec]
 def _methods_help() -> str:
     each = "; ".join(f"{name} {spec.facts.summary}" for name, spec in METHODS.items())
     return (
-        f"How velocity is measured: {each}. auto is track where its program fits the tick, else mt, else s, and it is "
-        "told which was taken; an option that only some methods have leaves the others out."
+        f"Method of the velocity measurement. {each}. auto is track where its program fits the tick, else mt, else s; "
+        "the choice is printed. Methods that lack a given option are skipped."
     )
 
 
@@ -253,9 +253,10 @@ BUS = option(
     "Files",
     "--bus",
     type=click.Choice(["none", *BUSES], case_sensitive=False),
-    help="Give the core registers on a bus: "
+    help="Registers of the core on a bus. "
     + "; ".join(f"{bus.name}: {bus.help}" for bus in BUSES.values())
-    + ". Files that describe and read the registers are written, too. Without it: none, or what --for needs.",
+    + ". Files that describe and read the registers are written, too. Without it there is no bus, or that of "
+    "--for.",
 )
 
 FAMILY = option(
@@ -263,7 +264,7 @@ FAMILY = option(
     "--family",
     type=click.Choice([*FAMILIES], case_sensitive=False),
     default="ecp5",
-    help="FPGA of the estimated cells and, for ecp5, greatest clock: "
+    help="FPGA family of the estimated cells and greatest clock. "
     + ", ".join(f"{name} for {family.title}" for name, family in FAMILIES.items())
     + ". Nothing that is written depends on it.",
 )
@@ -273,6 +274,6 @@ BAUD = option(
     "Files",
     "--baud BITS",
     type=click.IntRange(min=1),
-    help="Bits a second of --bus uart, which the clock must make within 2 %, with at least 8 clocks a bit; "
-    f"{DEFAULT_BAUD}, if it is not given.",
+    help="Bits a second of --bus uart, 1000000 without it. The clock must make them within 2 %, with at "
+    "least 8 clocks a bit.",
 )

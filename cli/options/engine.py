@@ -18,20 +18,20 @@ _OPTIONS = [
         "--engine",
         type=click.Choice(["auto", "pysim", "cxxrtl", "verilator", "cxxrtl-every-clock"], case_sensitive=False),
         default="auto",
-        help="What simulates the hardware: pysim is Amaranth's simulator and runs some 10,000 clocks a second; "
-        "cxxrtl is compiled and runs 10,000,000 and more, but needs a C++ compiler and some seconds for a new core; "
-        "it skips clocks in which only a timer counts, which cxxrtl-every-clock does not; "
-        "verilator is compiled from the exported Verilog; auto is cxxrtl if there is a compiler, else pysim.",
+        help="Simulator of the hardware. pysim is Amaranth's simulator and runs some 10,000 clocks a second. cxxrtl is "
+        "compiled and runs 10,000,000 and more, but needs a C++ compiler and some seconds for a new core; it skips "
+        "clocks in which only a timer counts. cxxrtl-every-clock skips none. verilator is compiled from the exported "
+        "Verilog. auto is cxxrtl if there is a compiler, else pysim.",
     ),
     option(
         _SIMULATION,
         "--pulse INPUT:TIME,TIME…",
         multiple=True,
-        help="Input preset (with --preset), home (with --index-once) or probe_0 (with --probe) rises at these times, "
-        "such as preset:20ms,35ms or home:960clk. It can be given for each input.",
+        help="Times at which an input rises, as preset:20ms,35ms. Inputs are preset (with --preset), home "
+        "(with --index-once) and probe_0 and so on (with --probe). It can be given for each input.",
     ),
-    option(_SIMULATION, "--vcd-from TIME", help="Time at which the waveform of --vcd begins, such as 20us or 960clk."),
-    option(_SIMULATION, "--vcd-to TIME", help="Time at which the waveform of --vcd ends, such as 20us or 960clk."),
+    option(_SIMULATION, "--vcd-from TIME", help="Start of the waveform of --vcd, such as 20us or 960clk."),
+    option(_SIMULATION, "--vcd-to TIME", help="End of the waveform of --vcd, such as 20us or 960clk."),
 ]
 
 

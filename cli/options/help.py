@@ -1,11 +1,11 @@
-"""Help in a line per option: the ten that most need with -h, all with --help; `tachometry help` explains one."""
+"""Help in a sentence per option: the ten that most need with -h, all with --help; `tachometry help` explains one."""
 
 import re
 from collections.abc import Sequence
 
 import click
 
-_WIDTH, _COLUMN = 80, 28
+_WIDTH, _COLUMN = 80, 20
 _MOST = 10
 # What most need, the first first.
 _NEEDED = (
@@ -24,26 +24,12 @@ def needed(options: Sequence[click.Option]) -> list[click.Option]:
 
 
 def line(record: tuple[str, str], width: int = _WIDTH) -> str:
-    """Return a line on an option: its names, the first sentence on it as far as it fits, and its default if short."""
+    """Return an option's names and the first sentence on it, and its default where that fits."""
     names, text = record
-    start = f"  {names}".ljust(_COLUMN - 1) + " "
-    sentence, default = text, ""
-    if " [default: " in text:
-        sentence, _, default = text.rpartition(" [default: ")
-        default = f" [{default.split(']')[0].split(';')[0]}]"
-    room = width - len(start)
-    if len(default) > room // 2:
-        default = ""
-    first = re.split(r"(?<!\beq)\. ", sentence)[0].rstrip(".")
-    first = first if len(first) + len(default) <= room else _cut(first, room - len(default))
-    return (start + first + default)[:width].rstrip()
-
-
-def _cut(text: str, room: int) -> str:
-    """Return as much of a sentence as fits: to a comma or colon beyond its half, else with an ellipsis."""
-    part = text[: max(room, 1)]
-    for mark in (";", ":", ",", " ("):
-        place = part.rfind(mark)
-        if place > room // 2:
-            return part[:place]
-    return part[: max(room - 1, 0)].rsplit(" ", 1)[0].rstrip(",:;") + "…"
+    text, _, default = text.partition(" [default: ")
+    first = re.split(r"(?<!\beq)\. ", text)[0].strip().rstrip(".")
+    start = f"  {names}  ".ljust(_COLUMN)
+    if len(start) + len(first) > width:
+        start = start.rstrip() + "\n" + " " * _COLUMN
+    shown = f" [{default.split(']')[0].split(';')[0]}]" if default else ""
+    return start + first + shown * (len(start.rpartition("\n")[2] + first + shown) <= width)

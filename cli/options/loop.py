@@ -16,8 +16,8 @@ _OPTIONS = [
         _LOOP,
         "--loop",
         is_flag=True,
-        help="Add a disturbance observer and a controller of position and velocity, with commands as inputs and the "
-        "current as output.",
+        help="Add a control loop: disturbance observer and controller. Commands for position and velocity are "
+        "inputs, the current is an output.",
     ),
     *(declared(_LOOP, about) for about in options_of(LoopSpec)),
 ]

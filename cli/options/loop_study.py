@@ -49,16 +49,16 @@ class Loop:
     _group = _CONTROLLER
 
     measured_acceleration: bool = declaration(
-        False, "The observer works at every control tick, with the acceleration that method track measures."
+        False, "Let the observer use the acceleration of method track. It then works at every control tick."
     )
     delay: str | None = declaration(
         None,
-        "From a control tick until its current is commanded, at most a control tick.",
+        "Delay from a control tick to its current. At most a control tick.",
         metavar="TIME",
         shown="none",
     )
     gates: bool = declaration(
-        False, "Run the controller in gates, too: the core that generate --loop makes with these options."
+        False, "Also run the controller in gates. It is the core that generate --loop makes with these options."
     )
     unfiltered: bool = declaration(False, "K_V acts on the velocity before the low-pass filter.")
     feed_forward: bool = declaration(False, "Add the acceleration of the command.")
@@ -70,8 +70,8 @@ class Loop:
     )
     load: str | None = declaration(
         None,
-        "A torque against the shaft for a time, such as 0.2Nm:7s:500ms. RMS and greatest error, and the current, "
-        "are then of the time before it.",
+        "Load torque for a time, such as 0.2Nm:7s:500ms. RMS and greatest error, and the current, are "
+        "those of the time before it.",
         metavar="TORQUE:FROM:TIME",
         group=_MOTOR,
     )

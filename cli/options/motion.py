@@ -42,8 +42,9 @@ def _motion(required: bool) -> Callable[[Any], Any]:
         _MOTION,
         "--motion MOTION",
         required=required,
-        help="How the shaft moves, such as ramp:0:40rad/s:5s; all forms are listed below. With --axes "
-        "several, with commas between: each axis has its own, the last one those that are left, and the next seed.",
+        help="Motion of the shaft, such as ramp:0:40rad/s:5s. All forms are listed below. With --axes several, "
+        "with commas between: each axis has its own and its own seed; the last one is for all further "
+        "axes.",
     )
 
 

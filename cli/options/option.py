@@ -162,9 +162,9 @@ SHORT = click.Option(
 
 
 class GroupedCommand(click.Command):
-    """Lists its options in the help under the headings of their groups, a line each.
+    """Lists its options in the help under the headings of their groups.
 
-    With -h it is the ten that most need. `tachometry help COMMAND` has all sentences.
+    -h lists the ten most common ones; `tachometry help COMMAND` has all sentences.
     """
 
     def __init__(self, *args: Any, **attributes: Any) -> None:
@@ -200,8 +200,8 @@ class GroupedCommand(click.Command):
                 *map(line, records),
                 *(["", "Example:", example.strip("\n")] if example else []),
                 "",
-                f"{ctx.command_path} --help has all options in a line each.",
-                f"{(ctx.parent or ctx).command_path} help {self.name} has all there is to say.",
+                f"{ctx.command_path} --help has all options.",
+                f"{(ctx.parent or ctx).command_path} help {self.name} explains them.",
             ]
         )
 
@@ -217,7 +217,7 @@ class GroupedCommand(click.Command):
         lines = self._head(ctx)
         for heading, records in self._groups(ctx).items():
             lines += [f"{heading}:", *map(line, records)]
-        last = f"{(ctx.parent or ctx).command_path} help {self.name} [--OPTION] has all there is to say."
+        last = f"{(ctx.parent or ctx).command_path} help {self.name} [--OPTION] explains them."
         for block in (self.epilog or "").replace("\b\n", "").split("\n\n"):
             if len(lines) + len(block.splitlines()) + 3 <= _MOST_LINES:
                 lines += ["", *_within(block)]

@@ -15,25 +15,29 @@ _OPTIONS = [
     output(
         "--vcd",
         suffixes=(".vcd",),
-        help="Waveform of pins, ports and inner values, with a GTKWave save file (.gtkw) beside it, which GTKWave "
-        "opens.",
+        help="Waveform of pins, ports and inner values. A GTKWave save file (.gtkw) beside it opens it.",
     ),
     output(
         "--plot",
         suffixes=(".png", ".pdf", ".svg"),
-        help="Figure of velocity, error, pulse numbers and measurement times.",
+        help="Figure of velocity, error, pulse numbers, times.",
     ),
     output(
         "--trace",
-        help="CSV with a row per update: clock, tick, interval (the manifest has its unit), forced, raw velocity, "
-        "velocity in rad/s, or in the unit of --unit; then all other outputs that change with an update.",
+        help="CSV with a row per update. Its columns: clock, tick, interval (the manifest has its unit), "
+        "forced, raw velocity, velocity in rad/s, or in the unit of --unit; then all other outputs that "
+        "change with an update.",
     ),
-    output("--counts", help="CSV with a row per tick: tick, pulse count, position (counts), and what else ticks have."),
-    output("--events", help="CSV with a row per index pulse, illegal transition and external tick that was wrong."),
+    output(
+        "--counts",
+        help="CSV with a row per tick. Its columns: tick, pulse count, position (counts), and all other "
+        "outputs of a tick.",
+    ),
+    output("--events", help="CSV with a row per index, illegal edge and wrong tick."),
     output(
         "--save-capture",
         suffixes=(".sr",),
-        help="Encoder lines as the core samples them, as a sigrok capture, for PulseView or `tachometry replay`.",
+        help="Capture of the lines, as sigrok has it. PulseView and `tachometry replay` read it.",
     ),
 ]
 

@@ -14,8 +14,9 @@ from tachometry.cli.options.sweep_settings import arguments, of_command_line, of
 SCHEDULER = option(
     "Machines",
     "--scheduler ADDRESS",
-    help="Run on the workers of a Dask scheduler, such as tcp://host:8786, with the same version of tachometry. "
-    "Whoever can connect to it can run code there and here, see docs/guides/sweep.md.",
+    help="Run on a Dask scheduler, such as tcp://host:8786. Its workers need the same version of "
+    "tachometry. Everyone who can connect to it can run code there and here, see "
+    "docs/guides/sweep.md.",
 )
 JOBS = option(
     "Machines", "--jobs N", type=int, help="Number of processes on this machine. [default: one for each core]"

@@ -178,7 +178,7 @@ def measured_rows(state: State) -> list[tuple[str, str]]:
     rows.append(("position", f"{shown('position')} counts"))
     if "age" in state.columns:
         rows.append(("age", f"{shown('age')} ticks"))
-    return [*rows, ("stalled", shown("stalled", lambda stalled: "yes" if stalled else "no"))]
+    return [*rows, ("standstill", shown("standstill", lambda rests: "yes" if rests else "no"))]
 
 
 def wrong_rows(state: State) -> list[tuple[str, str]]:
@@ -193,9 +193,9 @@ def wrong_rows(state: State) -> list[tuple[str, str]]:
     for name, texts in (item for extra in state.spec.extras for item in extra.texts.items()):
         code = state.value(name)
         rows.append((name, "-" if code is None else f"{code}: {texts[int(code)]}" if code else "0"))
-    if "swallowed_edges" in state.columns:
-        edges = state.value("swallowed_edges")
-        rows.append(("swallowed edges", "-" if edges is None else str(edges)))
+    if "filtered_edges" in state.columns:
+        edges = state.value("filtered_edges")
+        rows.append(("filtered edges", "-" if edges is None else str(edges)))
     return rows
 
 

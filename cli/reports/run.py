@@ -100,8 +100,8 @@ def _updates(run: Run) -> tuple[str, str]:
 
 
 def _none(axis: Axis) -> str:
-    """Say why there were no pulses of compare."""
-    compare, position = axis.spec.compare, axis.run.ticks.position
+    """Say why there were no pulses of the position compare."""
+    compare, position = axis.spec.position_compare, axis.run.ticks.position
     assert compare is not None
     if compare.depth:
         return ": its list is empty here, and a program fills it"
@@ -126,7 +126,7 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         unit, times = spec.scale.shown_unit, plural(len(jumps), "time")
         rows.append(("note", f"the speed jumps {times}, most by {unit.of(jump):.6g} {unit.name} at {time:.6g} s"))
     if spec.filter_clocks:
-        rows.append(("edges swallowed", f"{run.ticks.swallowed_edges[-1]} (glitch filter)"))
+        rows.append(("edges filtered", f"{run.ticks.filtered_edges[-1]} (glitch filter)"))
     if spec.index:
         last = f", the last at position {run.index.index_position[-1]}" if len(run.index.clock) else ""
         wrong = {WIDE: "wider than a period", MISSED: "passed by without the state of --index-at"}
@@ -144,11 +144,13 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         rows.append(("position", f"{run.ticks.position[-1]} at the end; counts out are without presets"))
     if spec.front_end.modulus is not None:
         rows.append(("position modulo", f"{run.ticks.position_modulo[-1]} of {spec.front_end.modulus} at the end"))
-    if spec.compare is not None:
+    if spec.position_compare is not None:
         pulses = run.tables[COMPARE]
-        one = 1 << getattr(spec, "fine_bits", 0) * spec.compare.fine
-        last = f", the last at position {pulses.compare_position[-1] / one:.15g}" if len(pulses) else _none(axis)
-        rows.append(("compare", f"{plural(len(pulses), 'pulse')}{last}"))
+        one = 1 << getattr(spec, "position_fine_bits", 0) * spec.position_compare.fine
+        last = (
+            f", the last at position {pulses.position_compare_position[-1] / one:.15g}" if len(pulses) else _none(axis)
+        )
+        rows.append(("position compare", f"{plural(len(pulses), 'pulse')}{last}"))
     rows += filter(None, (extra.row(spec, run) for extra in spec.extras))
     if spec.external_tick:
         rows.append(("tick errors", f"{len(run.tick_errors)} (external tick too early or missing)"))
@@ -204,7 +206,7 @@ def _verdict(simulation: Simulation, warned: bool) -> Text:
         return Text(f"FAIL: hardware and golden model differ in {n_mismatches} values", style="bold red")
     captured = any(axis.truth is None for axis in simulation.axes)
     n_values = sum(len(table) * (1 + len(table.columns)) for table in run.tables.values())
-    of = f" ({plural(n_values, 'value')}), which says nothing of wiring and --ppr" if captured else ""
+    of = f" ({plural(n_values, 'value')}); wiring and --ppr are not checked" if captured else ""
     only = "; neither was compared with the shaft: see the warning" if warned else ""
     verdict, style = ("INTERRUPTED", "bold yellow") if simulation.interrupted else ("PASS", "bold green")
     if not any(len(axis.recording.time) > 1 for axis in simulation.axes):

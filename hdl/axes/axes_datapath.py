@@ -77,7 +77,7 @@ class AxesDatapath(wiring.Component):
                 "pulse_count": Out(signed(axis.widths.count)),
                 "position": Out(signed(axis.position_width)),
                 "overflow": Out(1),
-                "stalled": Out(1),
+                "standstill": Out(1),
                 "velocity_valid": Out(1),  # only together with `tick`: all below are new
                 "velocity": Out(signed(axis.velocity.width)),
                 "interval": Out(axis.widths.interval),
@@ -147,7 +147,7 @@ class AxesDatapath(wiring.Component):
         forced = Signal()
         m.d.sync += updates.eq(turn.decides & window.update)
         with m.If(turn.decides):
-            m.d.sync += [self.stalled.eq(window.next.rests), forced.eq(window.forced)]
+            m.d.sync += [self.standstill.eq(window.next.rests), forced.eq(window.forced)]
         m.d.comb += [
             window.clears.eq(self.turns.clears),
             window.state.eq(turn.before.window),

@@ -151,18 +151,18 @@ class AxesTrackDatapath(wiring.Component):
         ticks = Signal(tick_layout(axis))
         new = Signal(update_layout(axis))
         m.d.sync += valid.eq(now)
-        rounded = (after.position << axis.fine_bits) + (found.place >> 1) + found.place[0]
+        rounded = (after.position << axis.position_fine_bits) + (found.place >> 1) + found.place[0]
         with m.If(now):
             m.d.sync += [
                 whose.eq(of_axis),
                 ticks.position.eq(after.position),
                 ticks.pulse_count.eq(counts[0]),
                 ticks.overflow.eq(counts[1]),
-                *(new[name].eq(found[name]) for name in ("velocity", "acceleration", "quality")),
+                *(new[name].eq(found[name]) for name in ("velocity", "acceleration", "velocity_std")),
                 new.position_fine.eq(rounded),
                 new.interval.eq(after.elapsed),
                 new.forced.eq(~after.counted),
-                new.stalled.eq(found.stalled & ~after.counted),
+                new.standstill.eq(found.standstill & ~after.counted),
             ]
         return valid, whose, ticks, new
 

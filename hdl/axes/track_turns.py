@@ -16,7 +16,7 @@ from tachometry.spec.methods.track_axis import TrackAxis
 SHOWN_AFTER = 4  # clocks
 
 
-_FOUND = ("velocity", "acceleration", "quality", "stalled")
+_FOUND = ("velocity", "acceleration", "velocity_std", "standstill")
 
 
 def turn_layout(axis: TrackAxis) -> data.StructLayout:
@@ -32,7 +32,7 @@ def turn_layout(axis: TrackAxis) -> data.StructLayout:
             "counted": 1,
             **({"position": signed(axis.position_width)} if axis.front_end.index_resets else {}),
             **{name: layout[name] for name in _FOUND},
-            "place": signed(WIDTH - PLACE_BITS + axis.fine_bits + 1),
+            "place": signed(WIDTH - PLACE_BITS + axis.position_fine_bits + 1),
         }
     )
 
@@ -97,7 +97,7 @@ class TrackTurns(wiring.Component):
             self.turn.moved.eq(counts.moved),
             self.turn.counted.eq(counts.number.any()),
             *(self.turn[name].eq(port) for name, port in by_name(machine, _FOUND).items()),
-            self.turn.place.eq(machine.position_fine >> (PLACE_BITS - axis.fine_bits - 1)),
+            self.turn.place.eq(machine.position_fine >> (PLACE_BITS - axis.position_fine_bits - 1)),
         ]
         if position is not None:
             m.d.comb += self.turn.position.eq(position)

@@ -27,16 +27,16 @@ class Interrupts(wiring.Component):
                 **{event: In(1) for event in self._events if event != "stall"},
                 **{f"irq_{kind}_{event}": flow for kind, flow in _KINDS.items() for event in self._events},
                 "ticks": In(axes),
-                "stalled": In(axes),  # the shaft of the axis stands still
+                "standstill": In(axes),  # the shaft of the axis stands still
                 "irq": Out(1),  # an enabled event waits, a clock later
             }
         )
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        rested = Signal.like(self.stalled)  # at the latest tick of each axis
-        m.d.sync += rested.eq((self.stalled & self.ticks) | (rested & ~self.ticks))
-        stall = (self.stalled & self.ticks & ~rested).any()
+        rested = Signal.like(self.standstill)  # at the latest tick of each axis
+        m.d.sync += rested.eq((self.standstill & self.ticks) | (rested & ~self.ticks))
+        stall = (self.standstill & self.ticks & ~rested).any()
         raised: list[Value] = []
         comes = {"stall": stall} | by_name(self, (event for event in self._events if event != "stall"))
         enable, clear, pending = (by_name(self, self._events, f"irq_{kind}_{{}}") for kind in _KINDS)

@@ -6,18 +6,18 @@ from amaranth.lib.wiring import In, Out
 
 
 class SigmaDelta(wiring.Component):
-    """First-order sigma-delta modulator: `drive` is high in (value + 2^(width − 1)) of 2^width clocks.
+    """First-order sigma-delta modulator: `current_pdm` is high in (value + 2^(width − 1)) of 2^width clocks.
 
     A pulse-width modulator would have a period that delays what it shows; this has none, its ripple is at higher
     frequencies, and it is one adder. Latency: a clock.
     """
 
     def __init__(self, width: int) -> None:
-        super().__init__({"value": In(signed(width)), "drive": Out(1)})
+        super().__init__({"value": In(signed(width)), "current_pdm": Out(1)})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         left = Signal(len(self.value))
         # The inverted sign adds 2^(width − 1).
-        m.d.sync += Cat(left, self.drive).eq(left + Cat(self.value[:-1], ~self.value[-1]))
+        m.d.sync += Cat(left, self.current_pdm).eq(left + Cat(self.value[:-1], ~self.value[-1]))
         return m

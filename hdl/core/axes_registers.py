@@ -49,7 +49,7 @@ class AxesRegisterCore(wiring.Component):
             connect(m, box, bank, core)
             m.d.comb += [
                 box.ticks.eq(Cat(core.tick & (core.axis == axis) for axis in axes)),
-                box.stalled.eq(Cat(by_name(core, axes, "stalled_{}").values())),
+                box.standstill.eq(Cat(by_name(core, axes, "standstill_{}").values())),
                 self.irq.eq(box.irq),
             ]
         return m

@@ -97,7 +97,7 @@ class Demo(wiring.Component):
         if self.core.loop is not None:
             enable = Signal()
             m.submodules.sync_enable = Synchronizer(self.enable, enable)
-            m.d.comb += [self.core.enable.eq(enable), self.drive.eq(self.core.drive)]
+            m.d.comb += [self.core.enable.eq(enable), self.current_pdm.eq(self.core.current_pdm)]
 
     def _native(self, m: Module, sends: Signal) -> None:
         """Put the bridge and the telemetry on one native port: one of them begins when the other has ended."""
@@ -131,4 +131,4 @@ class Demo(wiring.Component):
         with m.If(core.velocity_valid):
             m.d.sync += backward.eq(core.velocity < 0)
         m.d.sync += runs.eq(runs + 1)
-        m.d.sync += self.leds.eq(Cat(~core.stalled, backward, wrong, runs[-1]))
+        m.d.sync += self.leds.eq(Cat(~core.standstill, backward, wrong, runs[-1]))

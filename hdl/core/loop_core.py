@@ -42,7 +42,7 @@ class LoopCore(wiring.Component):
     def idle(self) -> tuple[Idle, ...]:
         """Registers that a simulation may move on."""
         boxes = {"tachometer": self.tachometer, "control_clock": self.control_clock, "controller": self.controller}
-        return (IdleSum("sigma_delta.left"), IdleEcho("sigma_delta.drive"), *idle_of(boxes))
+        return (IdleSum("sigma_delta.left"), IdleEcho("sigma_delta.current_pdm"), *idle_of(boxes))
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
@@ -111,5 +111,5 @@ class LoopCore(wiring.Component):
             self.filtered_velocity.eq(controller.y),
             self.disturbance.eq(controller.w),
             sigma_delta.value.eq(controller.current),
-            self.drive.eq(sigma_delta.drive),
+            self.current_pdm.eq(sigma_delta.current_pdm),
         ]

@@ -77,8 +77,8 @@ class RegisterCore(wiring.Component):
         if self._map.irq:
             box = Interrupts(self._map)
             connect(m, box, bank, whole)
-            ticks = getattr(whole, spec.facts.stalls_with)
-            m.d.comb += [box.ticks.eq(ticks), box.stalled.eq(whole.stalled), self.irq.eq(box.irq)]
+            ticks = getattr(whole, spec.facts.rests_with)
+            m.d.comb += [box.ticks.eq(ticks), box.standstill.eq(whole.standstill), self.irq.eq(box.irq)]
             for extra in spec.extras:
                 for name, event in extra.events(spec).items():
                     gates = core if event.wires[0] in core.signature.members else core.extras[extra.name]

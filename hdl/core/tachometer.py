@@ -47,7 +47,7 @@ class Tachometer(wiring.Component):
     Members
     -------
     The ports of the spec, less `clk` and `rst`, which are those of the `sync` domain: the lines in; `velocity`,
-    `velocity_valid`, `interval`, `forced`, `tick`, `pulse_count`, `position`, `decode_error`, `overflow`, `stalled`
+    `velocity_valid`, `interval`, `forced`, `tick`, `pulse_count`, `position`, `decode_error`, `overflow`, `standstill`
     out; and those of its options.
     """
 
@@ -85,9 +85,9 @@ class Tachometer(wiring.Component):
         self.low_pass = (
             None if spec.lowpass is None else LowPass(spec.velocity.low_pass, layout, clears=spec.facts.last_at_rest)
         )
-        self.standstill: Standstill | None = None
-        if not isinstance(self.datapath, OwnStandstill) and spec.facts.stalls_with == TICK:
-            self.standstill = Standstill(spec.timing.max_ticks, spec.widths.count, max_shift=spec.times.max_tick_shift)
+        self.rest: Standstill | None = None
+        if not isinstance(self.datapath, OwnStandstill) and spec.facts.rests_with == TICK:
+            self.rest = Standstill(spec.timing.max_ticks, spec.widths.count, max_shift=spec.times.max_tick_shift)
         self.update_age = UpdateAge(spec.timing.max_ticks, spec.widths.stamp) if spec.age else None
         self.velocity_output: SerialVelocityOutput | PipelinedVelocityOutput | None = None
         if spec.velocity.output is not None:
@@ -95,14 +95,14 @@ class Tachometer(wiring.Component):
             self.velocity_output = box(spec.velocity.output, layout)
 
         self.compare_output: CompareOutput | None = None
-        if spec.compare is not None:
-            clocks = spec.compare.clocks(spec.timing.clock_hz)
-            if isinstance(spec, TrackTachometer) and spec.compare.fine:
+        if spec.position_compare is not None:
+            clocks = spec.position_compare.clocks(spec.timing.clock_hz)
+            if isinstance(spec, TrackTachometer) and spec.position_compare.fine:
                 given = spec.carrying, spec.velocity.native
-                self.compare_output = FineCompareOutput(spec.compare, clocks, spec.position_width, *given)
+                self.compare_output = FineCompareOutput(spec.position_compare, clocks, spec.position_width, *given)
             else:
-                aims = spec.compare.both and spec.front_end.moves_position
-                self.compare_output = CompareOutput(spec.compare, clocks, spec.position_width, aims=aims)
+                aims = spec.position_compare.both and spec.front_end.moves_position
+                self.compare_output = CompareOutput(spec.position_compare, clocks, spec.position_width, aims=aims)
         self.extras = {extra.name: gates_of(extra, spec) for extra in spec.extras}
 
     @property
@@ -149,7 +149,7 @@ class Tachometer(wiring.Component):
             with m.If(self.pulse_counter.coming):
                 m.d.sync += self.synced.eq(self.decoder.synced)
         if self._spec.filter_clocks:
-            m.d.comb += self.swallowed_edges.eq(self.conditioner.swallowed_edges)
+            m.d.comb += self.filtered_edges.eq(self.conditioner.filtered_edges)
         return m
 
     def _count(self, m: Module, step: Signal) -> None:
@@ -193,18 +193,18 @@ class Tachometer(wiring.Component):
             m.d.comb += self.pulse_counter.beyond.eq(datapath.beyond)
 
     def _rest(self, m: Module) -> None:
-        """Drive `stalled`."""
+        """Drive `standstill`."""
         if isinstance(self.datapath, OwnStandstill):
-            m.d.comb += self.stalled.eq(self.datapath.stalled)
-        if self.standstill is not None:
-            m.submodules.standstill = standstill = self.standstill
+            m.d.comb += self.standstill.eq(self.datapath.standstill)
+        if self.rest is not None:
+            m.submodules.rest = rest = self.rest
             m.d.comb += [
-                standstill.tick.eq(self.tick),
-                standstill.m_e.eq(self.pulse_count),
-                self.stalled.eq(standstill.stalled),
+                rest.tick.eq(self.tick),
+                rest.m_e.eq(self.pulse_count),
+                self.standstill.eq(rest.standstill),
             ]
             if isinstance(self.datapath, LongTicks):
-                m.d.comb += standstill.shift.eq(self.datapath.tick_shift)
+                m.d.comb += rest.shift.eq(self.datapath.tick_shift)
 
     def _output(self, m: Module) -> stream.Interface:
         """Lead updates from the datapath to the ports, through low-pass filter and unit if they are there."""
@@ -340,7 +340,12 @@ class Tachometer(wiring.Component):
         else:
             (step,) = delay(m, self.decoder.step, clocks=self._spec.latency.tick)
             m.d.comb += [box.step.eq(step), box.position.eq(self.position)]
-        follow(m, self, box, ("compare", "compare_valid", "compare_position", "compare_count"))
-        if "compare_waiting" in box.signature.members:
+        follow(
+            m,
+            self,
+            box,
+            ("position_compare", "position_compare_valid", "position_compare_position", "position_compare_count"),
+        )
+        if "position_compare_waiting" in box.signature.members:
             follow(m, box, self, LIST_PINS)
-            follow(m, self, box, ("compare_waiting",))
+            follow(m, self, box, ("position_compare_waiting",))

@@ -38,8 +38,8 @@ class InputConditioner(wiring.Component):
                 **{f"{name}_n": In(1) for name in complemented},
                 # The line and its complement are real and equal, filtered neither, two clocks after the pins.
                 **{f"equal_{name}": Out(1) for name in complemented},
-                "clear": In(1),  # `swallowed_edges` is 0 in the next clock
-                "swallowed_edges": Out(16),  # edges that the filter has kept out, two for each glitch; stays at 65534
+                "clear": In(1),  # `filtered_edges` is 0 in the next clock
+                "filtered_edges": Out(16),  # edges that the filter has kept out, two for each glitch; stays at 65534
             }
         )
         self._filters = {name: GlitchFilter(filter_clocks) for name in lines if filter_clocks}
@@ -78,7 +78,7 @@ class InputConditioner(wiring.Component):
         if self._filter_clocks:
             glitches = Signal(15)
             sum_ = Signal(16)
-            m.d.comb += [sum_.eq(glitches + sum(swallowed)), self.swallowed_edges.eq(Cat(0, glitches))]
+            m.d.comb += [sum_.eq(glitches + sum(swallowed)), self.filtered_edges.eq(Cat(0, glitches))]
             m.d.sync += glitches.eq(sum_)
             with m.If(sum_[-1]):
                 m.d.sync += glitches.eq(0x7FFF)

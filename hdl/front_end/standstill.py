@@ -28,7 +28,7 @@ class Standstill(wiring.Component):
                 "tick": In(1),
                 "m_e": In(signed(count_width)),  # valid with `tick`
                 **only_if(max_shift, shift=In(range(max_shift + 1))),  # with `tick`: it is 2^shift nominal ones
-                "stalled": Out(1),  # from `tick` on, until the next
+                "standstill": Out(1),  # from `tick` on, until the next
             }
         )
 
@@ -55,6 +55,6 @@ class Standstill(wiring.Component):
             none = silent & was_silent & (shown | ticks.last)
             with m.If(self.tick):
                 m.d.sync += was_silent.eq(silent)
-        m.d.comb += self.stalled.eq(Mux(self.tick, none, shown))
-        m.d.sync += shown.eq(self.stalled)
+        m.d.comb += self.standstill.eq(Mux(self.tick, none, shown))
+        m.d.sync += shown.eq(self.standstill)
         return m

@@ -51,7 +51,7 @@ class LongTicks(Datapath, Protocol):
 class OwnStandstill(Datapath, Protocol):
     """A datapath that knows itself what `Standstill` reports of others."""
 
-    stalled: Signal
+    standstill: Signal
 
 
 def datapath_members(spec: TachometerSpec) -> dict[str, Member]:

@@ -52,7 +52,7 @@ class IntervalAccumulator(wiring.Component):
                 "closes": Out(1),  # the window closes
                 "forced": Out(1),  # it closes without an alteration
                 "update": Out(1),  # the window closes in this tick
-                "stalled": Out(1),  # from `tick` on: nothing was counted in more than `max_ticks` ticks in a row
+                "standstill": Out(1),  # from `tick` on: nothing was counted in more than `max_ticks` ticks in a row
             }
         )
 
@@ -93,11 +93,11 @@ class IntervalAccumulator(wiring.Component):
         was_silent = Signal(init=1)  # m_e(i−1) is 0
         rests = Signal()
         nearly = Signal()  # the last tick ended a longest window, in which only the opening tick had a count
-        m.d.comb += self.stalled.eq(
+        m.d.comb += self.standstill.eq(
             # A longest window without an alteration goes on as it began, but for its opening tick; and a silence begins
             # in the tick that opens a window, or in the one after it.
             Mux(self.tick, silent & (rests | nearly | (longest & was_silent)), rests)
         )
-        m.d.sync += [was_silent.eq(silent), rests.eq(self.stalled)]
+        m.d.sync += [was_silent.eq(silent), rests.eq(self.standstill)]
         with m.If(self.tick):
             m.d.sync += nearly.eq(self.forced & silent)

@@ -27,7 +27,7 @@ class SMethod(wiring.Component):
                 **datapath_members(spec),
                 "coming": In(1),  # `tick` is high in the next clock
                 "next_count": In(signed(spec.widths.count)),  # what `pulse_count` is then; valid with `coming`
-                "stalled": Out(1),  # of the tick, see `IntervalAccumulator`
+                "standstill": Out(1),  # of the tick, see `IntervalAccumulator`
             }
         )
         self._spec = spec
@@ -91,7 +91,7 @@ class SMethod(wiring.Component):
             quotient.base.eq(self.pulse_count),
             quotient.numerator.eq(interval.numerator << self._spec.form.finer),
             quotient.tag.forced.eq(interval.forced),
-            self.stalled.eq(interval.stalled),
+            self.standstill.eq(interval.standstill),
             self.updates.valid.eq(found.valid),
             new.interval.eq(found.p.m),
             *(new[name].eq(found.p[name]) for name in found.p.shape().members if name != "m"),

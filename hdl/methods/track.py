@@ -65,18 +65,20 @@ class TrackMethod(wiring.Component):
         names = ("number", "times", "places", "last", "moved", "length", "kind", "end", "down")
         follow(m, machine, counts, names)
         new = self.updates.p
-        shift = PLACE_BITS - spec.fine_bits
+        shift = PLACE_BITS - spec.position_fine_bits
         m.d.sync += self.updates.valid.eq(ready)
         with m.If(ready):
             m.d.sync += [
                 new.velocity.eq(machine.velocity),
                 new.acceleration.eq(machine.acceleration),
-                new.quality.eq(machine.quality),
+                new.velocity_std.eq(machine.velocity_std),
                 new.position_fine.eq(
-                    (position << spec.fine_bits) + (machine.position_fine >> shift) + machine.position_fine[shift - 1]
+                    (position << spec.position_fine_bits)
+                    + (machine.position_fine >> shift)
+                    + machine.position_fine[shift - 1]
                 ),
                 new.interval.eq(counts.elapsed),
                 new.forced.eq(~counts.number.any()),
-                new.stalled.eq(machine.stalled & ~counts.number.any()),
+                new.standstill.eq(machine.standstill & ~counts.number.any()),
             ]
         return m

@@ -122,7 +122,7 @@ class TrackMachine(wiring.Component):
                 "end": In(2),  # kind of the position at the end
                 "down": In(1),  # the last count went backward
                 **dict.fromkeys(OUTPUTS[1:], Out(signed(WIDTH))),
-                "stalled": Out(1),  # of a tick without a count
+                "standstill": Out(1),  # of a tick without a count
             }
         )
         self._store_program()
@@ -321,7 +321,7 @@ class TrackMachine(wiring.Component):
         domain += shows.eq(Mux(self.go, self.now.output, 0))
         for name, port in by_name(self, filter(None, OUTPUTS)).items():
             with m.If(shows == OUTPUTS.index(name)):
-                m.d.sync += port.eq(~self.made[-1] if name == "stalled" else self.made)
+                m.d.sync += port.eq(~self.made[-1] if name == "standstill" else self.made)
 
     def _begin(self, m: Module) -> None:
         """Begin an operation of the unit, or wait for it."""

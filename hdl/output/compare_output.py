@@ -47,18 +47,18 @@ class CompareOutput(wiring.Component):
         The step that is in `position` for the first clock.
     moves : In(1)
         The position of the next clock is set. Only with `aims`.
-    compare : Out(1)
+    position_compare : Out(1)
         The pulse.
-    compare_valid : Out(1)
+    position_compare_valid : Out(1)
         The first clock of a pulse.
-    compare_position : Out(signed(width))
+    position_compare_position : Out(signed(width))
         The position of the latest pulse.
-    compare_count : Out(COUNT_WIDTH)
+    position_compare_count : Out(COUNT_WIDTH)
         Number of pulses, which wraps.
-    compare_next : In(signed(width))
-    compare_append, compare_clear : In(1)
+    position_compare_next : In(signed(width))
+    position_compare_append, position_compare_clear : In(1)
         Append it to the list, two clocks later at the earliest it is awaited; empty the list. Only with a list.
-    compare_waiting : Out
+    position_compare_waiting : Out
         Positions in the list, with the one that is awaited.
     """
 
@@ -67,15 +67,15 @@ class CompareOutput(wiring.Component):
         self._clocks = clocks
         position = signed(width)
         pins = dict(zip(LIST_PINS, (In(position), In(1), In(1)), strict=True))
-        of_list = {**pins, "compare_waiting": Out(range(compare.depth + 1))} if compare.depth else {}
+        of_list = {**pins, "position_compare_waiting": Out(range(compare.depth + 1))} if compare.depth else {}
         counted = {"position": In(position), "step": In(signed(2)), **({"moves": In(1)} if aims else {})}
         super().__init__(
             {
                 **(counted if taken is None else taken),
-                "compare": Out(1),
-                "compare_valid": Out(1),
-                "compare_position": Out(position),
-                "compare_count": Out(COUNT_WIDTH),
+                "position_compare": Out(1),
+                "position_compare_valid": Out(1),
+                "position_compare_position": Out(position),
+                "position_compare_count": Out(COUNT_WIDTH),
                 **of_list,
             }
         )
@@ -91,16 +91,16 @@ class CompareOutput(wiring.Component):
         awaited, there, moves = self._awaited(m, reached)
         left = Signal(range(self._clocks + 1))
         m.d.comb += reached.eq(there)
-        m.d.comb += self.compare.eq(left.any())
-        m.d.sync += self.compare_valid.eq(reached)
+        m.d.comb += self.position_compare.eq(left.any())
+        m.d.sync += self.position_compare_valid.eq(reached)
         with m.If(left.any()):
             m.d.sync += left.eq(left - 1)
         with m.If(reached):
             m.d.sync += [
                 left.eq(self._clocks),
                 *moves,
-                self.compare_position.eq(awaited),
-                self.compare_count.eq(self.compare_count + 1),
+                self.position_compare_position.eq(awaited),
+                self.position_compare_count.eq(self.position_compare_count + 1),
             ]
         return m
 
@@ -123,7 +123,7 @@ class CompareOutput(wiring.Component):
         width = len(self.position) + (aims and compare.count > 0)
         awaited = Signal(signed(width), init=compare.ahead(width))
         if compare.direction != BOTH:
-            there = self._at(awaited) & (self.compare_count != compare.count if compare.count else 1)
+            there = self._at(awaited) & (self.position_compare_count != compare.count if compare.count else 1)
             return awaited, there, [awaited.eq(awaited + compare.apart)]
         here = Signal.like(awaited)  # the next one forward, or the one before it backward
         m.d.comb += here.eq(Mux(back, awaited - compare.step, awaited))
@@ -149,12 +149,12 @@ class CompareOutput(wiring.Component):
     def _listed(self, m: Module, reached: Signal) -> Awaited:
         """Return what is awaited of a list."""
         fifo = SyncFIFOBuffered(width=len(self.position), depth=self._compare.depth)
-        m.submodules.fifo = ResetInserter(self.compare_clear)(fifo)
+        m.submodules.fifo = ResetInserter(self.position_compare_clear)(fifo)
         m.d.comb += [
-            fifo.w_data.eq(self.compare_next),
-            fifo.w_en.eq(self.compare_append),
+            fifo.w_data.eq(self.position_compare_next),
+            fifo.w_en.eq(self.position_compare_append),
             fifo.r_en.eq(reached),
-            self.compare_waiting.eq(fifo.level),
+            self.position_compare_waiting.eq(fifo.level),
         ]
         awaited = fifo.r_data.as_signed()
         return awaited, fifo.r_rdy & self._at(awaited), []

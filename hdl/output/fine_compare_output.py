@@ -34,7 +34,7 @@ class FineCompareOutput(CompareOutput):
 
     def __init__(self, compare: Compare, clocks: int, width: int, carrying: Carrying, native_width: int) -> None:
         self._carrying = carrying
-        fine = width + carrying.fine_bits
+        fine = width + carrying.position_fine_bits
         velocity, place = In(signed(native_width)), In(signed(fine))
         taken = {"valid": In(1), "velocity": velocity, "position_fine": place, "tick": In(1), "moves": In(1)}
         super().__init__(compare, clocks, fine, taken)
@@ -70,7 +70,7 @@ class FineCompareOutput(CompareOutput):
             m.d.sync += of_tick.eq(moved)
         with m.If(self.valid):
             m.d.sync += of_update.eq(of_tick)
-        awaited = Signal.like(self.position_fine, init=compare.in_lsb(compare.start, carrying.fine_bits))
+        awaited = Signal.like(self.position_fine, init=compare.in_lsb(compare.start, carrying.position_fine_bits))
         beyond = Signal.like(awaited)
         m.d.comb += beyond.eq((place >> carrying.more_bits) - awaited)
         ahead = beyond[-1] ^ (compare.direction == BACKWARD)
@@ -78,5 +78,5 @@ class FineCompareOutput(CompareOutput):
         m.d.sync += armed.eq((armed | ahead) & ~(loads & of_update))
         with m.If(loads):
             m.d.sync += speed.eq(new)
-        there = armed & ~ahead & (self.compare_count != compare.count if compare.count else 1)
-        return awaited, there, [awaited.eq(awaited + compare.in_lsb(compare.apart, carrying.fine_bits))]
+        there = armed & ~ahead & (self.position_compare_count != compare.count if compare.count else 1)
+        return awaited, there, [awaited.eq(awaited + compare.in_lsb(compare.apart, carrying.position_fine_bits))]

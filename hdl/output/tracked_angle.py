@@ -23,7 +23,7 @@ class TrackedAngle(wiring.Component):
 
     def __init__(self, carried: Carried, velocity_width: int, acceleration_width: int) -> None:
         self._carried = carried
-        bits, place = carried.angles.bits, carried.tracked.fine_bits + PLACE_BITS
+        bits, place = carried.angles.bits, carried.tracked.position_fine_bits + PLACE_BITS
         self._curve = Signal(signed(max(acceleration_width + carried.acceleration.shift, 2)))
         factors = (
             (place, carried.fine),

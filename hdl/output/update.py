@@ -19,8 +19,8 @@ def update_layout(spec: TachometerSpec) -> data.StructLayout:
     the low-pass filter: no update will follow before the next count.
     """
     fields = {"velocity": signed(spec.velocity.native), "interval": spec.widths.interval, "forced": 1}
-    if spec.facts.stalls_with == UPDATE:
-        fields["stalled"] = 1
+    if spec.facts.rests_with == UPDATE:
+        fields["standstill"] = 1
     if spec.widths.stamp:
         fields["stamp"] = spec.widths.stamp
     if spec.facts.last_at_rest and spec.lowpass is not None:

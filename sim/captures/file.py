@@ -139,7 +139,7 @@ def choose_channels(
             near = difflib.get_close_matches(str(channel), texts, 3, 0.5) if len(texts) > _LISTED else []
             close = f"; near it are {', '.join(near)}" if near else ""
             if line.endswith("_n"):
-                raise CaptureError(f"{path} must have a channel {line} with --complements, not only {listed}{close}")
+                raise CaptureError(f"{path} must have a channel {line} with --differential, not only {listed}{close}")
             raise CaptureError(f"channel {line} of {path} must be one of {listed}, not {channel!r}{close}")
         lines[line] = place
     for one, other in itertools.combinations(lines, 2):

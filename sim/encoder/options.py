@@ -85,80 +85,79 @@ class EncoderOptions:
 
     vibration: Vibration | None = option(  # noqa: RUF009
         None,
-        "Sinusoidal vibration of the shaft, such as 1mrad:50Hz (rad, mrad or deg; Hz, kHz, MHz or GHz). It is part of "
-        "the true motion.",
+        "Sinusoidal vibration of the shaft, such as 1mrad:50Hz. In rad, mrad or deg; Hz, kHz, MHz or GHz. "
+        "It is part of the true motion.",
         metavar="AMPL:FREQ",
         group="Motion",
         parse=_vibration,
     )
     jitter: float = _fault(
-        "Gaussian jitter of each edge in time: its standard deviation over the gap to the nearer neighbour, such as "
-        "0.05 or 5%, below 0.5.",
+        "Gaussian jitter of the edges in time, such as 0.05 or 5%. Its standard deviation over the gap to "
+        "the nearer neighbour, below 0.5.",
         "FRACTION",
         number_reader(FRACTION),
     )
     nonuniformity: float = _fault(
-        "Edges of the disc are displaced by up to this many edge pitches, below 0.5, the same in every turn.",
+        "Uneven disc: edges are off by up to FRACTION of a pitch. Below 0.5, the same in every turn.",
         "FRACTION",
         number_reader(FRACTION),
     )
     eccentricity: float = _fault(
-        "The disc sits off centre: its edges are displaced by up to this many edge pitches, as a sine over a turn.",
+        "Disc off centre: edges are off by up to FRACTION of a pitch. The displacement is a sine over a turn.",
         "FRACTION",
         number_reader(FRACTION),
     )
     phase_error_deg: float = _fault(
-        "B's pulse comes this many electrical degrees later than 90 after A's, such as 5 or 5deg; between -90 and 90.",
+        "Phase error of B in electrical degrees, such as 5 or 5deg. B comes so many degrees later than 90 "
+        "after A; between -90 and 90.",
         "DEGREES",
         number_reader(DEGREES, "deg"),
         name="phase-error",
     )
     duty_error_deg: float = _fault(
-        "Pulses of A and B are this many electrical degrees wider than 180, such as 5 or 5deg; between -90 and 90.",
+        "Duty error in electrical degrees, such as 5 or 5deg. Pulses of A and B are as many degrees wider "
+        "than 180; between -90 and 90.",
         "DEGREES",
         number_reader(DEGREES, "deg"),
         name="duty-error",
     )
     bounce: Bounce | None = option(  # noqa: RUF009
         None,
-        "Contact bounce, such as 3:500us (s, ms, us or ns): after an edge the line falls back COUNT times within TIME, "
-        "or within half the way to the next edge.",
+        "Contact bounce, such as 3:500us. After an edge the line falls back COUNT times within TIME (s, "
+        "ms, us or ns), or within half the way to the next edge.",
         metavar="COUNT:TIME",
         parse=_bounce,
     )
     lost: float = _fault(
-        "Probability that a line misses a pulse: it stays low, and two edges are lost.",
+        "Probability that a line misses a pulse, so two edges.",
         "PROBABILITY",
         number_reader(FRACTION),
     )
     illegal: float = _fault(
-        "Probability that an edge comes together with the next one: both lines change at once.",
+        "Probability that an edge comes together with the next. Both lines change at once then.",
         "PROBABILITY",
         number_reader(FRACTION),
     )
     broken: LineFault | None = option(  # noqa: RUF009
         None,
-        "A broken wire, such as b:200ms: from then on line a, b, z, c of halls, or a complement as a_n is high, as an "
-        "open input is.",
+        "A broken wire, such as b:200ms: high from then on. Line a, b, z, c of halls, or a complement as a_n.",
         metavar="LINE:TIME",
         parse=_line_fault,
     )
     stuck: LineFault | None = option(  # noqa: RUF009
         None,
-        "A shorted wire, such as a:200ms: from then on line a, b, z, c of halls, or a complement as a_n stays as it "
-        "is.",
+        "A shorted wire, such as a:200ms: constant from then on. Line a, b, z, c of halls, or a complement as a_n.",
         metavar="LINE:TIME",
         parse=_line_fault,
     )
     index_width: int = option(
         1,
-        "Quarter periods for which the index is high, 1 to 16. A wider one than 1 is not gated by A and B.",
+        "Quarter periods of the index mark, 1 to 16. A mark wider than 1 is not gated by A and B.",
         metavar="N",
     )
     index_skew_s: float = option(
         None,
-        "The index comes so much later than A and B, or earlier, as 3us or -3us (s, ms, us or ns); then it is not "
-        "gated.",
+        "Delay of the index after A and B, such as 3us or -3us. In s, ms, us or ns; the index is then not gated.",
         text="0s",
         name="index-skew",
         metavar="TIME",

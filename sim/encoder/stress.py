@@ -59,7 +59,7 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     a, b, c = (level >> np.uint8(line) & np.uint8(1) for line in range(3))
     trace = _probed(spec, PinTrace(clock, a, b, n_clocks, z, c=c if "c" in sensor.lines else None), seed)
     trace = _open(spec, trace, seed)
-    if spec.compare is not None and spec.compare.depth:
+    if spec.position_compare is not None and spec.position_compare.depth:
         trace = _listed(spec, trace, np.interp(np.arange(edge[-1]), edge, counts), seed)
     for name in spec.front_end.controls:
         few = 30 if name == "preset" else 6
@@ -112,10 +112,10 @@ def _listed(spec: TachometerSpec, trace: PinTrace, went: NDArray[np.float64], se
     clock = merged(trace.clock, acts, acts + 1)
     lines: dict[str, NDArray[Any]] = {**trace.at(clock)}
     place = went.take(clock, mode="clip").astype(np.int64) + rng.integers(-3, 4, len(clock))
-    lines["compare_next"] = place & (1 << spec.position_width) - 1
+    lines["position_compare_next"] = place & (1 << spec.position_width) - 1
     for name, often in (("append", 0.6), ("clear", 0.1)):
         act = np.isin(clock, acts) & (rng.random(len(clock)) < often)
-        lines[f"compare_{name}"] = act.astype(np.uint8)
+        lines[f"position_compare_{name}"] = act.astype(np.uint8)
     return PinTrace.of_lines(clock, trace.n_clocks, lines)
 
 

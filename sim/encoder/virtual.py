@@ -158,7 +158,9 @@ class VirtualEncoder(EncoderOptions):
             if fault is None or fault.line in (*lines, "z", *(f"{line}_n" for line in self.complemented)):
                 continue
             if fault.line.endswith("_n"):
-                made = "--complements and --index, which make" if fault.line == "z_n" else "--complements, which makes"
+                made = (
+                    "--differential and --index, which make" if fault.line == "z_n" else "--differential, which makes"
+                )
                 raise ParameterError(name, f"must not be of {fault.line} without {made} that line")
             raise ParameterError(name, f"must be of line {', '.join(lines)} or z, not {fault.line}")
         if not math.isfinite(self.start_angle_rad):

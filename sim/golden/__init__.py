@@ -11,7 +11,7 @@ from tachometry.sim.golden.low_pass import filtered
 from tachometry.sim.golden.methods import MODELS
 from tachometry.sim.golden.output import in_unit, with_age
 from tachometry.sim.golden.sampling import windows
-from tachometry.sim.golden.standstill import with_stalled
+from tachometry.sim.golden.standstill import with_standstill
 from tachometry.sim.signals.axes import AxesTrace, Trace
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run, Table
@@ -47,8 +47,8 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
         beyond, nominal = None, np.broadcast_to(np.int64(1), last.shape)
     ticks, index = count(spec, steps, last, beyond)
     del last  # as long as all ticks
-    if spec.facts.stalls_with == TICK:
-        ticks = with_stalled(spec, ticks, nominal)
+    if spec.facts.rests_with == TICK:
+        ticks = with_standstill(spec, ticks, nominal)
     measured = golden.updates(ticks, steps, trace.n_clocks)
     if "cause" not in measured.columns:
         measured = measured.having(cause=measured.clock - spec.latency.datapath)

@@ -35,9 +35,9 @@ class GoldenAxesBank(GoldenBank):
         self._follow(overflow)
         stalls = []
         for axis in range(registers.axes.axes):
-            rows = self._tables[registers.axes.axis.facts.stalls_with]
+            rows = self._tables[registers.axes.axis.facts.rests_with]
             own = rows["axis"] == axis
-            stalls.append(rises(rows.clock[own], rows[f"stalled_{axis}"][own]))
+            stalls.append(rises(rows.clock[own], rows[f"standstill_{axis}"][own]))
         self._stalls = np.unique(np.concatenate(stalls))
 
     def _of_clock(self, clock: int) -> dict[str, int]:

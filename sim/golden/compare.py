@@ -15,7 +15,7 @@ from tachometry.spec.formats.carrying import FASTER_BITS
 from tachometry.spec.language.port import COMPARE
 
 _NEVER = 1 << 62
-_WAITING = "compare_waiting"
+_WAITING = "position_compare_waiting"
 Clocks = list[tuple[int, int]]  # clocks, each with a number
 
 
@@ -38,7 +38,7 @@ def pulses(spec: TachometerSpec, steps: Steps, trace: PinTrace, updates: Table) 
 
     `updates` have velocity and place as the method has them.
     """
-    if (compare := spec.compare) is None:
+    if (compare := spec.position_compare) is None:
         return {}
     if compare.depth:
         return listed(spec, steps, trace)
@@ -49,9 +49,9 @@ def pulses(spec: TachometerSpec, steps: Steps, trace: PinTrace, updates: Table) 
 
 def listed(spec: TachometerSpec, steps: Steps, trace: PinTrace) -> dict[str, Table]:
     """Return the same of a list alone."""
-    assert spec.compare is not None
-    ways = _ways(spec, spec.compare, steps)
-    found, changes = _listed(spec.compare.depth, ways, trace, 1 << spec.position_width - 1)
+    assert spec.position_compare is not None
+    ways = _ways(spec, spec.position_compare, steps)
+    found, changes = _listed(spec.position_compare.depth, ways, trace, 1 << spec.position_width - 1)
     at, level = np.array([(0, 0), *changes], dtype=np.int64).T
     return {COMPARE: _table(found), _WAITING: Table(at, {_WAITING: np.cumsum(level)})}
 
@@ -83,13 +83,13 @@ def _carried(
     in which it catches up, then the velocity once a clock.
     """
     way = spec.carrying
-    half = 1 << spec.position_width - 1 + way.fine_bits
+    half = 1 << spec.position_width - 1 + way.position_fine_bits
     widest = half << way.more_bits
     before = np.searchsorted(_sets(spec, steps), updates.clock - spec.latency.datapath, side="right")
     begins = [*(updates.clock + way.latency).tolist(), n_clocks]
     columns = (updates.velocity, updates.position_fine, np.diff(before, prepend=0))
     rows = zip(begins[:-1], begins[1:], *(column.tolist() for column in columns), strict=True)
-    awaited = compare.in_lsb(compare.start, way.fine_bits)
+    awaited = compare.in_lsb(compare.start, way.position_fine_bits)
     armed, number = False, 0
     for clock, end, velocity, fine, jumped in [(0, begins[0], 0, 0, 0), *rows]:
         turn, since = way.per_clock.scaled(velocity << way.shift), clock
@@ -104,7 +104,7 @@ def _carried(
             else:
                 yield clock, awaited
                 number += 1
-                awaited = (awaited + compare.in_lsb(compare.apart, way.fine_bits) + half) % (2 * half) - half
+                awaited = (awaited + compare.in_lsb(compare.apart, way.position_fine_bits) + half) % (2 * half) - half
                 clock += 1
 
 
@@ -118,7 +118,7 @@ def _until(value: int, turn: int, half: int) -> int:
 
 def _table(found: Clocks) -> Table:
     clock, reached = np.array(found, dtype=np.int64).reshape(-1, 2).T
-    return Table(clock + 1, {"compare_position": reached})
+    return Table(clock + 1, {"position_compare_position": reached})
 
 
 def _computed(spec: TachometerSpec, compare: Compare, steps: Steps, end: int) -> Iterator[tuple[int, int]]:
@@ -204,16 +204,16 @@ def _writes(trace: PinTrace) -> Iterator[tuple[int, int, int, int]]:
 
 def shown(spec: TachometerSpec, found: dict[str, Table], clock: NDArray[np.int64]) -> dict[str, NDArray[np.int64]]:
     """Return what is shown of pulses in these clocks."""
-    if spec.compare is None:
+    if spec.position_compare is None:
         return {}
     pulses = found[COMPARE]
     number = np.searchsorted(pulses.clock, clock, side="right")
     begun = np.append(np.iinfo(np.int64).min // 2, pulses.clock)[number]
     values = {
-        "compare": clock - begun < spec.compare.clocks(spec.timing.clock_hz),
-        "compare_count": number % (1 << COUNT_WIDTH),
+        "position_compare": clock - begun < spec.position_compare.clocks(spec.timing.clock_hz),
+        "position_compare_count": number % (1 << COUNT_WIDTH),
     }
-    if spec.compare.depth:
+    if spec.position_compare.depth:
         waiting = found[_WAITING]
         values[_WAITING] = waiting[_WAITING][np.searchsorted(waiting.clock, clock, side="right") - 1]
     return values

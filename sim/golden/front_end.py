@@ -333,7 +333,7 @@ def count(
             shaft = reached - np.append(0, origins.captured)[np.searchsorted(steps.index, last, side="right")]
         columns["position_modulo"] = shaft % spec.front_end.modulus
     if spec.filter_clocks:
-        columns["swallowed_edges"] = 2 * np.minimum(places(steps.swallowed, strobe, "right"), (1 << 15) - 1)
+        columns["filtered_edges"] = 2 * np.minimum(places(steps.swallowed, strobe, "right"), (1 << 15) - 1)
     if steps.wheel is not None:
         columns["synced"] = steps.wheel.synced(strobe - 1)
     index = {"index_position": wrapped(spec, origins.captured - origins.at_index)}

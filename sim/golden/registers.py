@@ -68,8 +68,8 @@ class GoldenBank:
         self._happened = {"updated": self._tables[UPDATE].clock, "indexed": self._tables[INDEX].clock}
         self._happened |= {name: self._tables[name].clock for name in (WIDE, MISSED)}
         self._follow(self._tables[TICK].overflow)
-        stalls = self._tables[registers.spec.facts.stalls_with]
-        self._stalls = rises(stalls.clock, stalls.stalled)
+        stalls = self._tables[registers.spec.facts.rests_with]
+        self._stalls = rises(stalls.clock, stalls.standstill)
 
     def _follow(self, overflow: np.ndarray) -> None:
         """Find the clocks of what is counted; `overflow` is a column of the ticks."""
@@ -224,7 +224,7 @@ class GoldenBank:
         return {
             "time": clock % (1 << WORD),
             "age": min(age, self._map.spec.timing.max_ticks),
-            "swallowed_edges": 2 * min(glitches, (1 << 15) - 1),
+            "filtered_edges": 2 * min(glitches, (1 << 15) - 1),
             **self._shown(extras.shown(self._map.spec, self._tables, np.array([clock]), self._cleared)),
             "homed": int(homed(self._map.spec, self._steps, np.array([clock]))[0]),
             **self._shown(compare.shown(self._map.spec, self._tables, np.array([clock]))),
@@ -235,7 +235,7 @@ class GoldenBank:
         spec = self._map.spec
         added = {name for extra in spec.extras for name, *_ in extra.registers(spec)}
         fields = {field for name in added for field in self._map[name].fields}
-        fields |= {field for field in self._map.settings if field.port.startswith("compare_")}
+        fields |= {field for field in self._map.settings if field.port.startswith("position_compare_")}
         if not fields and not spec.extras:
             return
         control = self._map.registers.index(self._map["CONTROL"])
@@ -256,7 +256,7 @@ class GoldenBank:
         }
         pins = PinTrace.of_lines(clock, self._trace.n_clocks, lines)
         self._tables |= extras.tables(extras.View(spec, pins, self._steps, self._tables, clears))
-        if "compare_next" in lines:
+        if "position_compare_next" in lines:
             self._tables |= compare.listed(spec, self._steps, pins)
 
     @staticmethod

@@ -7,7 +7,7 @@ from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 
 
-def with_stalled(spec: TachometerSpec, ticks: Table, nominal: NDArray[np.int64]) -> Table:
+def with_standstill(spec: TachometerSpec, ticks: Table, nominal: NDArray[np.int64]) -> Table:
     """Return ticks with whether the shaft rests; `nominal` says how many nominal ticks each is long.
 
     It does if the ticks in a row that counted nothing, this one included, are together long enough. The tick before the
@@ -15,4 +15,4 @@ def with_stalled(spec: TachometerSpec, ticks: Table, nominal: NDArray[np.int64])
     """
     through = np.cumsum(nominal)
     counted = np.maximum.accumulate(np.where(ticks.pulse_count != 0, through, -1))
-    return ticks.having(stalled=through - counted >= spec.times.stalled_after_ticks)
+    return ticks.having(standstill=through - counted >= spec.times.standstill_after_ticks)

@@ -196,7 +196,7 @@ class PinTrace(_Lines):
         A third line.
     more : mapping of str to integer array, shape (n,)
         Further inputs by name, such as `preset`. `probe` and `probe_arm` have a bit for each probe, the first lowest;
-        A setting, such as `probe_edges`, is what a program has written. `compare_next` is the bits of a position.
+        A setting, such as `probe_edges`, is what a program has written. `position_compare_next` has bits of a position.
     """
 
     clock: NDArray[np.int64]
@@ -274,7 +274,7 @@ class PinTrace(_Lines):
         low = {name: np.zeros_like(self.a) for name in spec.front_end.controls if name not in self.lines}
         low |= {pin.port.name: np.full_like(self.a, pin.rest) for pin in spec.front_end.pins if not pin.of}
         low |= {f"{line}_n": self.lines[line] ^ np.uint8(1) for line in spec.front_end.complemented}
-        if spec.compare is not None and spec.compare.depth:
+        if spec.position_compare is not None and spec.position_compare.depth:
             low |= dict.fromkeys(LIST_PINS, np.zeros_like(self.a))
         return PinTrace.of_lines(self.clock, self.n_clocks, low | self.lines) if low else self
 

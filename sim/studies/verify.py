@@ -183,7 +183,7 @@ def _answer(ends: list[Any], left: Iterator[Any]) -> Any:
     try:
         result, error = end.recv()
     except EOFError:
-        raise OSError("a process of verify was killed, perhaps for want of memory: take fewer --jobs") from None
+        raise OSError("a process of verify was killed (out of memory?): try fewer --jobs") from None
     if error is not None:
         raise error
     for core in islice(left, 1):

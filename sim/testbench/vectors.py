@@ -141,9 +141,11 @@ def _fastest(spec: TachometerSpec) -> float:
 
 def _to_compare(spec: TachometerSpec, longest: int) -> list[str]:
     """Return segments over the first three positions of the compare output, if that takes no more clocks."""
-    if spec.compare is None or spec.compare.depth:
+    if spec.position_compare is None or spec.position_compare.depth:
         return []
-    start, apart = (spec.compare.in_lsb(place, 0) for place in (spec.compare.start, spec.compare.apart))
+    start, apart = (
+        spec.position_compare.in_lsb(place, 0) for place in (spec.position_compare.start, spec.position_compare.apart)
+    )
     most, more = _fastest(spec), 3 + abs(start) // 16  # since illegal transitions lose counts
     ahead = start - int(math.copysign(more, apart))  # whence it is reached in its direction
     ways = [ahead, start + 2 * apart + int(math.copysign(more, apart)) - ahead]

@@ -45,7 +45,7 @@ class Law(WithTachometer, Motor):
     tachometer: TachometerSpec  # of any method
     position_gain: Fraction = option(  # noqa: RUF009
         None,
-        "Gain k_p of the position error, in 1/s²; 0: the velocity alone is controlled.",
+        "Gain k_p of the position error, in 1/s²; 0: none. With 0 the velocity alone is controlled.",
         text="100",
         name="kp",
         metavar="KP",
@@ -61,7 +61,7 @@ class Law(WithTachometer, Motor):
     )
     observer: Fraction = option(  # noqa: RUF009
         None,
-        "Bandwidth G_dis of the disturbance observer, in rad/s, Hz or kHz.",
+        "Bandwidth of the disturbance observer G_dis. In rad/s, Hz or kHz.",
         text="40rad/s",
         metavar="BANDWIDTH",
         unit="rad/s",
@@ -69,7 +69,7 @@ class Law(WithTachometer, Motor):
     )
     velocity_filter: Fraction | None = option(  # noqa: RUF009
         None,
-        "Bandwidth G_v of the low-pass filter of the velocity, or none.",
+        "Bandwidth G_v of the velocity filter, or none.",
         shown="that of --observer; none with method track",
         metavar="[BANDWIDTH|none]",
         unit="rad/s",
@@ -77,14 +77,14 @@ class Law(WithTachometer, Motor):
     )
     current_limit: Fraction = option(  # noqa: RUF009
         None,
-        "Greatest commanded current, in A or mA; the observer is given the current that is held within it.",
+        "Greatest commanded current, in A or mA. The observer gets the current that is held within it.",
         text="20A",
         metavar="CURRENT",
         parse=Quantity(CURRENT),
     )
     control_period: int | None = option(
         None,
-        "Time between two control ticks, a whole number of clocks, such as 20us or 960clk.",
+        "Time between two control ticks, such as 20us or 960clk. It is a whole number of clocks.",
         shown="one tick",
         metavar="TIME",
         unit="clocks",
@@ -92,8 +92,8 @@ class Law(WithTachometer, Motor):
     )
     synchronised: bool = option(
         True,
-        "Let velocity filter and observer work at the updates of the velocity (Fig. 11), or at every control tick "
-        "(Fig. 2).",
+        "Let filter and observer work at velocity updates. That is Fig. 11; otherwise they work at every "
+        "control tick (Fig. 2).",
     )
 
     def __post_init__(self) -> None:

@@ -76,18 +76,19 @@ class Loop(Law):
     current_width: int = option(16, "Bits of current, 8 to 24.", metavar="N", limits=(8, 24))
     multiplier: str = option(
         "serial",
-        "How products are formed: a bit a clock, or at once with multipliers of the FPGA.",
+        "Way in which products of the loop are computed. serial takes a clock for each bit, parallel "
+        "multipliers of the FPGA.",
         name="loop-multiplier",
         choices=MULTIPLIERS,
     )
     command: str = option(
         "ports",
-        "Where commands come from: from outside, or from a generator in the core of constant speeds, ramps and sines.",
+        "Source of commands: inputs, or a generator in the core. The generator makes constant speeds, ramps and sines.",
         choices=COMMANDS,
     )
     gains: str = option(
         "fixed",
-        "Whether gains and current limit are fixed, or inputs; a bus makes them registers that begin with the options.",
+        "Let gains and current limit be fixed, or inputs. A bus makes inputs registers that begin with the options.",
         choices=FIXED_OR_INPUTS,
     )
 
@@ -99,8 +100,10 @@ class Loop(Law):
             raise ParameterError(named, "must not be given together with --loop, which takes A and B as they come")
         for name in self.tachometer.front_end.controls:
             raise ParameterError(OF_CONTROLS[name], "must not be given together with --loop, whose position would jump")
-        if self.tachometer.compare is not None and self.tachometer.compare.depth:
-            raise ParameterError("compare", "must not be a list together with --loop, whose inputs are commands")
+        if self.tachometer.position_compare is not None and self.tachometer.position_compare.depth:
+            raise ParameterError(
+                "position_compare", "must not be a list together with --loop, whose inputs are commands"
+            )
         check_options(self)
         self._check_formats()
         if self.period < self.latency.least_period:

@@ -58,7 +58,7 @@ def loop_ports(spec: Loop) -> Iterator[Port]:
     text = (
         "The current as a bit stream of a first-order sigma-delta modulator: 1 in (current + 2^(w-1)) of 2^w clocks, "
     )
-    yield Port("drive", "output", help=text + "w bits of current.")
+    yield Port("current_pdm", "output", help=text + "w bits of current.")
 
 
 def _units(spec: Loop) -> dict[str, tuple[int, str]]:

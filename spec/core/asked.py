@@ -22,21 +22,21 @@ class Asked:
     timing: Timing = Timing.parse()  # noqa: RUF009
     unit: str = option(
         NATIVE,
-        "Unit of the velocity; other than count/tick it costs a constant multiplication, and is off by less than one "
-        "LSB.",
+        "Unit of the velocity. All but count/tick cost a constant multiplication, and the velocity is "
+        "then off by less than one LSB.",
         choices=UNITS,
         tests=("", "rpm", "rad/s", "rev/s"),
     )
     frac_bits: int | None = option(
         None,
-        "Fraction bits of the velocity: its LSB is 2^-N of the unit. In count/tick 4 to 24.",
+        "Fraction bits of the velocity: its LSB is 2^-N of the unit. 4 to 24 in count/tick.",
         shown="16 in count/tick, else 10; fewer if --max-speed would not fit --velocity-width",
         metavar="N",
         parse=parse_whole,
         tests=("most - 20", "most - 0", "16"),
         also=(
             Option(
-                "LSB of the velocity as a power of two of its unit: 2^-4 or 0.0625 (instead of --frac-bits).",
+                "LSB of the velocity: 2^-4 or 0.0625 (instead of --frac-bits). It must be a power of two of the unit.",
                 name="lsb",
                 metavar="2^-N",
                 parse=parse_lsb,
@@ -46,7 +46,7 @@ class Asked:
     )
     velocity_width: int | None = option(
         None,
-        "Bits of the velocity, 8 to 64; a velocity that does not fit saturates and raises velocity_overflow. "
+        "Bits of the velocity, 8 to 64. A velocity beyond them saturates and raises velocity_overflow. "
         "--max-speed must fit.",
         shown="as many as it can need",
         metavar="N",
@@ -56,8 +56,9 @@ class Asked:
     )
     max_speed: Speed | None = option(  # noqa: RUF009
         None,
-        "Greatest speed to be measured, in rad/s, rev/s or rpm; a lower one makes the core smaller. Beyond it (with an "
-        "external tick: in the longest) the velocity saturates and raises overflow; the position stays exact.",
+        "Greatest speed, in rad/s, rev/s or rpm. A lower one makes the core smaller. Above it (with an "
+        "external tick: in the longest tick) the velocity saturates and overflow rises; the position "
+        "stays exact.",
         shown="one count per clock",
         metavar="SPEED",
         parse=parse_speed,
@@ -72,8 +73,9 @@ class Asked:
     )
     filter_clocks: int = option(
         0,
-        "Glitch filter: a level is accepted when it has held for so long, up to 10 ms, and reported so much late. In "
-        "s, ms, us or ns, rounded up to clocks; a plain number is clocks. Swallowed edges are counted.",
+        "Glitch filter: a level counts once it has held for TIME. Edges are delayed by TIME, which is at "
+        "most 10 ms. In s, ms, us or ns, rounded up to clocks; a plain number is clocks. Edges that are "
+        "filtered out are counted.",
         name="filter",
         metavar="TIME",
         shown="0",
@@ -81,12 +83,12 @@ class Asked:
         tests=("", "1", "5"),
     )
     index: Index | None = option(  # noqa: RUF009
-        None, "Index line z: the index captures the position in index_position.", part=Index
+        None, "Index line z: it captures the position in index_position.", part=Index
     )
     preset: int | None = option(
         None,
-        "Input preset sets the position to N when it rises; no count is lost, and the velocity does not change. "
-        "With --bus, N is what register PRESET begins with, and CONTROL.preset sets the position as well.",
+        "Input preset sets the position to N when it rises. No count is lost, and the velocity does not "
+        "change. With --bus, register PRESET begins with N, and CONTROL.preset sets the position as well.",
         metavar="N",
         parse=parse_whole,
         tests=("", "-7"),
@@ -94,8 +96,8 @@ class Asked:
     )
     position_modulo: str | None = option(
         None,
-        "Output position_modulo, 0 to N-1: the position of the shaft within N counts, within rev (a revolution), or "
-        "within rev/4, an electrical angle of 4 pole pairs. A preset leaves it as it is, --index-reset makes it 0.",
+        "Output position_modulo, 0 to N-1. N is counts, rev is a revolution, rev/4 an electrical turn of "
+        "4 pole pairs. A preset does not change it, --index-reset makes it 0.",
         metavar="[N|rev|rev/P]",
         parse=parse_modulo,
         tests=("", "rev", "7"),
@@ -103,12 +105,12 @@ class Asked:
     )
     external_tick: bool = option(
         False,
-        "A rise of tick_in ends a sampling period, as of a PWM carrier; --tick is its nominal length.",
+        "Input tick_in ends a sampling period, as of a PWM carrier. --tick is its nominal length.",
         group="Timing",
     )
     max_tick_cycles: int | None = option(
         None,
-        "Longest external tick: after it the core makes a tick itself and raises tick_error.",
+        "Longest external tick. After it the core makes a tick itself and raises tick_error.",
         name="max-tick-period",
         metavar="TIME",
         unit="clocks",
@@ -120,14 +122,14 @@ class Asked:
     age: bool = option(False, "Output age: ticks since the update.")
     bounds: bool = option(
         False,
-        "Outputs velocity_lower and velocity_upper, which enclose the true mean speed over the measured window, and "
-        "bounds_valid. They hold for an ideal disc and ideal lines, or within --edge-error, while no count is lost.",
+        "Bounds: outputs velocity_lower, velocity_upper, bounds_valid. They enclose the true mean speed "
+        "over the measured window, for an ideal disc and ideal lines, or within --edge-error, while no "
+        "count is lost.",
         fits=lambda spec: spec.facts.bounds,
     )
     edge_error: Fraction = option(  # noqa: RUF009
         Fraction(0),
-        "The distance of any two edges is off by at most E counts, 0 to 1, because of the disc and the lines, so "
-        "--bounds are wider. It is rounded up to eighths.",
+        "Widen --bounds for edges that are off by up to E counts. 0 to 1, rounded up to eighths.",
         shown="0",
         metavar="E",
         parse=Quantity(FRACTION),
@@ -136,8 +138,8 @@ class Asked:
     )
     lowpass: Fraction | None = option(  # noqa: RUF009
         None,
-        "Low-pass filter of the velocity for measurements of different length, eq. (22), in rad/s, Hz or kHz. The "
-        "length is the time since the last update.",
+        "Low-pass filter of the velocity, in rad/s, Hz or kHz. It is for measurements of different "
+        "length, eq. (22); the length is the time since the last update.",
         metavar="BANDWIDTH",
         unit="rad/s",
         parse=parse_bandwidth,

@@ -13,7 +13,11 @@ COUNT_WIDTH = 16  # bits of the number of pulses, which wraps
 MAX_CLOCKS = 1 << 24
 MAX_DEPTH = 1 << 12
 FORWARD, BACKWARD, BOTH = DIRECTIONS = "forward", "backward", "both"
-LIST_PINS = ("compare_next", "compare_append", "compare_clear")  # inputs of a list, which registers have on a bus
+LIST_PINS = (
+    "position_compare_next",
+    "position_compare_append",
+    "position_compare_clear",
+)  # inputs of a list, which registers have on a bus
 FINEST_BITS = 17  # fraction bits of places between counts, as they are asked for: one more than any core has
 _PLACES = r"(-?\d{1,15}(?:\.\d{1,16})?):(\d{1,15}(?:\.\d{1,16})?):(\d{1,15})"
 _FORM = re.compile(rf"(?:{_PLACES}|list:(\d{{1,15}})):([^:]+)(?::({'|'.join(DIRECTIONS)}))?(?::(fine))?", re.ASCII)
@@ -103,13 +107,13 @@ class Compare:
 
     def clocks(self, clock_hz: int) -> int:
         """Return clocks of a pulse; ParameterError if it has no whole number of them."""
-        return whole_clocks("compare", self.width, clock_hz)
+        return whole_clocks("position_compare", self.width, clock_hz)
 
-    def in_lsb(self, place: int, fine_bits: int) -> int:
-        """Return a place, or a distance, in 2^-fine_bits counts if it is fine, else in counts."""
-        return place >> FINEST_BITS - fine_bits if self.fine else place
+    def in_lsb(self, place: int, position_fine_bits: int) -> int:
+        """Return a place, or a distance, in 2^-position_fine_bits counts if it is fine, else in counts."""
+        return place >> FINEST_BITS - position_fine_bits if self.fine else place
 
-    def check(self, clock_hz: int, position_width: int, fastest: Fraction, fine_bits: int | None) -> None:
+    def check(self, clock_hz: int, position_width: int, fastest: Fraction, position_fine_bits: int | None) -> None:
         """Check that it fits a core whose shaft has at most so many counts in a clock, and whose `position_fine` has so
         many fraction bits, if there is one; ParameterError if a position, a number or a time is out of range, or if a
         pulse would last into the next.
@@ -119,12 +123,16 @@ class Compare:
         clocks = self.clocks(clock_hz)
         if self.fine:
             if self.depth or self.direction == BOTH:
-                raise ParameterError("compare", "must not be fine with :both or a list: type 100:12.5:0:10us:fine")
-            if fine_bits is None:
-                raise ParameterError("compare", "must not be fine with this method: position_fine is of --method track")
-            if (self.start | self.step) % (1 << FINEST_BITS - fine_bits):
-                grid = f"multiples of 2^-{fine_bits} count, see --fine-bits"
-                raise ParameterError("compare", f"must have START and STEP in {grid}")
+                raise ParameterError(
+                    "position_compare", "must not be fine with :both or a list: type 100:12.5:0:10us:fine"
+                )
+            if position_fine_bits is None:
+                raise ParameterError(
+                    "position_compare", "must not be fine with this method: position_fine is of --method track"
+                )
+            if (self.start | self.step) % (1 << FINEST_BITS - position_fine_bits):
+                grid = f"multiples of 2^-{position_fine_bits} count, see --position-fine-bits"
+                raise ParameterError("position_compare", f"must have START and STEP in {grid}")
         fit = (half - 1 - self.start) // self.step + 1 if self.both and self.step > 0 else 1 << COUNT_WIDTH
         ranges = (
             ("start", self.start, -half, half - 1),
@@ -138,11 +146,11 @@ class Compare:
             if not least <= value <= most:
                 if name in ("start", "step"):
                     least, most, value = (self._written(place) for place in (least, most, value))
-                raise ParameterError("compare", f"must have a {name} from {least} to {most} here, not {value}")
+                raise ParameterError("position_compare", f"must have a {name} from {least} to {most} here, not {value}")
         if not self.depth and fastest and fastest * one * clocks >= self.step:
             longest = math.ceil(Fraction(self.step, one) / fastest) - 1
             raise ParameterError(
-                "compare",
+                "position_compare",
                 f"must have a WIDTH of at most {longest} clocks here, not {clocks}: at --max-speed the shaft is at the "
                 "next position then",
             )

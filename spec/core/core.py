@@ -18,12 +18,13 @@ class Core(Numbers):
     """Features beside the measurement, and the inputs of a core."""
 
     extras: tuple[Extra, ...] = field(default=(), metadata={"extras": EXTRAS})  # see `spec.core.extras`
-    compare: Compare | None = option(  # noqa: RUF009
+    position_compare: Compare | None = option(  # noqa: RUF009
         None,
-        "Output compare has pulses of WIDTH, a time or clocks, at COUNT positions (0: no end) from START on, STEP "
-        "counts apart: 100:100:50:10us. They come while the shaft turns forward; with :backward at the end backward, "
-        "and with :both whichever way. list:DEPTH:WIDTH takes positions that a program writes, up to DEPTH ahead. With "
-        ":fine behind all that START and STEP may lie between counts, where track says that the shaft is.",
+        "Pulses at positions, such as 100:100:50:10us. Output position_compare has pulses of WIDTH, a "
+        "time or clocks, at COUNT positions (0: no end) from START on, STEP counts apart. They come while "
+        "the shaft turns forward; with :backward at the end backward, with :both either way. "
+        "list:DEPTH:WIDTH takes positions that a program writes, up to DEPTH ahead. With :fine at the end "
+        "START and STEP may lie between counts, at places that track finds.",
         metavar="[START:STEP:COUNT|list:DEPTH]:WIDTH",
         parse=Compare.parse,
         tests=("", "2:3:0:2clk", "1.5:2.5:0:2clk:fine", "-2:3:40:1clk:backward", "3:4:9:1clk:both", "list:3:2clk"),
@@ -52,8 +53,8 @@ class Core(Numbers):
             "tick_latency": latency.tick,
             "tick_to_velocity": latency.tick_to_velocity,
         }
-        if self.compare is not None and not self.compare.fine:  # else it is at the place itself
-            found["pin_to_compare"] = latency.pin_to_count + latency.tick + 1
+        if self.position_compare is not None and not self.position_compare.fine:  # else it is at the place itself
+            found["pin_to_position_compare"] = latency.pin_to_count + latency.tick + 1
         for extra in self.extras:
             found |= extra.latency(self)
         return found | ({"tick_in_to_window_end": TICK_IN_TO_WINDOW_END} if self.external_tick else {})

@@ -71,20 +71,20 @@ class Encoder:
     _group = "Encoder"
     pulses_per_rev: int = option(
         REQUIRED,
-        "Pulses per revolution: periods of line A (or B) in one turn, as in the encoder's data sheet.",
+        "Pulses per revolution: periods of line A in one turn. The data sheet of the encoder has it.",
         name="ppr",
         metavar="N",
         parse=parse_whole,
         also=(
-            Option("Lines of the disc, which are pulses per revolution (instead of --ppr).", name="lines", **_OF_TURN),
+            Option("Lines of the disc: pulses per revolution (instead of --ppr).", name="lines", **_OF_TURN),
             Option(
-                "Counts per revolution, after decoding (instead of --ppr): of 2500 lines 10000.",
+                "Counts per revolution, after decoding (instead of --ppr). 2500 lines have 10000.",
                 name="cpr",
                 parse_at=_of_counts,
                 **_OF_TURN,
             ),
             Option(
-                "Pole pairs of the motor, which are periods of its halls in a turn (instead of --ppr).",
+                "Pole pairs of the motor with halls (instead of --ppr). The halls have as many periods in a turn.",
                 name="pole-pairs",
                 parse_at=_pole_pairs,
                 **_OF_TURN,
@@ -93,8 +93,9 @@ class Encoder:
     )
     decoding: int = option(
         None,
-        "Counts per pulse: 4 (or x4) counts every edge, 2 both edges of A, 1 the edges of A while B is low. Of pulses, "
-        "2 counts every edge, which is their default, and 1 rises. A step is always 1, a period of halls 6.",
+        "Counts per pulse. 4 (or x4) counts every edge, 2 both edges of A, 1 the edges of A while B is "
+        "low. With --sensor pulses 2 (the default) counts every edge, 1 the rises. A step always has 1, a "
+        "period of halls 6.",
         parse=_factor,
         shown="4",
         metavar="[4|2|1]",
@@ -102,17 +103,18 @@ class Encoder:
     )
     sensor: str = option(
         "quadrature",
-        "What moves the lines: quadrature (A and B), pulses (A alone, as of a tooth wheel, fan or flow meter: always "
-        "forward), step-dir (each rise of A is a step, forward while B is high), up-down (each rise of A counts up, "
-        "of B down), or hall (A, B and C of a motor, 120 electrical degrees apart).",
+        "Kind of the encoder lines. quadrature: A and B. pulses: A alone, of a tooth wheel, fan or flow "
+        "meter, always forward. step-dir: each rise of A is a step, forward while B is high. up-down: "
+        "each rise of A counts up, each rise of B down. hall: A, B and C of a motor, 120 electrical "
+        "degrees apart.",
         choices=tuple(SENSORS),
         tests=("", "hall", "pulses", "step-dir", "up-down"),
         tacit=True,
     )
-    reverse: bool = option(False, "Count backward what would be forward.", tacit=True)
+    reverse: bool = option(False, "Reverse the direction of counting.", tacit=True)
     invert: str | None = option(
         None,
-        "Lines to be inverted, which are high where they should be low: a, b, c, z, with commas between.",
+        "Lines that are inverted: a, b, c, z, with commas between.",
         metavar="LINES",
         parse=_inverted,
         tests=("", "a"),
@@ -120,9 +122,10 @@ class Encoder:
     )
     missing_teeth: str | None = option(
         None,
-        "Teeth of a full crank wheel less those missing in its gap (with --sensor pulses and --ppr N), as 60-2 or "
-        "36-1. From the second gap on the missing teeth count where they would be. With --index the first tooth after "
-        "a gap is the index, and there is no pin z. Output synced tells that the gap is where it should be.",
+        "Teeth of a crank wheel and those missing, as 60-2 or 36-1. It needs --sensor pulses and --ppr N. "
+        "The missing teeth count where they would be, from the second gap on. With --index the first "
+        "tooth after a gap is the index, and there is no pin z. Output synced is high while the gap is in "
+        "its place.",
         metavar="N-M",
         parse=_wheel,
         tests=(),

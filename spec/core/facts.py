@@ -22,8 +22,8 @@ class Facts:
     rest_tenths: int = 17
     # whether the observer of a control loop waits for a count: it takes no update that is `forced`
     awaits_count: bool = False
-    # strobe with which `stalled` changes: TICK after empty ticks, UPDATE if the datapath measures the silence in clocks
-    stalls_with: str = TICK
+    # strobe with which `standstill` changes: TICK after empty ticks, UPDATE if the datapath measures silence in clocks
+    rests_with: str = TICK
     pairs_all: bool = False  # whether pairwise tests give all options all of their values
     # texts of options that have another default with this method than with all others
     usual: Mapping[str, str] = field(default_factory=dict)

@@ -13,9 +13,10 @@ class Index:
     reset: bool = option(False, "The index also sets the position to 0 (with --index).", name="index-reset")
     at: str | None = option(
         None,
-        "Where the index is taken (with --index): in a state of the lines, such as A=1,B=1, while z is high, which is "
-        "one place in both directions, or edge, where z rises, which is another place backward than forward. Outputs "
-        "index_missed and index_wide tell if z comes without its state, or meets it twice.",
+        "Place of the index within the mark (with --index). A state of the lines, such as A=1,B=1, while "
+        "z is high: one place in both directions. Or edge, where z rises: at one end of the mark forward, "
+        "at the other backward. Outputs index_missed and index_wide report that z came without its state, "
+        "or met it twice.",
         metavar="[edge|A=1,B=1]",
         shown=f"{USUAL_STATE}; edge for sensors other than quadrature",
         parse=parse_state,
@@ -25,8 +26,8 @@ class Index:
     )
     once: bool = option(
         False,
-        "The index is taken once (with --index): the first one after input home rises, or CONTROL.home is written. "
-        "Output homed tells that it was.",
+        "Take the index once, after input home (with --index). CONTROL.home also arms it. Output homed "
+        "shows that it was taken.",
         name="index-once",
         tacit=True,
     )

@@ -23,20 +23,20 @@ def ports_of(spec: Core, own: Iterable[Port]) -> Iterator[Port]:
     yield strobe(TICK, "One clock for every sampling period.")
     text = "m_e, the counts of this period."
     yield held(TICK, "pulse_count", spec.widths.count, signed=True, unit="counts", help=text)
-    text = "Sum of all counts up to this period; it wraps in two's complement. Between the ticks it counts on."
+    text = "Sum of all counts up to this period; it wraps in two's complement. It also changes between ticks."
     yield held(TICK, "position", spec.position_width, signed=True, unit="counts", help=text)
     wrong = _wrong(spec)
     yield strobe("decode_error", f"One clock: {wrong}" if wrong else "Never high: one line cannot be wrong.")
     text = "pulse_count was saturated at the maximum speed; position is exact all the same."
     yield held(TICK, "overflow", help=text)
-    if spec.facts.stalls_with == UPDATE:
+    if spec.facts.rests_with == UPDATE:
         text = "The shaft stands still: at the end of this period the last count, or the reset, was the maximum time "
         text += "ago. The velocity is 0."
     else:
         text = "The shaft rests: pulse_count was 0 in this period and in those before it for longer than the maximum "
-        text += "time, that is for stalled_after_ticks of the manifest; the time before the first period is one of "
+        text += "time, that is for standstill_after_ticks of the manifest; the time before the first period is one of "
         text += "them. It falls with the next count."
-    yield held(spec.facts.stalls_with, "stalled", help=text)
+    yield held(spec.facts.rests_with, "standstill", help=text)
     if spec.velocity.output:
         yield held(UPDATE, "velocity_overflow", help="This velocity was saturated to the width of the port.")
     if spec.age:
@@ -48,7 +48,7 @@ def ports_of(spec: Core, own: Iterable[Port]) -> Iterator[Port]:
     yield from _index_ports(spec)
     if modulus := spec.front_end.modulus:
         text = f"Counts up to this period modulo {modulus}, from 0 on, since reset or since an index that resets. "
-        text += "Between the ticks it counts on, and a preset leaves it as it is."
+        text += "It also changes between ticks. A preset does not change it."
         yield held(TICK, "position_modulo", (modulus - 1).bit_length(), unit="counts", help=text)
     if spec.external_tick:
         text = "One clock. Together with tick: the external tick was missing, and the core made one. Alone: an "
@@ -60,7 +60,7 @@ def ports_of(spec: Core, own: Iterable[Port]) -> Iterator[Port]:
     if spec.filter_clocks:
         text = "Edges that the glitch filter has kept out, two for each glitch; it stays at 65534. Between the ticks "
         text += "it counts on, and a capture takes what it is then."
-        yield held(TICK, "swallowed_edges", 16, unit="edges", help=text)
+        yield held(TICK, "filtered_edges", 16, unit="edges", help=text)
     yield from _of_extras(spec, 1)
 
 
@@ -118,31 +118,37 @@ def _wrong(spec: Core) -> str:
 
 
 def _list_pins(spec: Core) -> Iterable[Port]:
-    if spec.compare is None or not spec.compare.depth:
+    if spec.position_compare is None or not spec.position_compare.depth:
         return
     texts = {
-        "next": "Position that compare_append appends to the list of compare.",
+        "next": "Position that position_compare_append appends to the list of the position compare.",
         "append": "Appends it, in each clock in which it is high; if there is room in the list.",
-        "clear": "Empties the list of compare.",
+        "clear": "Empties the list of the position compare.",
     }
     for name, text in texts.items():
         width = spec.position_width if name == "next" else 1
-        yield Port(f"compare_{name}", "input", width, signed=width > 1, help=f"{text} Synchronous to clk.")
+        yield Port(f"position_compare_{name}", "input", width, signed=width > 1, help=f"{text} Synchronous to clk.")
 
 
 def _compare_ports(spec: Core) -> Iterable[Port]:
-    if spec.compare is None:
+    if spec.position_compare is None:
         return
-    yield held(TICK, "compare", help=f"Pulse at a position, of {spec.compare.width}. It does not wait for a tick.")
-    yield held(TICK, "compare_count", COUNT_WIDTH, help="Pulses of compare since reset; it wraps.")
-    if depth := spec.compare.depth:
-        text = f"Positions in the list of compare, with the one that is awaited: {depth} are all."
-        yield held(TICK, "compare_waiting", depth.bit_length(), help=text)
-    yield strobe(COMPARE, "The first clock of a pulse of compare.")
-    text = "Position of the latest pulse of compare."
-    fine = getattr(spec, "fine_bits", 0) * spec.compare.fine
+    yield held(
+        TICK,
+        "position_compare",
+        help=f"Pulse at a position, of {spec.position_compare.width}. It does not wait for a tick.",
+    )
+    yield held(
+        TICK, "position_compare_count", COUNT_WIDTH, help="Pulses of the position compare since reset; it wraps."
+    )
+    if depth := spec.position_compare.depth:
+        text = f"Positions in the list of the position compare, with the one that is awaited: {depth} are all."
+        yield held(TICK, "position_compare_waiting", depth.bit_length(), help=text)
+    yield strobe(COMPARE, "The first clock of a pulse of the position compare.")
+    text = "Position of the latest pulse of the position compare."
+    fine = getattr(spec, "position_fine_bits", 0) * spec.position_compare.fine
     unit = f"2^-{fine} counts" if fine else "counts"
-    yield held(COMPARE, "compare_position", spec.position_width + fine, signed=True, unit=unit, help=text)
+    yield held(COMPARE, "position_compare_position", spec.position_width + fine, signed=True, unit=unit, help=text)
 
 
 def bound_ports(spec: Core) -> Iterator[Port]:

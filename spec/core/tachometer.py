@@ -56,7 +56,7 @@ class TachometerSpec(Core):
             "clock_hz": self.timing.clock_hz,
             "tick_cycles": self.timing.tick_cycles,
             "max_ticks": self.timing.max_ticks,
-            "stalled_after_ticks": times.stalled_after_ticks,
+            "standstill_after_ticks": times.standstill_after_ticks,
             "counts_per_rev": self.encoder.counts_per_rev,
             "decoding": self.encoder.decoding,
             "velocity": {

@@ -44,9 +44,9 @@ class Times:
         return self.shortest_tick if self.spacing is None else self.spacing
 
     @property
-    def stalled_after_ticks(self) -> int:
-        """Nominal ticks without a count after which `stalled` rises: of empty ticks, or since the last count."""
-        return self.asked.timing.max_ticks + (self.asked.facts.stalls_with == TICK)
+    def standstill_after_ticks(self) -> int:
+        """Nominal ticks without a count after which `standstill` rises: of empty ticks, or since the last count."""
+        return self.asked.timing.max_ticks + (self.asked.facts.rests_with == TICK)
 
 
 @dataclass(frozen=True)

@@ -98,8 +98,7 @@ class Timing:
     )
     tick_cycles: int = option(
         REQUIRED,
-        "Sampling period Ts, in s, ms, us or ns, or its frequency in Hz or kHz, a whole number of clocks; 960clk are "
-        "960 clocks.",
+        "Sampling period Ts, such as 100us, 10kHz or 960clk. It must be a whole number of clocks.",
         text="20us",
         shown="20us, or as long as the method needs at this clock",
         name="tick",
@@ -110,13 +109,13 @@ class Timing:
         few=3,
         also=(
             Option(
-                "Frequency of the PWM, one period of which is the sampling period (instead of --tick).",
+                "Frequency of the PWM, whose period is the tick. It stands in place of --tick.",
                 name="pwm",
                 metavar="FREQUENCY",
                 parse_at=_of_frequency,
             ),
             Option(
-                "Sampling period of method rairan, whose tick is called dt (instead of --tick).",
+                "Sampling period of method rairan (instead of --tick).",
                 name="dt",
                 metavar="TIME",
                 parse_at=_tick,
@@ -126,8 +125,7 @@ class Timing:
     )
     max_ticks: int = option(
         REQUIRED,
-        "Longest measurement: after it an update is forced, so that standstill is seen. In s, ms, us or ns, 2 to 2^20 "
-        "whole ticks; 960clk are 960 clocks.",
+        "Longest measurement; then the velocity goes to 0. A time, or clocks: 960clk; 2 to 2^20 whole ticks.",
         text="10ms",
         shown="10ms, with method track 100ms",
         name="max-time",

@@ -79,7 +79,7 @@ class Angles:
 class Tracked:
     """Formats of a method that tracks the place of the shaft."""
 
-    fine_bits: int  # fraction bits of the fine position
+    position_fine_bits: int  # fraction bits of the fine position
     slope: Fraction  # LSB of the acceleration, in counts per clock²
     block: bool  # whether a multiplier of the FPGA makes products
 
@@ -120,7 +120,7 @@ class Carried:
     @cached_property
     def fine(self) -> Factor:
         """An LSB of the fine position, as an angle."""
-        return Factor.of(self.angles.per_count / (1 << self.tracked.fine_bits), self.factor_bits)
+        return Factor.of(self.angles.per_count / (1 << self.tracked.position_fine_bits), self.factor_bits)
 
     @cached_property
     def velocity(self) -> Factor:

@@ -17,11 +17,11 @@ FASTER_BITS = 3  # it catches up 2^3 times as fast as the shaft
 class Carrying:
     """Says how a place is carried on."""
 
-    # how the velocity in counts per clock is computed, whose LSB is 2^-(fine_bits + more_bits) counts
+    # how the velocity in counts per clock is computed, whose LSB is 2^-(position_fine_bits + more_bits) counts
     per_clock: VelocityOutput
     shift: int  # of the velocity that it takes, to the left
     # fraction bits of the place that is given, and further ones of the place that is carried on
-    fine_bits: int
+    position_fine_bits: int
     more_bits: int
     # clocks from the end of a tick at the pins to the velocity per clock of its update, and three to use the place
     late: int

@@ -66,8 +66,8 @@ class Tracking:
     max_time: int  # clocks of silence after which 0 is shown
     velocity_out: int  # fraction bits of the velocity in counts per tick that is shown
     slope: Fraction  # LSB of the acceleration that is shown in one of the recursion, less than 1
-    quality: Fraction  # LSB of the deviation that is shown, in one count per clock
-    quality_bits: int  # of it
+    velocity_std: Fraction  # LSB of the deviation that is shown, in one count per clock
+    std_bits: int  # of it
 
     @cached_property
     def factor_bits(self) -> int:
@@ -155,14 +155,14 @@ class Tracking:
         most = (1 << (WIDTH - 2)) - 16
         shown = self.max_count << self.velocity_out
         noises = 1 << (self.factor_bits - CHANCE_BITS - 1)  # one event among those that the noise is learned from
-        of_quality = math.log2(self.quality) - a - t - 6 - 3 / 2  # over the roots of the order and of log_8
+        of_std = math.log2(self.velocity_std) - a - t - 6 - 3 / 2  # over the roots of the order and of log_8
         logs = {
-            "of_straight": math.log2(STRAIGHT) + of_quality, "of_curve": math.log2(CURVE) + of_quality, "none": -127,
+            "of_straight": math.log2(STRAIGHT) + of_std, "of_curve": math.log2(CURVE) + of_std, "none": -127,
             "log_3_2": math.log2(3 / 2), "log_9_4": math.log2(9 / 4), "log_8": 3, "log_45": 5.5, "log_64": 6,
             "log_256": 8, "log_8192": MOST_EVENTS_BITS, "log_4": 2, "log_eighth": -3, "log_half": -1,
             "log_5_8": math.log2(8 / 5),
             "of_velocity": v - PLACE_BITS + t, "of_speed": v + t, "of_slope": a - v + t + 1,
-            "of_bound": math.log2(self.quality) - v + 2**-EXP_INDEX,  # not below the velocity for the table
+            "of_bound": math.log2(self.velocity_std) - v + 2**-EXP_INDEX,  # not below the velocity for the table
         }  # fmt: skip
         return {
             **{name: fixed_log(value) for name, value in logs.items()},
@@ -178,7 +178,7 @@ class Tracking:
             "clock": 1 << t, "tick": self.tick_cycles,
             "most_since": self.most_since, "most_memory": min(int(self.memory_seconds * self.clock_hz) << t, most),
             "max_time": self.max_time << t, "forget": forget << t,
-            "most_quality": (1 << self.quality_bits) - 1,
+            "most_std": (1 << self.std_bits) - 1,
             "most": most, "most_shown": shown, "least_shown": -shown,
             "noises_one": noises, "noises_first": 8 * noises, "noises_least": 16 * noises,
             "noises_offset": 256 * noises, "noises_most": 512 * noises,

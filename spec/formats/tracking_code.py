@@ -42,7 +42,14 @@ class Jump(IntEnum):
 INPUTS = ("number", "counts", "places", "times", "last", "moved", "length")
 OFFSETS = ("o0", "o1", "o2", "o3")
 CHOSEN = ("o@last", "o@up", "o@down", "o@m1", "o@m2", "o@m3")  # an offset that the tick chooses
-OUTPUTS = ("", "velocity", "position_fine", "quality", "acceleration", "stalled")  # stalled: not if it is negative
+OUTPUTS = (
+    "",
+    "velocity",
+    "position_fine",
+    "velocity_std",
+    "acceleration",
+    "standstill",
+)  # standstill: not if it is negative
 ADDRESS_BITS = 7
 FIRST_CHOSEN = (1 << ADDRESS_BITS) - 8  # address of what the tick chooses
 FIRST_OFFSET = FIRST_CHOSEN - (1 << ADDRESS_BITS - 1)  # another bit, so that few cells choose

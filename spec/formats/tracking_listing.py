@@ -135,7 +135,7 @@ few:
     of_v = log_T - of_slope
     t + ~ + ~; if pos goto curved
     of_v + ~ exp
-    as = zero; quality = of_straight
+    as = zero; velocity_std = of_straight
     block of_e = log_e + log_X
     vs = v s- ~
     velocity = sum
@@ -143,7 +143,7 @@ few:
     goto placed
 curved:
     as = a product velocity             # the velocity at the time when it is shown
-    quality = of_curve
+    velocity_std = of_curve
     block of_e = log_e + log_X
     vs = v
     velocity = sum + ~
@@ -173,12 +173,12 @@ shown:
     t = ~
     limit + w over 1
     block slope by
-    quality - log_T + ~ exp
+    velocity_std - log_T + ~ exp
     t min most_shown max least_shown out velocity
     t = ~
     serial slope by
     as product acceleration
-    t max least min most_quality out quality
+    t max least min most_std out velocity_std
     ~ out acceleration
     after - one; if neg goto fewer
 learn:                                  # nothing below is in a hurry
@@ -319,7 +319,7 @@ begin:
     v = zero s+ ~
     vs = sum; a = zero; as = zero; mu = zero; lag = zero
     before = zero; slow_T = zero; T = dt; log_T = log_dt
-    log_X = log_quarter; after = zero; quality = of_curve
+    log_X = log_quarter; after = zero; velocity_std = of_curve
     if one goto show
     log_T = log_dt - log_64 - log_half exp     # means of many counts are by logarithms: they are forgotten
     T = ~
@@ -330,7 +330,7 @@ same:
 silent:
     since = $length + since min most_since
     quiet = $length + quiet max zero min most
-    sum - max_time out stalled + max_time - forget; if pos goto rest
+    sum - max_time out standstill + max_time - forget; if pos goto rest
     phase; if neg goto nothing
 show:
     since + ahead by
@@ -378,7 +378,7 @@ still:
 rest:
     phase = minus_two; since = zero; p = zero
 nothing:
-    quality = none; least = zero; velocity = zero
+    velocity_std = none; least = zero; velocity = zero
     p out position_fine
 quiet:
     as = zero

@@ -90,7 +90,7 @@ class OneAxis(TachometerSpec):
     @cached_property
     def ports(self) -> Ports:
         """Ports of the core, less the count of the glitch filter and what tells of a wrong index, which no axis has."""
-        return Ports(port for port in super().ports if port.name not in ("swallowed_edges", WIDE, MISSED))
+        return Ports(port for port in super().ports if port.name not in ("filtered_edges", WIDE, MISSED))
 
     @property
     @abstractmethod

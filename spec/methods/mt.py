@@ -70,8 +70,8 @@ class MTTachometer(TimedTachometer):
     )
     whole_cycles: bool = option(
         False,
-        "Let measurements last whole cycles of A and B, so that phase and duty errors of the encoder cancel; "
-        "below one cycle per Tc, and at reversals, they end as without.",
+        "Let measurements last whole cycles of A and B. Phase and duty errors of the encoder then cancel. "
+        "Below one cycle per Tc, and at reversals, they end as without it.",
     )
 
     method = "mt"

@@ -172,15 +172,15 @@ class RairanTachometer(TachometerSpec):
 
     estimate: str = option(
         "n3",
-        "Which estimate the velocity is: n1, the upper bound, n2, the lower, or n3, their harmonic mean, eq. (11).",
+        "Estimate that the velocity is, eq. (11). n1 is the upper bound, n2 the lower, n3 their harmonic mean.",
         choices=ESTIMATES,
     )
-    paper_exact: bool = option(False, "The published algorithm and nothing else: no direction, no standstill.")
-    bound_decay: bool = option(True, "While no count comes, let the velocity decay with the time since the last one.")
+    paper_exact: bool = option(False, "The published algorithm alone: no direction, no standstill.")
+    bound_decay: bool = option(True, "Let the velocity decay while no count comes.")
     adaptive: Fraction | None = option(  # noqa: RUF009
         None,
-        "Longer dt, 2^k ticks: the shortest with which the relative error of n3, eq. (13), is at most this, such as 1% "
-        "or 0.01.",
+        "Longer dt, 2^k ticks, for an error of at most TARGET. It is the shortest with which the relative "
+        "error of n3, eq. (13), is at most TARGET, such as 1% or 0.01.",
         metavar="TARGET",
         parse=parse_target,
         tests=("", "25%"),

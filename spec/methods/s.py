@@ -126,13 +126,13 @@ class STachometer(TachometerSpec):
     out of range raises ParameterError.
     """
 
-    cancel: bool = option(True, "Cancel alternate pulse alterations, eq. (21), or average plainly, eq. (17).")
+    cancel: bool = option(True, "Cancel alternate pulse alterations, eq. (21). Otherwise they are averaged, eq. (17).")
 
     reciprocal_source: str = option(
         "serial",
-        "Where the reciprocal of the measurement time comes from: divided serially between two ticks, or looked up in "
-        "a table of block RAM. Where ticks are too short for the one, or windows too long, the other is taken; where "
-        "neither is possible, it is carried along from tick to tick.",
+        "Source of the reciprocal of the measurement time. serial divides between two ticks, table looks "
+        "it up in block RAM. Where ticks are too short for the one, or windows too long, the other is "
+        "taken; where neither is possible, it is carried from tick to tick.",
         name="reciprocal",
         choices=_SOURCES,
     )

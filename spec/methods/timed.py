@@ -142,13 +142,11 @@ class TimedTachometer(TachometerSpec):
     A value out of range raises ParameterError.
     """
 
-    timer: str = option("clock", "What times are counted in: clocks, or ticks as in the paper.", choices=_TIMERS)
+    timer: str = option("clock", "Unit in which times are counted; the paper has ticks.", choices=_TIMERS)
     bound_decay: bool = option(
-        True, "While no count comes, let the velocity decay as 1½ counts over the time since the last one."
+        True, "Let the velocity decay while no count comes. It is 1½ counts over the time since the last one."
     )
-    paper_exact: bool = option(
-        False, "The published algorithm and nothing else: no decay, and a reversal is no special case."
-    )
+    paper_exact: bool = option(False, "The published algorithm alone: no decay, no reversals.")
 
     equation: ClassVar[int]  # its number in Tsuji 2009
     one_count: ClassVar[bool]  # see `Quotient`

@@ -87,8 +87,8 @@ class TrackTachometer(TachometerSpec):
     timing: Timing = Timing.parse(max_time=_MAX_TIME)  # noqa: RUF009
     max_memory: int | None = option(
         None,
-        "Longest memory, for use inside a control loop: it follows a change that it does not see yet as if the memory "
-        "were so short. In s, ms, us or ns.",
+        "Longest memory, for use inside a control loop. A change that is not yet seen is followed as by "
+        "so short a memory. In s, ms, us or ns.",
         shown="4s; with --loop 0.6/k_v",
         metavar="TIME",
         unit="clocks",
@@ -97,12 +97,12 @@ class TrackTachometer(TachometerSpec):
     )
     multiplier: str = option(
         "auto",
-        "How products are made: serial takes few cells and a bit a clock, block takes a multiplier of the FPGA and few "
-        "clocks; auto is serial where that fits the tick.",
+        "Way in which products are computed. serial takes few cells and a clock for each bit, block a "
+        "multiplier of the FPGA and few clocks. auto is serial where that fits the tick.",
         choices=_MULTIPLIERS,
         tests=("", "block"),
     )
-    fine_bits: int = option(
+    position_fine_bits: int = option(
         6, "Fraction bits of position_fine, 1 to 16.", metavar="N", limits=(1, 16), tests=("", "1", "16")
     )
 
@@ -115,7 +115,7 @@ class TrackTachometer(TachometerSpec):
         forced="The tick held no count.",
         bounds=False,
         awaits_count=True,
-        stalls_with=UPDATE,
+        rests_with=UPDATE,
         usual={"max-time": _MAX_TIME},
     )
 
@@ -147,8 +147,8 @@ class TrackTachometer(TachometerSpec):
             max_time=self.timing.max_ticks * self.timing.tick_cycles,
             velocity_out=self.velocity.native_frac_bits,
             slope=Fraction(1, 2),
-            quality=self.timing.tick_cycles * self.velocity.lsb_per_count,
-            quality_bits=min(self.velocity.width - 1, RESULT_BITS),
+            velocity_std=self.timing.tick_cycles * self.velocity.lsb_per_count,
+            std_bits=min(self.velocity.width - 1, RESULT_BITS),
         )
 
     @cached_property
@@ -189,17 +189,17 @@ class TrackTachometer(TachometerSpec):
     def carrying(self) -> Carrying:
         """How `position_fine` is carried on to the pulses of a fine compare output."""
         native, cycles = self.velocity.native_frac_bits, self.timing.tick_cycles
-        bits = self.fine_bits + 1 + (2 * self.tick.longest).bit_length()
+        bits = self.position_fine_bits + 1 + (2 * self.tick.longest).bit_length()
         shift = max(0, bits - (native + cycles.bit_length() - 3))  # an LSB has to be that of four of the velocity
         ratio = Fraction(1 << bits, cycles << native + shift)
         per_clock = VelocityOutput(ratio, self.velocity.max << native + shift, bits + 2)
         latency = self.latency
         late = latency.pin_to_count + latency.tick + latency.datapath + per_clock.serial_latency + 3
-        return Carrying(per_clock, shift, self.fine_bits, bits - self.fine_bits, late)
+        return Carrying(per_clock, shift, self.position_fine_bits, bits - self.position_fine_bits, late)
 
     @cached_property
     def tracked(self) -> Tracked:
-        return Tracked(self.fine_bits, self.acceleration.counts_per_clock2, self.program.times == BLOCK)
+        return Tracked(self.position_fine_bits, self.acceleration.counts_per_clock2, self.program.times == BLOCK)
 
     @property
     def remembered(self) -> None:
@@ -225,7 +225,7 @@ class TrackTachometer(TachometerSpec):
             "unit": self.acceleration.unit,
             "rad_per_s2_per_lsb": self.acceleration.rad_per_s2_per_lsb,
         }
-        return {"acceleration": acceleration, "position_fine": {"frac_bits": self.fine_bits}}
+        return {"acceleration": acceleration, "position_fine": {"frac_bits": self.position_fine_bits}}
 
     def __post_init__(self) -> None:
         shortest, longest = self.timing.tick_cycles, MOST_MEMORY * self.timing.clock_hz
@@ -259,10 +259,12 @@ class TrackTachometer(TachometerSpec):
 
     def _check_fine(self) -> None:
         """Check that the place of an update is carried on before the next; ParameterError if it is not."""
-        if self.compare is None or not self.compare.fine:
+        if self.position_compare is None or not self.position_compare.fine:
             return
         if self.carrying.latency > self.times.shortest_tick:
-            raise ParameterError("compare", "must not be fine here: it takes a longer tick or a shorter --filter")
+            raise ParameterError(
+                "position_compare", "must not be fine here: it takes a longer tick or a shorter --filter"
+            )
 
     @property
     def method_ports(self) -> tuple[Port, ...]:
@@ -270,12 +272,12 @@ class TrackTachometer(TachometerSpec):
         unit = f"2^{-shown.frac_bits} {shown.unit}"
         text = "Acceleration; multiplied by rad_per_s2_per_lsb of the manifest it is in rad/s²."
         acceleration = held(UPDATE, "acceleration", shown.width, signed=True, unit=unit, help=text)
-        width, unit = self.position_width + self.fine_bits, f"2^{-self.fine_bits} counts"
+        width, unit = self.position_width + self.position_fine_bits, f"2^{-self.position_fine_bits} counts"
         text = "Position at the end of this period, between the counts as well; it wraps as position does."
         position = held(UPDATE, "position_fine", width, signed=True, unit=unit, help=text)
         unit = f"2^{-self.velocity.frac_bits} {self.unit}"
         text = "Standard deviation that the velocity is expected to have, by the noise that was seen."
-        return acceleration, position, held(UPDATE, "quality", self.form.quality_bits, unit=unit, help=text)
+        return acceleration, position, held(UPDATE, "velocity_std", self.form.std_bits, unit=unit, help=text)
 
 
 def in_loop(spec: TachometerSpec, velocity_gain: Fraction) -> TachometerSpec:

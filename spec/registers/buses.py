@@ -69,7 +69,7 @@ _ADDRESS = 0
 _FEWEST_BIT_CYCLES = 8
 _BAUD_TOLERANCE = 50  # 1 / 2 %
 DEFAULT_BAUD = 1_000_000
-CAPTURE = _into("capture", 1, "Registers capture the core in every clock in which it is high; of the clock's domain.")
+CAPTURE = _into("capture", 1, "While high, the registers take a snapshot in every clock. Synchronous to `clk`.")
 
 BUSES = {
     bus.name: bus
@@ -222,7 +222,7 @@ def manifest_on(registers: RegisterMap, bus: Bus, name: str = "tachometer") -> d
     """
     ports = bus.ports(registers)
     if name in {port.name for port in ports}:
-        raise ParameterError("name", f"must not be that of a port, which {name!r} is")
+        raise ParameterError("name", f"must not be the name of a port: {name!r}")
     described = manifest(registers.core, name)
     described["ports"] = [described_port(port) for port in (*registers.core_ports, *ports)]
     described |= {"bus": bus.name, **({"irq": True} if registers.irq else {}), "registers": registers.described()}

@@ -26,7 +26,7 @@ from tachometry.spec.registers.manifest import described_port
 from tachometry.spec.registers.map import RegisterMap
 
 ENCODER_LINES = ("a", "b", "z")
-DRIVE = "drive"  # the current of a loop, as a stream of bits
+DRIVE = "current_pdm"  # the current of a loop, as a stream of bits
 LEDS = 4
 PERIOD_WIDTH = 16  # bits of the telemetry's period
 
@@ -47,8 +47,8 @@ class DemoMap(RegisterMap):
     """
 
     def __post_init__(self) -> None:
-        if self.spec.compare is not None and self.spec.compare.depth:
-            raise ParameterError("compare", "must not be a list with a demo, which has no input for it")
+        if self.spec.position_compare is not None and self.spec.position_compare.depth:
+            raise ParameterError("position_compare", "must not be a list with a demo, which has no input for it")
         if not self.spec.encoder.plain:
             raise ParameterError("sensor", "must be quadrature with a demo, its lines as they come: it emulates these")
         refuse(self.spec.extras, "demo")
@@ -150,7 +150,7 @@ def demo_manifest(registers: DemoMap, bus: Bus, name: str = "tachometer") -> dic
     """
     ports = demo_ports(registers, bus)
     if name in {port.name for port in ports}:
-        raise ParameterError("name", f"must not be that of a port, which {name!r} is")
+        raise ParameterError("name", f"must not be the name of a port: {name!r}")
     return {**manifest_on(registers, bus, name), "ports": [described_port(port) for port in ports]}
 
 

@@ -70,7 +70,7 @@ def manifest(spec: AnySpec, name: str = "tachometer") -> dict[str, Any]:
     It raises ValueError if `name` cannot be the name of a module.
     """
     if name in {port.name for port in spec.ports}:
-        raise ParameterError("name", f"must not be that of a port, which {name!r} is")
+        raise ParameterError("name", f"must not be the name of a port: {name!r}")
     return {
         "module": check_module_name(name),
         **spec.entries,

@@ -5,7 +5,7 @@ by its sign or by zeros, or two of them if it is wider; ports of one bit are fla
 
 A capture takes all of these in one clock: the position and whatever else belongs to a tick is of the latest tick, the
 velocity and whatever belongs to an update is of the latest update, and the age says how many ticks came after what
-caused it. Only `swallowed_edges`, `over_speed`, `probed` and what a watch of the encoder shows are of the clock of the
+caused it. Only `filtered_edges`, `over_speed`, `probed` and what a watch of the encoder shows are of the clock of the
 capture.
 Reading the first captured register, VELOCITY, captures, and the others keep what was captured until the next capture.
 Before the first update the velocity is 0, and what else has a unit and belongs to an update is not defined.
@@ -106,7 +106,7 @@ class RegisterMap:
             return {}
         found = {"index": "An index was taken."} if self.spec.index else {}
         found["overflow"] = "A tick at more than the maximum speed: its pulse_count was saturated."
-        found["stall"] = "The shaft has come to rest: stalled rises."
+        found["stall"] = "The shaft has come to rest: standstill rises."
         late = ", or an external tick was missing or came too early" if self.spec.external_tick else ""
         found["error"] = f"Both lines changed at once{late}."
         for extra in self.spec.extras:
@@ -297,15 +297,25 @@ class RegisterMap:
 
     def _listing(self) -> Iterable[Draft]:
         """Return registers that fill the list of the compare output."""
-        if self.spec.compare is None or not self.spec.compare.depth:
+        if self.spec.position_compare is None or not self.spec.position_compare.depth:
             return
-        yield from self._position("COMPARE_NEXT", "Position for the list of compare.", "compare_next")
-        acts = {"append": "Writing 1 appends COMPARE_NEXT, if there is room.", "clear": "Writing 1 empties the list."}
+        yield from self._position(
+            "POSITION_COMPARE_NEXT", "Position for the list of the position compare.", "position_compare_next"
+        )
+        acts = {
+            "append": "Writing 1 appends POSITION_COMPARE_NEXT, if there is room.",
+            "clear": "Writing 1 empties the list.",
+        }
         fields = (
-            Field(name, 1, place, help, writable=True, single=True, port=f"compare_{name}")
+            Field(name, 1, place, help, writable=True, single=True, port=f"position_compare_{name}")
             for place, (name, help) in enumerate(acts.items())
         )
-        yield "COMPARE_LIST", "Changes the list of compare; COMPARE_WAITING says how long it is.", tuple(fields), {}
+        yield (
+            "POSITION_COMPARE_LIST",
+            "Changes the list of the position compare; POSITION_COMPARE_WAITING says how long it is.",
+            tuple(fields),
+            {},
+        )
 
     def _added(self) -> Iterable[Draft]:
         """Return what a design around the core adds."""

@@ -115,8 +115,8 @@ def test_shared_options_say_what_every_method_does(capsys: pytest.CaptureFixture
     for about in common_options():
         assert about.help in text
     assert "Method t and mt and rairan:" in text
-    assert "t, mt: While no count comes, " in text
-    assert " rairan: While no count comes, " in text
+    assert "t, mt: Let the velocity decay" in text
+    assert " rairan: Let the velocity decay" in text
     assert text.count("[default: bound-decay]") == 1
 
 

@@ -63,7 +63,7 @@ test_refusals = refused(
 def test_the_angle_is_that_of_the_motor_at_its_use(method: str, motion: str, rms: float, worst: float) -> None:
     """In electrical degrees, 1.5 ticks ahead, of a real disc; where the zero is was not known, so the mean is off."""
     words = {"lines": "1000", "clock": "48MHz", "tick": "100us", "max-speed": "6000rpm", "lead": "1.5tick"}
-    spec = of_texts(method, {**words, "electrical": "7", **({"fine-bits": "8"} if method == "track" else {})})
+    spec = of_texts(method, {**words, "electrical": "7", **({"position-fine-bits": "8"} if method == "track" else {})})
     disc = VirtualEncoder(1000, phase_error_deg=10, nonuniformity=0.1, jitter=0.05, seed=11)
     moved = parse_motion(motion)
     trace = disc.record(moved).recording.place(48_000_000).completed(spec)

@@ -24,15 +24,16 @@ CASES = (
     Case("s", f"{SLOW} preset=-7 index=yes health-edges=6 health-errors=9 filter=1", edges=60, clocks=20_000),
     Case(
         "m",
-        "ppr=8 tick=40us max-time=400us health=yes health-edges=900 health-errors=900 complements=3 index=yes filter=2",
+        "ppr=8 tick=40us max-time=400us health=yes health-edges=900 health-errors=900 differential=3 "
+        "index=yes filter=2",
         12,
     ),
     Case(
-        "m", "ppr=8 tick=40us max-time=400us health=yes health-edges=900 health-errors=900 complements=2 invert=a", 12
+        "m", "ppr=8 tick=40us max-time=400us health=yes health-edges=900 health-errors=900 differential=2 invert=a", 12
     ),
-    Case("m", "ppr=8 tick=40us max-time=400us health=yes health-edges=900 health-errors=900 complements=2", 12),
+    Case("m", "ppr=8 tick=40us max-time=400us health=yes health-edges=900 health-errors=900 differential=2", 12),
 )
-BUS = Case("m", "ppr=2 health=yes health-edges=3 health-errors=0 complements=3 index=yes index-at=edge", swings=True)
+BUS = Case("m", "ppr=2 health=yes health-edges=3 health-errors=0 differential=3 index=yes index-at=edge", swings=True)
 
 
 def rule(case: Case) -> None:
@@ -44,7 +45,7 @@ def rule(case: Case) -> None:
     a, b = case.level("a"), case.level("b")
     errors = {*run.errors.tolist()}
     index = dict(zip(run.index.clock.tolist(), run.index.index_position.tolist(), strict=True)) if spec.index else {}
-    opened = dict.fromkeys("ab" + "z" * bool(index), 0) if "complements" in texts else {}
+    opened = dict.fromkeys("ab" + "z" * bool(index), 0) if "differential" in texts else {}
     lines = {line: (case.level(line), case.level(f"{line}_n")) for line in opened}
     line, alone, counted, due = "", 0, 0, 0
     forward, was_forward, origin = True, True, None
@@ -69,7 +70,7 @@ def rule(case: Case) -> None:
             alone = counted = 0
         for name, (level, other) in lines.items():
             opened[name] = opened[name] + 1 if level[here] == other[here] else 0
-            if opened[name] == int(texts["complements"]) + 1:
+            if opened[name] == int(texts["differential"]) + 1:
                 found.add({"a": A_OPEN, "b": B_OPEN, "z": Z_OPEN}[name])
         if due:
             found.add(INDEX_COUNTS)
@@ -98,10 +99,10 @@ test_bus = on_a_bus(BUS)
 test_verilog = in_icarus(CASES[3])
 test_refusals = refused(
     {
-        "health=yes complements=1": "complements must be from 2us to 1.048576s at this clock, not 1us",
-        "health=yes complements=0": "complements must be from 2us to 1.048576s at this clock, not 0s",
-        "health=yes complements=soon": "complements must be",
-        "complements=1us": "complements must be given together with --health",
+        "health=yes differential=1": "differential must be from 2us to 1.048576s at this clock, not 1us",
+        "health=yes differential=0": "differential must be from 2us to 1.048576s at this clock, not 0s",
+        "health=yes complements=soon": "differential must be",
+        "differential=1us": "differential must be given together with --health",
         "health=no health-edges=9": "health_edges must be given together with --health",
         "health=yes sensor=hall": "health must be left out for hall",
         "health=yes health-edges=1": "health_edges must be from 2 to 65536, not 1",
@@ -110,5 +111,5 @@ test_refusals = refused(
 
 
 def test_an_encoder_without_complements_breaks_none() -> None:
-    with pytest.raises(ParameterError, match="must not be of a_n without --complements"):
+    with pytest.raises(ParameterError, match="must not be of a_n without --differential"):
         VirtualEncoder(8, broken=LineFault("a_n", 0.1))

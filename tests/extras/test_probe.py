@@ -18,7 +18,7 @@ CASES = (
     Case("track", "probe=2 tick=500clk max-time=2000clk preset=40 unit=rpm lowpass=100Hz", edges=10, clocks=20_000),
     Case("m", "probe=both,both filter=3clk max-speed=100rev/s position-width=8"),
 )
-BUS = Case("s", "probe=rising,falling,both compare=list:3:2clk position-width=8", edges=40)
+BUS = Case("s", "probe=rising,falling,both position-compare=list:3:2clk position-width=8", edges=40)
 _FORWARD = (0, 1, 3, 2)  # A is bit 0
 
 

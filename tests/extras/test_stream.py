@@ -25,7 +25,11 @@ from tachometry.spec.registers.demo import DemoMap
 
 FAST = "tick=40clk max-time=160clk max-speed=500rev/s"
 CASES = (
-    Case("s", f"{FAST} index=yes index-once=yes health=yes over-speed=200rev/s probe=1 compare=2:3:0:7clk stream=axi"),
+    Case(
+        "s",
+        f"{FAST} index=yes index-once=yes health=yes over-speed=200rev/s probe=1 "
+        "position-compare=2:3:0:7clk stream=axi",
+    ),
     Case("mt", f"{FAST} position-width=48 index=yes index-reset=yes stream=axi:edge:5"),
     Case("track", "tick=400clk max-time=1600clk stream=axi:tick:1", clocks=8000),
 )
@@ -35,12 +39,12 @@ DATA, VALID, LAST = "m_axis_tdata", "m_axis_tvalid", "m_axis_tlast"
 
 # Of each core the bytes of a record, as `struct` has them, their names, and the bits of `flags` from the lowest on.
 LAYOUTS = {
-    "s": ("<IIii", "time flags position velocity", "forced overflow stalled homed probed compare fault over_speed"),
-    "mt": ("<IIqi12x", "time flags position velocity", "forced overflow stalled out_of_range"),
+    "s": ("<IIii", "time flags position velocity", "forced overflow standstill homed probed compare fault over_speed"),
+    "mt": ("<IIqi12x", "time flags position velocity", "forced overflow standstill out_of_range"),
     "track": (
         "<IIqiii4x",
         "time flags position_fine position velocity acceleration",
-        "forced overflow stalled",
+        "forced overflow standstill",
     ),
 }
 

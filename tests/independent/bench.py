@@ -15,7 +15,15 @@ from reference.front import Play, wrapped
 Manifest = dict[str, Any]
 Row = dict[str, int]  # outputs by name, and "clock"
 PINS = ("a", "b", "z", "tick_in")
-_STROBES = ("velocity_valid", "tick", "decode_error", "index_valid", "index_missed", "tick_error", "compare_valid")
+_STROBES = (
+    "velocity_valid",
+    "tick",
+    "decode_error",
+    "index_valid",
+    "index_missed",
+    "tick_error",
+    "position_compare_valid",
+)
 
 # The core, and a line of text for every clock with a strobe.
 _SHELL = """

@@ -49,7 +49,7 @@ def _case(
 
 
 _PORTS = "decoding=2 unit=rpm index=yes index-reset=yes position-width=8 filter=3 age=yes"
-_PORTS += " health=yes health-edges=3 health-errors=1 over-speed=20rpm compare=-1:2:9:7clk:backward"
+_PORTS += " health=yes health-edges=3 health-errors=1 over-speed=20rpm position-compare=-1:2:9:7clk:backward"
 _ALL = f"{_PORTS} bounds=yes"
 
 CASES = [
@@ -68,7 +68,8 @@ CASES = [
     _case("m_native", "tick=50 max-time=500 velocity-width=16 max-speed=50rev/s bounds=yes edge-error=1 average=8"),
     _case(
         "m_rpm",
-        f"tick=21 max-time=420 max-speed=40rad/s average=3 velocity-width=12 lsb=2^-2 {_ALL} compare=-1:2:9:7clk:both",
+        f"tick=21 max-time=420 max-speed=40rad/s average=3 velocity-width=12 lsb=2^-2 {_ALL} "
+        "position-compare=-1:2:9:7clk:both",
         4000,
         least=4,
     ),
@@ -123,21 +124,21 @@ CASES = [
     _case(
         "track_rpm",
         "tick=1200 max-time=7200 max-speed=100rpm velocity-width=14 lsb=2^-4 max-memory=96000 multiplier=serial "
-        f"fine-bits=4 {_PORTS}",
+        f"position-fine-bits=4 {_PORTS}",
         60_000,
         4,
         seed="track_rpm2",  # with more counts in a tick than may be
     ),
     _case(
         "track_rad",
-        "tick=1100 max-time=11000 decoding=1 unit=rad/s lowpass=100rad/s external-tick=yes fine-bits=1 lsb=2^-8 "
-        "multiplier=block",
+        "tick=1100 max-time=11000 decoding=1 unit=rad/s lowpass=100rad/s external-tick=yes position-fine-bits=1 "
+        "lsb=2^-8 multiplier=block",
         120_000,
     ),
     _case(
         "track_rev",
         "tick=1500 max-time=6000 unit=rev/s lsb=2^-10 velocity-width=12 external-tick=yes max-tick-period=2000 "
-        "fine-bits=16",
+        "position-fine-bits=16",
         120_000,
         seed="track_rev1",  # with a speed that does not fit, and a rest
     ),

@@ -30,7 +30,7 @@ _SHARED = {
     "bounds": "bounds",
     "edge_error": "edge-error",
     "lowpass": "lowpass",
-    "compare": "compare",
+    "position_compare": "position-compare",
     "over_speed": "over-speed",
     "health": "health",
     "health_edges": "health-edges",
@@ -38,7 +38,7 @@ _SHARED = {
 }
 _TIMED = {"timer": "timer", "bound_decay": "bound-decay", "paper_exact": "paper-exact"}
 _RAIRAN = {"estimate": "estimate", "paper_exact": "paper-exact", "bound_decay": "bound-decay", "adaptive": "adaptive"}
-_TRACK = {"max_memory": "max-memory", "multiplier": "multiplier", "fine_bits": "fine-bits"}
+_TRACK = {"max_memory": "max-memory", "multiplier": "multiplier", "position_fine_bits": "position-fine-bits"}
 WORDS = {
     "s": {**_SHARED, "cancel": "cancel", "reciprocal_source": "reciprocal"},
     "m": {**_SHARED, "average": "average"},
@@ -48,7 +48,7 @@ WORDS = {
     "track": {**_SHARED, **_TRACK},
 }
 # Named only where they are asked for.
-_TACIT = ("health", "health_edges", "health_errors", "over_speed", "compare")
+_TACIT = ("health", "health_edges", "health_errors", "over_speed", "position_compare")
 _FLAGS = ("index", "index-reset", "age", "bounds", "paper-exact", "whole-cycles", "health")
 # Entries of the acceleration, and its unit for that of the velocity.
 ACCELERATION = ("width", "frac_bits", "unit", "rad_per_s2_per_lsb")
@@ -78,9 +78,9 @@ def parameter(settings: Settings, name: str, shown: object) -> object:
         "edge_error": float(settings.edge_error),
         "max_memory": settings.max_memory,
         "multiplier": settings.words.get("multiplier", "auto"),
-        "fine_bits": settings.fine_bits,
+        "position_fine_bits": settings.position_fine_bits,
         "position_width": settings.position_bits,
-        "compare": settings.words.get("compare"),
+        "position_compare": settings.words.get("position-compare"),
         "over_speed": settings.words.get("over-speed"),
         "health_edges": int(settings.words.get("health-edges", "256")),
         "health_errors": int(settings.words.get("health-errors", "10")),
@@ -261,7 +261,7 @@ class Expected:
             "clock_hz": lambda: settings.clock_hz,
             "tick_cycles": lambda: settings.tick,
             "max_ticks": lambda: settings.max_ticks,
-            "stalled_after_ticks": lambda: settings.max_ticks + (settings.method != "track"),
+            "standstill_after_ticks": lambda: settings.max_ticks + (settings.method != "track"),
             "counts_per_rev": lambda: settings.counts_per_turn,
             "decoding": lambda: settings.decoding,
             "velocity.width": lambda: next(p["width"] for p in manifest["ports"] if p["name"] == "velocity"),
@@ -277,7 +277,7 @@ class Expected:
             "acceleration.frac_bits": lambda: manifest["acceleration"]["frac_bits"],
             "acceleration.unit": lambda: ACCELERATIONS[settings.unit],
             "acceleration.rad_per_s2_per_lsb": lambda: pytest.approx(self.acceleration_lsb, rel=1e-13),
-            "position_fine.frac_bits": lambda: settings.fine_bits,
+            "position_fine.frac_bits": lambda: settings.position_fine_bits,
             "bounds.none": self.none,
             "interval_unit_cycles": lambda: settings.period if settings.method in ("t", "mt") else settings.tick,
             "latency_cycles.pin_to_count": lambda: 2 + settings.filter,
@@ -286,7 +286,7 @@ class Expected:
             "latency_cycles.tick_to_velocity": lambda: self.to_velocity,
             "latency_cycles.tick_in_to_window_end": lambda: 2,
             # Measured: every pulse is compared at its clock.
-            "latency_cycles.pin_to_compare": lambda: manifest["latency_cycles"]["pin_to_compare"],
+            "latency_cycles.pin_to_position_compare": lambda: manifest["latency_cycles"]["pin_to_position_compare"],
             "recovery_cycles": self.recovery,
             # Measured: external ticks that are as close as this, and a clock closer.
             "external_tick_cycles.min": lambda: external["min"] if 2 <= external["min"] <= settings.tick else None,
@@ -308,7 +308,7 @@ class Expected:
             "min_time_cycles": settings.method == "mt",
             "recovery_cycles": self.forgets,
             **dict.fromkeys((f"acceleration.{name}" for name in ACCELERATION), settings.method == "track"),
-            "latency_cycles.pin_to_compare": "compare" in settings.words,
+            "latency_cycles.pin_to_position_compare": "position-compare" in settings.words,
             "position_fine.frac_bits": settings.method == "track",
             **dict.fromkeys(
                 ("latency_cycles.tick_in_to_window_end", "external_tick_cycles.min", "external_tick_cycles.max"),
@@ -374,22 +374,26 @@ def check_ports(expected: Expected, ports: list[dict[str, Any]]) -> None:
         **(
             {
                 "acceleration": expected.acceleration_bits,
-                "position_fine": settings.position_bits + settings.fine_bits,
-                "quality": max(int(expected.manifest["velocity"]["width"]) - 1, 1),
+                "position_fine": settings.position_bits + settings.position_fine_bits,
+                "velocity_std": max(int(expected.manifest["velocity"]["width"]) - 1, 1),
             }
             if settings.method == "track"
             else {}
         ),
         **({"index_position": settings.position_bits} if settings.flag("index") else {}),
-        **({"compare_position": settings.position_bits, "compare_count": 16} if "compare" in settings.words else {}),
+        **(
+            {"position_compare_position": settings.position_bits, "position_compare_count": 16}
+            if "position-compare" in settings.words
+            else {}
+        ),
         **({"health": 4, "faults": 8} if settings.flag("health") else {}),
         **({"index_error": settings.position_bits} if settings.flag("health") and settings.flag("index") else {}),
-        **({"swallowed_edges": 16} if settings.filter else {}),
+        **({"filtered_edges": 16} if settings.filter else {}),
     }
-    single = ["velocity_valid", "forced", "tick", "decode_error", "overflow", "stalled"]
+    single = ["velocity_valid", "forced", "tick", "decode_error", "overflow", "standstill"]
     single += ["velocity_overflow"] * (not own) + ["bounds_valid"] * settings.flag("bounds")
     single += ["out_of_range"] * beyond + ["index_valid", "index_missed", "index_wide"] * settings.flag("index")
-    single += ["compare", "compare_valid"] * ("compare" in settings.words)
+    single += ["position_compare", "position_compare_valid"] * ("position-compare" in settings.words)
     single += ["over_speed"] * ("over-speed" in settings.words)
     single += ["fault"] * settings.flag("health") + ["tick_error"] * settings.external
     inputs = ["clk", "rst", "a", "b"] + ["z"] * settings.flag("index") + ["tick_in"] * settings.external
@@ -400,14 +404,14 @@ def check_ports(expected: Expected, ports: list[dict[str, Any]]) -> None:
     unsigned = (
         "interval",
         "age",
-        "quality",
+        "velocity_std",
         "n_ep1",
         "n_dt1",
         "dt_shift",
-        "swallowed_edges",
+        "filtered_edges",
         "health",
         "faults",
-        "compare_count",
+        "position_compare_count",
     )
     for name, port in found.items():
         assert set(port) == {"name", "direction", "width", "signed"}

@@ -59,7 +59,7 @@ def check_updates(
     ticks: Sequence[Tick],
     slack: Fraction = Fraction(0),
 ) -> set[str]:
-    """Return every update, its clock and all that comes with it, but `stalled`; which bounds have been absent."""
+    """Return every update, its clock and all that comes with it, but `standstill`; which bounds have been absent."""
     latency = manifest["latency_cycles"]
     late = latency["tick_latency"] + latency["tick_to_velocity"]
     assert [update.cause + late for update in updates[: len(rows)]] == [row["clock"] for row in rows]

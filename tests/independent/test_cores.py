@@ -86,7 +86,7 @@ def model(case: Case, manifest: Manifest, front: Front) -> tuple[list[Update], l
 def check_front(
     case: Case, manifest: Manifest, front: Front, ticks: list[Tick], rows: list[Row], wrong: list[int]
 ) -> None:
-    """Ticks, pulse numbers, positions, index, errors and swallowed edges."""
+    """Ticks, pulse numbers, positions, index, errors and filtered edges."""
     settings, late, n = case.settings, manifest["latency_cycles"]["tick_latency"], front.n_clocks
     seen = [row for row in rows if row["tick"]]
     first = ticks[0].last
@@ -106,23 +106,25 @@ def check_front(
     if settings.external:
         assert [row["clock"] - late for row in rows if row["tick_error"]] == [at for at in wrong if at + late < n]
         assert wrong
-    if "compare" in settings.words:
-        spare = manifest["latency_cycles"]["pin_to_compare"] - manifest["latency_cycles"]["pin_to_count"]
+    if "position-compare" in settings.words:
+        spare = manifest["latency_cycles"]["pin_to_position_compare"] - manifest["latency_cycles"]["pin_to_count"]
         wanted = compared(settings, front)
-        assert [(row["clock"] - spare, row["compare_position"]) for row in rows if row["compare_valid"]] == wanted
+        assert [
+            (row["clock"] - spare, row["position_compare_position"]) for row in rows if row["position_compare_valid"]
+        ] == wanted
         assert wanted or settings.method in ("mt", "track")  # whose motions do not come there
         for row in seen:
             before = [at + spare for at, _ in wanted if at + spare <= row["clock"]]
-            assert row["compare_count"] == len(before)
-            assert row["compare"] == (bool(before) and row["clock"] - before[-1] < 7)
+            assert row["position_compare_count"] == len(before)
+            assert row["position_compare"] == (bool(before) and row["clock"] - before[-1] < 7)
     if settings.flag("health"):
         check_health(faults(settings, front, late), seen)
     if settings.filter:
         glitches = sorted(front.glitches)
         for row in seen:
             gone = [bisect_right(glitches, row["clock"] - spare) for spare in (2, 4)]
-            assert 2 * gone[1] <= row["swallowed_edges"] <= 2 * gone[0]
-        assert seen[-1]["swallowed_edges"] == 2 * len(front.glitches) > 0
+            assert 2 * gone[1] <= row["filtered_edges"] <= 2 * gone[0]
+        assert seen[-1]["filtered_edges"] == 2 * len(front.glitches) > 0
 
 
 def check_health(found: list[tuple[int, int, int]], seen: list[Row]) -> None:

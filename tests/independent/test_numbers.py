@@ -70,18 +70,20 @@ def test_swallowed_edges_stay_at_65534(golden: Found) -> None:
     """Two for each of 33,000 glitches, ten of which are in a tick."""
     clocks = [0, *(10 * k + at for k in range(1, 33_001) for at in (0, 1))]
     level = [nth % 2 for nth in range(len(clocks))]
-    found = golden(BASE | {"filter": "3"}, clocks, 330_100, a=level, b=0)["tick"].swallowed_edges.tolist()
+    found = golden(BASE | {"filter": "3"}, clocks, 330_100, a=level, b=0)["tick"].filtered_edges.tolist()
     assert (found[0], found[1000], found[-1]) == (18, 20_018, 65_534)
 
 
 @pytest.mark.parametrize(("sign", "glitches"), [(1, "0"), (-1, "5clk")])
 def test_a_fine_pulse_begins_when_the_shaft_is_there(golden: Found, sign: int, glitches: str) -> None:
     """In the first clock, of the pins, in which it is: the edge to position 1 lies at 1/2."""
-    words = {"method": "track", "clock": "20MHz", "tick": "50us", "max-time": "100ms", "fine-bits": "16"}
-    words["compare"] = "3.5:7.3125:0:1clk:fine" if sign > 0 else "-3.5:7.3125:0:1clk:backward:fine"
+    words = {"method": "track", "clock": "20MHz", "tick": "50us", "max-time": "100ms", "position-fine-bits": "16"}
+    words["position-compare"] = "3.5:7.3125:0:1clk:fine" if sign > 0 else "-3.5:7.3125:0:1clk:backward:fine"
     clocks = range(0, 37 * 40_000 + 1, 37)
-    pulses = golden(BASE | words | {"filter": glitches}, clocks, clocks[-1], **turned([sign] * 40_000))["compare_valid"]
-    late = (pulses.clock - 37 * (sign * pulses.compare_position / 2**16 + 1 / 2))[3000:]
+    pulses = golden(BASE | words | {"filter": glitches}, clocks, clocks[-1], **turned([sign] * 40_000))[
+        "position_compare_valid"
+    ]
+    late = (pulses.clock - 37 * (sign * pulses.position_compare_position / 2**16 + 1 / 2))[3000:]
     assert (abs(late - 1 / 2) < 0.6).all()
     assert late.mean() == pytest.approx(1 / 2, abs=0.1)
 
@@ -120,7 +122,7 @@ LOOP = {
     "loop_multiplier": "serial", "command": "ports", "gains": "fixed",
 }  # fmt: skip
 TIMED = {"timer": "clock", "bound_decay": True, "paper_exact": False}
-TRACK = {"max_ticks": 5000, "frac_bits": 24, "max_memory": None, "multiplier": "auto", "fine_bits": 6}
+TRACK = {"max_ticks": 5000, "frac_bits": 24, "max_memory": None, "multiplier": "auto", "position_fine_bits": 6}
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ ENDS: dict[str, set[object]] = {
     "position_bits": {8, 48},
     "average": {1, 256},
     "decoding": {1, 2, 4},
-    "fine_bits": {1, 16},
+    "position_fine_bits": {1, 16},
 }
 
 

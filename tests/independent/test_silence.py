@@ -30,7 +30,7 @@ def test_core_and_its_silences(case: Case, generated: Generated) -> None:
 
 
 def check_silence_and_dithering(settings: Settings, rows_of: Callable[[Lines], list[Row]]) -> None:
-    """`stalled` rises after the maximum time and falls with a count; dithering on one edge reads 0."""
+    """`standstill` rises after the maximum time and falls with a count; dithering on one edge reads 0."""
     tick, more = settings.tick, settings.tick // TICK
     assert (tick, settings.max_ticks) == (TICK * more, MOST)
     first, single, last, dithers = 16 * tick + 7, 50 * tick + 9, 66 * tick + 5, 110 * tick + 3
@@ -49,9 +49,9 @@ def check_silence_and_dithering(settings: Settings, rows_of: Callable[[Lines], l
         if not row["velocity_valid" if tracks else "tick"] or row["clock"] > dithers:
             continue
         empty = 0 if row["pulse_count"] else empty + 1
-        assert row["stalled"] == (empty > MOST - tracks), row
-        assert not (tracks and row["stalled"] and row["velocity"]) or settings.lowpass, row
-        seen[row["stalled"]] += 1
+        assert row["standstill"] == (empty > MOST - tracks), row
+        assert not (tracks and row["standstill"] and row["velocity"]) or settings.lowpass, row
+        seen[row["standstill"]] += 1
     assert min(seen.values()) > 8
     after = [row["velocity"] for row in rows if row["velocity_valid"] and row["clock"] > dithers]
     # Of two counts in a tick tracking knows the mean place to 0.2 %.

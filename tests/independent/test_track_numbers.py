@@ -50,7 +50,7 @@ def test_a_silence_of_the_maximum_time_is_a_rest_and_one_of_100_ms_is_forgotten(
         TICK * nth - 1 - 2 - edges[-1] for nth in range(1, len(updates) + 1)
     ]  # two clocks from a pin to its count
     assert (updates.velocity == 0).tolist()[300:] == [20 * clocks >= CLOCK for clocks in silence[300:]]
-    assert (updates.quality == 0).tolist()[300:] == [10 * clocks >= CLOCK for clocks in silence[300:]]
+    assert (updates.velocity_std == 0).tolist()[300:] == [10 * clocks >= CLOCK for clocks in silence[300:]]
 
 
 def beside(golden: Found, described: Found, edges: list[int], memory: int) -> list[tuple[float, ...]]:
@@ -62,7 +62,7 @@ def beside(golden: Found, described: Found, edges: list[int], memory: int) -> li
         counted = edge + latency["pin_to_count"]
         counts[min(counted // TICK, len(updates))].append((counted, 1))
     model, rows = Tracker(memory, CLOCK // 10, CLOCK // 10, sum(latency.values())), []
-    for nth, row in enumerate(zip(updates.velocity.tolist(), updates.quality.tolist(), strict=True)):
+    for nth, row in enumerate(zip(updates.velocity.tolist(), updates.velocity_std.tolist(), strict=True)):
         velocity = model.tick((nth + 1) * TICK - 1, counts[nth])
         deviation = math.sqrt(max(model.expected, 9 / 14 * model.lag**2)) / model.memory if model.phase == 2 else 0
         rows.append((*(value / 2**24 for value in row), velocity * TICK, deviation * TICK))
@@ -93,10 +93,10 @@ def test_quality_is_that_of_the_order(golden: Found, described: Found, events: i
 def test_quality_is_that_of_the_least_noise_and_of_lost_counts(golden: Found) -> None:
     """An ideal disc has a noise of 2^-10; X·L is 1/8 after counts were lost, for 1/32, and is halved in 820 events."""
     edges = [1056 * k for k in range(1, 5000) if not 2000 <= k < 2004]
-    quality = shown(golden, {"max-memory": f"{32 * 1056}clk"}, edges, edges[-1]).quality / 2**24
+    velocity_std = shown(golden, {"max-memory": f"{32 * 1056}clk"}, edges, edges[-1]).velocity_std / 2**24
     for events, more in ((-20, 1), (410, 4 * 2**-0.5), (820, 2), (1230, 2**0.5), (1700, 1)):
         wanted = 12 * 2**-10 * math.sqrt(more / 32) / 35.2
-        assert quality[round(1.1 * (2004 + events))] == pytest.approx(wanted, rel=0.01), events
+        assert velocity_std[round(1.1 * (2004 + events))] == pytest.approx(wanted, rel=0.01), events
 
 
 @pytest.mark.parametrize("ticks", [slice(60, 120), slice(1100, 2400)])

@@ -107,8 +107,8 @@ class Motion:
 
 def check_steady(motion: Motion, part: int, per_lsb: float) -> None:
     """All is right to an LSB; there is hardly an acceleration."""
-    settings, gap, one = motion.settings, motion.gap(part), 1 << motion.settings.fine_bits
-    bits = settings.position_bits + settings.fine_bits
+    settings, gap, one = motion.settings, motion.gap(part), 1 << motion.settings.position_fine_bits
+    bits = settings.position_bits + settings.position_fine_bits
     for row in motion.settled(part):
         check_velocity(settings, Fraction(settings.tick, gap), row, Fraction(1, 4))
         assert abs(row["acceleration"] * per_lsb) < motion.real_acceleration / 500, row

@@ -29,7 +29,7 @@ def check_tracking(
     late = latency["tick_latency"] + latency["tick_to_velocity"]
     assert [update.cause + late for update in updates] == [row["clock"] for row in rows]
     seen = {"rests": 0, "waits": 0}
-    one, bits = 1 << settings.fine_bits, settings.position_bits + settings.fine_bits
+    one, bits = 1 << settings.position_fine_bits, settings.position_bits + settings.position_fine_bits
     last = -settings.max_ticks * settings.tick
     for tick, update, row in zip(ticks, updates, rows, strict=False):
         assert row["interval"] == update.interval, (update, row)

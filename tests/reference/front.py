@@ -231,7 +231,7 @@ def _turns(settings: Settings, front: Front, late: int) -> list[tuple[int, int, 
 
 def compared(settings: Settings, front: Front) -> list[tuple[int, int]]:
     """Return clocks of steps that lead to the awaited positions, and these."""
-    start, step, count, _, *direction = settings.words["compare"].split(":")
+    start, step, count, _, *direction = settings.words["position-compare"].split(":")
     sign, both = -1 if direction == ["backward"] else 1, direction == ["both"]
     found: list[tuple[int, int]] = []
     number, position, rises = 0, 0, set(front.index)

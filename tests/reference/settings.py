@@ -209,9 +209,9 @@ class Settings:
         return self._whole("max-memory", 0) or None
 
     @cached_property
-    def fine_bits(self) -> int:
+    def position_fine_bits(self) -> int:
         """Fraction bits of `position_fine`."""
-        return self._whole("fine-bits", 6)
+        return self._whole("position-fine-bits", 6)
 
     @cached_property
     def average(self) -> int:

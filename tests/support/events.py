@@ -20,8 +20,8 @@ ILLEGAL = [f"{STATES[k]}->{STATES[(k + 2) % 4]}" for k in range(4)]
 COMMON = [
     "m_e saturated",
     "sign change",
-    "stalled",
-    "count after stalled",
+    "standstill",
+    "count after standstill",
     "position wrapped",
     "glitch swallowed",
     "index captured",
@@ -194,15 +194,15 @@ def covered_by_timed(spec: TimedTachometer, run: Run) -> dict[str, int]:
 
 def covered(spec: TachometerSpec, trace: PinTrace, run: Run) -> Counter[str]:
     """Return how often each event of the coverage table happened."""
-    updates, stalled = run.updates, run.tables[spec.facts.stalls_with].stalled
+    updates, standstill = run.updates, run.tables[spec.facts.rests_with].standstill
     sign = np.sign(updates.velocity)
     found = Counter(
         covered_by_method(spec, run)
         | {
             "m_e saturated": _count(run.ticks.overflow),
             "sign change": _count(np.diff(sign[sign != 0])),
-            "stalled": _count(stalled),
-            "count after stalled": _count(np.diff(stalled.astype(np.int64)) < 0),
+            "standstill": _count(standstill),
+            "count after standstill": _count(np.diff(standstill.astype(np.int64)) < 0),
             "index captured": len(run.index.clock),
             "position reset": len(run.index.clock) * spec.front_end.index_resets,
             "external tick": len(run.ticks.clock) * spec.external_tick,
@@ -215,7 +215,7 @@ def covered(spec: TachometerSpec, trace: PinTrace, run: Run) -> Counter[str]:
             "bounds": _count(updates.get("bounds_valid")),
             "aged": _count(run.ticks.get("age")),
             "update in every clock": _count(np.diff(updates.clock) == 1),
-            "glitch swallowed": int(run.ticks.get("swallowed_edges")[-1]) // 2,
+            "glitch swallowed": int(run.ticks.get("filtered_edges")[-1]) // 2,
             "position wrapped": _count(np.abs(np.diff(run.ticks.position)) >> (spec.position_width - 1)),
         }
     )

@@ -143,7 +143,7 @@ def watched(spec: TachometerSpec, rng: np.random.Generator) -> TachometerSpec:
     compare = Compare(int(rng.integers(-3, 4)), int(rng.integers(3, 6)), int(rng.choice([0, 3, 25])), "2clk")
     compare = replace(compare, direction=str(rng.choice(DIRECTIONS)))
     limit = Speed(Fraction(str(round(spec.velocity.greatest_speed * rng.uniform(0.02, 0.5), 3) or 0.001)))
-    return replace(spec, extras=(Health(edges=edges, errors=errors), OverSpeed(limit=limit)), compare=compare)
+    return replace(spec, extras=(Health(edges=edges, errors=errors), OverSpeed(limit=limit)), position_compare=compare)
 
 
 def filter_of(method: str, clocks: int, tick_cycles: int) -> int:
@@ -161,7 +161,7 @@ def random_options(method: str, rng: np.random.Generator) -> dict[str, Any]:
         return {
             "max_memory": None if rng.random() < 0.7 else int(10 ** rng.uniform(3.1, 6)),
             "multiplier": str(rng.choice(["serial", "block", "auto"])),
-            "fine_bits": int(rng.choice([1, 8, 16])),
+            "position_fine_bits": int(rng.choice([1, 8, 16])),
         }
     if method == "rairan":
         return {
@@ -240,7 +240,7 @@ def _lost_counts(spec: TachometerSpec, encoding: Encoding, trace: PinTrace, run:
 
     Jitter makes an edge come early or late, but never twice or not at all.
     """
-    if len(run.errors) or run.ticks.get("swallowed_edges")[-1] or spec.front_end.index_resets:
+    if len(run.errors) or run.ticks.get("filtered_edges")[-1] or spec.front_end.index_resets:
         return []
     sampled = (run.ticks.clock - spec.latency.tick - spec.latency.pin_to_count) / CLOCK_HZ
     turned = encoding.true_position(sampled, spec.encoder.decoding) - _before_known(spec, trace)

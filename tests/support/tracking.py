@@ -56,7 +56,7 @@ class Interpreter:
         unit, code = self._unit, self.program.code.instructions
         unit._chance = 1 << CHANCE_BITS - 1
         place, sum_, sign, result, by = self.program.code.labels["tick" if self.met else "reset"], 0, 1, 0, 1
-        shown = {"stalled": 0}
+        shown = {"standstill": 0}
 
         def name(word: str) -> str:
             return (f"o{chosen[word]}" if chosen[word] >= 0 else "zero") if word in chosen else word
@@ -89,7 +89,7 @@ class Interpreter:
             if one.store:
                 self.words[name(one.store)] = sum_
             if one.output:
-                shown[one.output] = int(sum_ >= 0) if one.output == "stalled" else sum_
+                shown[one.output] = int(sum_ >= 0) if one.output == "standstill" else sum_
             match one.start:
                 case Start.LOG:
                     result = log2(sum_)

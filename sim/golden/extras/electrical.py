@@ -126,7 +126,7 @@ def _phases(extra: ElectricalAngle, view: View, counts: _Counts) -> Phases | Cou
         latest = np.searchsorted(updates.clock, begun + 1, side="right") - 1
         return CountedPhases.of(kind, counts.moves(), (begun, updates["velocity"][latest], lead))
     ticks, cause = view.tables["tick"], updates["cause"]
-    bits = kind.tracked.fine_bits
+    bits = kind.tracked.position_fine_bits
     half = 1 << bits + PLACE_BITS - 1
     place = ticks["position"][np.searchsorted(ticks.clock, cause)] << bits
     fine = (updates["position_fine"] - place + half) % (2 * half) - half

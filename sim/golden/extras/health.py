@@ -63,7 +63,7 @@ def _open(spec: TachometerSpec, health: Health, trace: PinTrace, clears: Ints) -
         lasts = np.searchsorted(begin, clears, side="right") > np.searchsorted(end, clears + 1, side="right")
         start = np.sort(np.append(begin, clears[lasts] + 1))
         until = np.minimum(end[np.searchsorted(end, start, side="right")], np.append(start[1:], 1 << 62))
-        late = start + (health.complements or 0)
+        late = start + (health.differential or 0)
         found.append(late[late < until])
         codes.append(np.full_like(found[-1], int(OPEN[name])))
     return np.concatenate(found), np.concatenate(codes)

@@ -91,7 +91,7 @@ class Events:
     high: Bools
     sign: Ints
     forced: Bools
-    stalled: Bools
+    standstill: Bools
     n_ep1: Ints
     n_dt1: Ints
     shift: Ints
@@ -136,7 +136,7 @@ class Model:
             "velocity": self._velocity(events),
             "interval": np.where(events.high | (events.n == 0), 1, events.n) << events.shift,
             "forced": events.forced,
-            "rests": events.stalled,
+            "rests": events.standstill,
             "n_ep1": events.n_ep1,
             "n_dt1": events.n_dt1,
             "dt_shift": events.shift,
@@ -241,8 +241,8 @@ class Model:
         shift = shift[order]
         n_ep1 = np.where(high, n, np.minimum(n, 1))
         n_dt1 = np.where(high | (n == 0), 1, n)
-        stalled, valid = forced & (n == 0), n > 0
-        return Events(clock, n, high, sign, forced, stalled, n_ep1, n_dt1, shift, loose, unsynced, valid)
+        standstill, valid = forced & (n == 0), n > 0
+        return Events(clock, n, high, sign, forced, standstill, n_ep1, n_dt1, shift, loose, unsynced, valid)
 
     def _to_the_letter(self, found: Windows) -> Events:
         clock, value, is_nep, happens, sign = self._alternating(found)

@@ -13,8 +13,8 @@ struct Recursion : Tables {
   int64_t phase = 0, turn = 0, noises, p = 0, v = 0, a = 0, shown_v = 0, shown_a = 0, memory = 0, log_memory = 0;
   int64_t slow_until = 0, since = 0, quiet = 0, noise, sure, alarm, error = 0, mean = 0, lag = 0, edge = 0, slips = 0;
   int64_t certain, slack = 0, lost = 0;
-  bool stalled = false;
-  int64_t log_share, offsets[4] = {0, 0, 0, 0}, grows = 1, log_growth = 0, log_limit, trouble = 0, chance, moved = 0, quality = 0;
+  bool standstill = false;
+  int64_t log_share, offsets[4] = {0, 0, 0, 0}, grows = 1, log_growth = 0, log_limit, trouble = 0, chance, moved = 0, velocity_std = 0;
   int64_t *row = nullptr;
 
   Recursion(const Constants &k, const Tables &tables) : Tables(tables), k(k) {
@@ -60,10 +60,10 @@ struct Recursion : Tables {
     row[0] = std::max(-k.most_shown, std::min(shown, k.most_shown));
     row[1] = place;
     int64_t more = std::max<int64_t>(trouble + k.log_9_4, 0) + k.log_8;
-    int64_t deviation = power(round(std::max(more + log_share, slips) + log_limit, 1) + quality - log_memory, 1);
-    row[2] = std::min(std::max(deviation, least), k.most_quality);
+    int64_t deviation = power(round(std::max(more + log_share, slips) + log_limit, 1) + velocity_std - log_memory, 1);
+    row[2] = std::min(std::max(deviation, least), k.most_std);
     row[3] = product(shown_a, k.slope, k.acceleration);
-    row[4] = stalled;
+    row[4] = standstill;
   }
 
   void tick(int64_t number, int64_t times, int64_t places, int64_t last, int64_t moved_, int kind, bool down, int end, int64_t length) {
@@ -72,7 +72,7 @@ struct Recursion : Tables {
     since = std::min(since + (length << t), k.most_since);
     quiet = std::min(quiet + (length << t), k.most);
     moved = moved_ * k.count;
-    stalled = !number && quiet >= k.max_time;
+    standstill = !number && quiet >= k.max_time;
     if (!number) return silence(end);
     quiet = last << t;
     event(number, times << t, places, kind, down);
@@ -138,9 +138,9 @@ struct Recursion : Tables {
     error = e;
     bool is_long = x + k.log_256 < 0;
     int64_t log_at = log2(a) + log_memory;
-    shown_v = v, shown_a = a, quality = k.of_curve;
+    shown_v = v, shown_a = a, velocity_std = k.of_curve;
     if (x + k.log_64 < 0 && 2 * (log_at + log_memory) - x - log_limit - (is_long ? k.log_9_4 : 0) < 0)
-      shown_v -= power(log_at - k.of_slope, sign_of(a)), shown_a = 0, quality = k.of_straight;
+      shown_v -= power(log_at - k.of_slope, sign_of(a)), shown_a = 0, velocity_std = k.of_straight;
     emit(ahead(), place());
     // What is learned.
     if (slips > 0 && !sudden) lost = 4 * k.count;
@@ -184,7 +184,7 @@ struct Recursion : Tables {
     v = shown_v = power(log2(e) + k.of_velocity - log_dt, sign_of(e));
     p = at - moved, edge = raw - moved;
     since = tau, log_memory = n > 1 ? log_dt - k.log_64 - k.log_half : log_dt, memory = n > 1 ? power(log_memory, 1) : dt, log_share = k.log_quarter;
-    a = shown_a = mean = lag = error = slow_until = 0, quality = k.of_curve;
+    a = shown_a = mean = lag = error = slow_until = 0, velocity_std = k.of_curve;
     emit(ahead(), place());
     ready();
   }
@@ -203,11 +203,11 @@ struct Recursion : Tables {
       velocity = sign * std::min(sign * velocity, power(bound, 1));
       least = power(bound + k.of_bound, 1);
     }
-    if (stalled) velocity = shown_a = 0;
+    if (standstill) velocity = shown_a = 0;
     emit(velocity, z, least);
   }
   void nothing() {
-    shown_a = 0, quality = k.none;
+    shown_a = 0, velocity_std = k.none;
     emit(0, p, 0);
   }
 };

@@ -146,10 +146,10 @@ class Model:
         """Return all updates below `n_clocks` clocks, with the velocity in counts per tick as the datapath has it."""
         spec = self._spec
         shown = (compiled(tuple(constants_of(spec.form, spec.program.ahead))) or rows)(spec.form, spec.program.ahead)
-        unused, shift = 64 - spec.position_width - spec.fine_bits, PLACE_BITS - spec.fine_bits
+        unused, shift = 64 - spec.position_width - spec.position_fine_bits, PLACE_BITS - spec.position_fine_bits
         n, most = len(ticks), spec.timing.max_ticks
-        names = ("velocity", "interval", "forced", "acceleration", "quality", "position_fine", "stalled")
-        flags = ("forced", "stalled")
+        names = ("velocity", "interval", "forced", "acceleration", "velocity_std", "position_fine", "standstill")
+        flags = ("forced", "standstill")
         columns = {name: np.empty(n, dtype=bool if name in flags else np.int64) for name in names}
         begin, reached, latest = -1, 0, -most
         for first in range(0, n, _PIECE):
@@ -157,14 +157,14 @@ class Model:
             last = ticks.clock[piece] - spec.latency.tick
             windows = Windows.of(steps, last, spec.form.most_number, begin, reached)
             begin, reached = int(last[-1]), reached + int(windows.moved.sum())
-            velocity, place, quality, acceleration, stalled = shown(windows).T
-            fine = (ticks.position[piece] << spec.fine_bits) + ((place + (1 << shift - 1)) >> shift)
+            velocity, place, velocity_std, acceleration, standstill = shown(windows).T
+            fine = (ticks.position[piece] << spec.position_fine_bits) + ((place + (1 << shift - 1)) >> shift)
             counted = windows.number > 0
             number = np.arange(first, first + len(last))
             before = np.maximum.accumulate(np.append(latest, np.where(counted, number, latest)))
             latest = int(before[-1])
             interval = np.minimum(number - before[:-1], most)
-            values = (velocity, interval, ~counted, acceleration, quality, fine << unused >> unused, stalled)
+            values = (velocity, interval, ~counted, acceleration, velocity_std, fine << unused >> unused, standstill)
             for name, value in zip(names, values, strict=True):
                 columns[name][piece] = value
         return Table(ticks.clock + spec.latency.datapath, {"cause": ticks.clock, **columns})

@@ -49,7 +49,7 @@ class Recursion:
         self.p = self.v = self.a = self.shown_v = self.shown_a = 0
         self.memory = self.log_memory = self.slow_until = 0
         self.since = self.quiet = 0
-        self.stalled = False
+        self.standstill = False
         self.noise = self.sure = self.certain = k["quarter"]  # D, D_s, D_a
         self.alarm, self.slack, self.lost = 4 * self.certain, 0, 0
         self.error = self.mean = self.lag = self.edge = self.slips = 0
@@ -57,7 +57,7 @@ class Recursion:
         self.offsets = [0] * 4
         self.grows, self.log_growth = 1, 0
         self.log_limit, self.trouble = 2 * log2(self.noise) + k["order"], -k["log_9_4"]
-        self._chance, self.quality = _HALF, 0
+        self._chance, self.velocity_std = _HALF, 0
 
     # The arithmetic.
 
@@ -99,7 +99,7 @@ class Recursion:
         self.since = min(self.since + (length << bits), k["most_since"])
         self.quiet = min(self.quiet + (length << bits), k["most"])
         self._moved = moved << PLACE_BITS
-        self.stalled = not number and self.quiet >= k["max_time"]
+        self.standstill = not number and self.quiet >= k["max_time"]
         if number:
             self.quiet = last << bits
             return self._event(number, times << bits, places, kind, down)
@@ -194,9 +194,9 @@ class Recursion:
         unseen = 2 * (log_at + self.log_memory) - x - self.log_limit - (k["log_9_4"] if long else 0) < 0
         if x + k["log_64"] < 0 and unseen:
             self.shown_v = self.v - self._power(log_at - k["of_slope"], -1 if self.a < 0 else 1)
-            self.shown_a, self.quality = 0, k["of_straight"]
+            self.shown_a, self.velocity_std = 0, k["of_straight"]
         else:
-            self.shown_v, self.shown_a, self.quality = self.v, self.a, k["of_curve"]
+            self.shown_v, self.shown_a, self.velocity_std = self.v, self.a, k["of_curve"]
 
     def _learn(self, n: int, e: int, change: int, kind: int) -> None:
         """Learn the noise, the lag and the offsets of the edges."""
@@ -266,7 +266,7 @@ class Recursion:
             self.log_memory -= k["log_64"] + k["log_half"]
             self.memory = self._power(self.log_memory)
         self.a = self.shown_a = self.mean = self.lag = self.error = self.slow_until = 0
-        self.quality = k["of_curve"]
+        self.velocity_std = k["of_curve"]
         row = self._emit(self._ahead())
         self._ready()
         return row
@@ -303,13 +303,13 @@ class Recursion:
             bound = k["of_speed"] - log2(self.quiet + self._lead) - share
             velocity = sign * min(sign * velocity, self._power(bound))
             least = self._power(bound + k["of_bound"])
-        if self.stalled:
+        if self.standstill:
             velocity = self.shown_a = 0
         return self._emit(velocity, z, least)
 
     def _nothing(self) -> Row:
         """Show no velocity."""
-        self.shown_a, self.quality = 0, self._k["none"]
+        self.shown_a, self.velocity_std = 0, self._k["none"]
         return self._emit(0, self.p, 0)
 
     def _emit(self, velocity: int, place: int | None = None, least: int = 1) -> Row:
@@ -321,7 +321,7 @@ class Recursion:
         return (
             max(-k["most_shown"], min(shown, k["most_shown"])),
             place,
-            min(max(self._power(noise + self.quality - self.log_memory), least), k["most_quality"]),
+            min(max(self._power(noise + self.velocity_std - self.log_memory), least), k["most_std"]),
             self._product(self.shown_a, k["slope"], "acceleration"),
-            int(self.stalled),
+            int(self.standstill),
         )

@@ -54,8 +54,9 @@ class Health(Extra):
 
     on: bool = option(
         True,
-        "Watch the encoder: outputs health (the first fault), faults (how many) and fault (there is one), and with "
-        "--index index_error. A reset clears them, and CONTROL.clear.",
+        "Watch the encoder: outputs health, faults and fault. health is the first fault, faults how many "
+        "there were, fault that there is one. With --index also index_error. A reset or CONTROL.clear "
+        "clears them.",
         name="health",
         flag=True,
         parse=parse_flag,
@@ -63,8 +64,9 @@ class Health(Extra):
     )
     edges: int = option(
         256,
-        "N edges of a line in a second, 2 to 65536, and none of the other, are a fault of the other. A shaft that "
-        "swings about one edge has such edges as well (with --health).",
+        "Edges of a line, 2 to 65536, by which the other is dead. They count within a second, without an "
+        "edge of the other line. A shaft that swings about one edge has such edges as well (with "
+        "--health).",
         name="health-edges",
         metavar="N",
         limits=(2, 1 << 16),
@@ -73,19 +75,19 @@ class Health(Extra):
     )
     errors: int = option(
         10,
-        "More than N illegal transitions in a second, 0 to 65535, are a fault (with --health).",
+        "Illegal transitions allowed in a second, 0 to 65535. More are a fault (with --health).",
         name="health-errors",
         metavar="N",
         limits=(0, (1 << 16) - 1),
         tests=("0",),
         tacit=True,
     )
-    complements: int | None = option(
+    differential: int | None = option(
         None,
-        "Inputs a_n and b_n, and z_n with --index, of a differential encoder (with --health): a line that equals its "
-        "complement for longer than TIME is an open circuit, a fault. In s, ms, us or ns, rounded up to clocks; a "
-        "plain number is clocks. 1us is more than receivers and cables skew.",
-        name="complements",
+        "Differential encoder: inputs a_n, b_n, and z_n with --index. A line that equals its complement "
+        "for longer than TIME is an open circuit, a fault (with --health). In s, ms, us or ns, rounded up "
+        "to clocks; a plain number is clocks. 1us is more than the skew of receivers and cables.",
+        name="differential",
         metavar="TIME",
         parse_at=parse_filter,
         tests=("2", "40"),
@@ -101,16 +103,16 @@ class Health(Extra):
         if spec.encoder.sensor != "quadrature":
             rest = f"must be left out for {spec.encoder.sensor}: it watches two lines in quadrature"
             raise ParameterError("health", rest)
-        if self.complements is not None and not COMPLEMENTS[0] <= self.complements <= COMPLEMENTS[1]:
-            times = (format_time(Fraction(one) / spec.timing.clock_hz) for one in (*COMPLEMENTS, self.complements))
-            raise ParameterError("complements", "must be from {} to {} at this clock, not {}".format(*times))
+        if self.differential is not None and not COMPLEMENTS[0] <= self.differential <= COMPLEMENTS[1]:
+            times = (format_time(Fraction(one) / spec.timing.clock_hz) for one in (*COMPLEMENTS, self.differential))
+            raise ParameterError("differential", "must be from {} to {} at this clock, not {}".format(*times))
 
     def pins(self, spec: Numbers) -> Iterable[Pin]:
-        if self.complements is None:
+        if self.differential is None:
             return
         for line in (*spec.encoder.kind.lines, *("z",) * (spec.index is not None)):
             port = pin(f"{line}_n", f"Complement of line {line.upper()}, asynchronous.")
-            yield Pin(port, of=line, holds=self.complements)
+            yield Pin(port, of=line, holds=self.differential)
 
     def faults(self, spec: Numbers) -> tuple[Fault, ...]:
         """Return the faults that can be seen."""

@@ -21,8 +21,8 @@ class OverSpeed(Extra):
 
     limit: Speed = option(  # noqa: RUF009
         REQUIRED,
-        "Output over_speed trips at a velocity beyond this, in rad/s, rev/s or rpm, and stays so until a reset or "
-        "CONTROL.clear.",
+        "Latch output over_speed when the speed exceeds SPEED. In rad/s, rev/s or rpm. A reset or "
+        "CONTROL.clear clears it.",
         name="over-speed",
         metavar="SPEED",
         parse=parse_speed,

@@ -53,9 +53,9 @@ class Probe(Extra):
 
     probes: str = option(
         REQUIRED,
-        "N inputs probe, 1 to 8, each of which latches the position and the time since the last count at a rising "
-        "edge, with method track also the fine position; or the edges of each, such as rising,falling,both. A probe "
-        "waits until it is armed again.",
+        "Latch the position at edges of N inputs probe, 1 to 8. The time since the last count is latched "
+        "as well, with method track also the fine position. The rising edge counts; EDGES such as "
+        "rising,falling,both has the edge of each input. A probe waits until it is armed again.",
         name="probe",
         metavar="[N|EDGES]",
         shown="none",

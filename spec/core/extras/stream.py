@@ -74,8 +74,9 @@ class Stream(Extra):
 
     records: Records = option(  # noqa: RUF009
         REQUIRED,
-        "AXI4-Stream m_axis for a DMA: a record of time, flags, position and velocity, and of what else track has, "
-        "with every update, or tick or edge as WHEN; tlast ends packets of N records, 256 without it: axi:edge:1000.",
+        "AXI4-Stream m_axis of records for a DMA. A record has time, flags, position and velocity, and "
+        "with track also the other outputs. It is sent with every update, or with every tick or edge as "
+        "WHEN. tlast ends packets of N records, of 256 without N: axi:edge:1000.",
         name="stream",
         metavar="axi[:WHEN[:N]]",
         parse=Records.parse,

@@ -152,11 +152,11 @@ def test_every_board_has_pins_for_every_port(name: str, bus: str) -> None:
     board = BOARDS[name]
     design = core(board, bus, loop=bus == "uart")
     wanted = {"a", "b", "z", "tick_in", "capture", "emulated_a", "emulated_b", "emulated_z"}
-    wanted |= {line.name for line in BUSES[bus].lines} if bus == "spi" else {"drive", "enable"}
+    wanted |= {line.name for line in BUSES[bus].lines} if bus == "spi" else {"current_pdm", "enable"}
     assert wanted == board.pins.keys() & design.signature.members.keys()
     plan = prepared(design, board)
     lines = [*lines_of(plan.files)]
-    inputs = wanted - {"spi_miso", "emulated_a", "emulated_b", "emulated_z", "drive"}
+    inputs = wanted - {"spi_miso", "emulated_a", "emulated_b", "emulated_z", "current_pdm"}
     for port in wanted:
         signal = f"tachometer_0__{port}__io"
         assert any(signal in line for line in lines), port

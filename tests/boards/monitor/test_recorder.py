@@ -36,7 +36,7 @@ def frames(registers: DemoMap) -> list[Frame]:
     return [
         frame_of(registers, 0.0, position=-3, bounds_valid=0),
         frame_of(
-            registers, 0.25, velocity=-2, bounds_valid=1, velocity_lower=-3, velocity_upper=none, stalled=1, age=7
+            registers, 0.25, velocity=-2, bounds_valid=1, velocity_lower=-3, velocity_upper=none, standstill=1, age=7
         ),
         frame_of(registers, 1e-7, velocity=3, bounds_valid=1, velocity_lower=-none, velocity_upper=5),
     ]
@@ -66,7 +66,7 @@ def test_csv(unit: str, tmp_path: Path) -> None:
     assert float(rows[1][lower]) == pytest.approx(-3 * lsb, rel=1e-12)
     assert float(rows[2][upper]) == pytest.approx(5 * lsb, rel=1e-12)
     assert [row["position [counts]"] for row in rows] == ["-3", "0", "0"]
-    assert [row["stalled"] for row in rows] == ["0", "1", "0"]
+    assert [row["standstill"] for row in rows] == ["0", "1", "0"]
     assert [row["age [ticks]"] for row in rows] == ["0", "7", "0"]
     heads = {name.split(" ")[0] for name in rows[0]}
     assert heads == {port.name for port in registers.ports}

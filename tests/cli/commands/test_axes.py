@@ -142,7 +142,7 @@ def test_registers_of_every_axis(tmp_path: Path) -> None:
     assert run("generate", *core, "--for", "litex", "-o", tmp_path) == 0
     driver = (tmp_path / "axes_driver.h").read_text()
     assert all(f"now->velocity_{axis} = axes_signed_32(velocity_{axis});" in driver for axis in range(3))
-    assert all(f"now->stalled_{axis} = (status_{axis} & " in driver for axis in range(3))
+    assert all(f"now->standstill_{axis} = (status_{axis} & " in driver for axis in range(3))
     (tmp_path / "main.c").write_text('#include "axes_driver.h"\n')
     strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-fsyntax-only"]
     subprocess.run(["cc", *strict, "main.c"], cwd=tmp_path, check=True)

@@ -64,7 +64,7 @@ def test_what_is_generated_is_right_and_a_change_of_any_file_is_found(core: str,
 
 
 def test_a_bench_of_a_motion_is_that_of_inputs_that_a_program_writes(generated: Generated) -> None:
-    options = "s --probe 2 --compare list:2:1ms --testbench cocotb --motion constant:9rad/s:30ms"
+    options = "s --probe 2 --position-compare list:2:1ms --testbench cocotb --motion constant:9rad/s:30ms"
     folder = generated("core", *f"{SMALL} {options}".split())
     make = Make(cache(core_files), ci_files, file_names, digest)
     assert check(folder / "core.json", make, simulation=False).right

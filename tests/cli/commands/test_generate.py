@@ -87,7 +87,7 @@ def test_every_option_is_in_the_manifest(tmp_path: Path) -> None:
     inputs = [port["name"] for port in manifest["ports"] if port["direction"] == "input"]
     assert inputs == ["clk", "rst", "a", "b", "z", "tick_in"]
     of_index = ["index_valid", "index_wide", "index_missed", "index_position"]
-    options_of_output = ["velocity_overflow", *of_index, "tick_error", "swallowed_edges"]
+    options_of_output = ["velocity_overflow", *of_index, "tick_error", "filtered_edges"]
     assert [port["name"] for port in manifest["ports"]][-7:] == options_of_output
 
 

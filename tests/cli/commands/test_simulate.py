@@ -96,9 +96,9 @@ def test_counts_have_a_row_per_tick(tmp_path: Path, golden_run: Run) -> None:
     assert run("simulate", *CORE, *MOTION, "--counts", tmp_path / "c.csv") == 0
     text = (tmp_path / "c.csv").read_bytes().decode()
     ticks = golden_run.ticks
-    rows = zip(ticks.pulse_count.tolist(), ticks.position.tolist(), ticks.stalled.astype(int).tolist(), strict=True)
+    rows = zip(ticks.pulse_count.tolist(), ticks.position.tolist(), ticks.standstill.astype(int).tolist(), strict=True)
     wanted = "".join(f"{i},{m_e},{x},0,{rests}\n" for i, (m_e, x, rests) in enumerate(rows))
-    assert text == f"tick,pulse_count,position,overflow,stalled\n{wanted}"
+    assert text == f"tick,pulse_count,position,overflow,standstill\n{wanted}"
 
 
 def test_events_have_a_row_each(tmp_path: Path) -> None:
@@ -287,7 +287,7 @@ def test_the_glitch_filter_tells_what_it_swallowed(capsys: pytest.CaptureFixture
     # Each line changes every 21 clocks or so; some levels hold for less than 18.
     assert run("simulate", *CORE, *"--motion constant:30rad/s:200ms --jitter 0.3 --filter 18".split(), *FEW_CLOCKS) == 0
     rows = summary(capsys.readouterr().out)
-    assert int(rows["edges swallowed"].split()[0]) > 0
+    assert int(rows["edges filtered"].split()[0]) > 0
     assert rows["mismatches"] == "0"
 
 

@@ -167,10 +167,10 @@ def test_usual_motion_stays_short_for_every_timing() -> None:
 
 @pytest.mark.parametrize("asked", ["-2000:500:0:10us", "300:100:0:1us:backward"])
 def test_usual_motion_goes_over_the_positions_of_compare(asked: str) -> None:
-    compare = Compare.parse("compare", asked)
-    spec = STachometer(encoder=Encoder(500, 4), timing=Timing.parse(), compare=compare)
+    compare = Compare.parse("position_compare", asked)
+    spec = STachometer(encoder=Encoder(500, 4), timing=Timing.parse(), position_compare=compare)
     run = golden.run(spec, PinTrace.of(usual_motion(spec), spec))
-    assert run.tables["compare_valid"].compare_position[:3].tolist() == [
+    assert run.tables["position_compare_valid"].position_compare_position[:3].tolist() == [
         compare.start + k * compare.apart for k in range(3)
     ]
 

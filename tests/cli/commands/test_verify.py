@@ -175,7 +175,7 @@ def end_or_wait(core: int) -> None:
 @pytest.mark.parametrize(
     ("check", "error", "message"),
     [
-        (end_or_wait, OSError, "^a process of verify was killed, perhaps for want of memory: take fewer --jobs$"),
+        (end_or_wait, OSError, r"^a process of verify was killed \(out of memory\?\): try fewer --jobs$"),
         (int, ValueError, "invalid literal for int"),
     ],
 )

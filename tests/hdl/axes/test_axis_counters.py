@@ -76,8 +76,8 @@ def test_every_axis_adds_up_what_tracking_takes_of_a_tick() -> None:
         max_time=8 * ROUNDS,
         velocity_out=8,
         slope=Fraction(1, 2),
-        quality=Fraction(ROUNDS),
-        quality_bits=8,
+        velocity_std=Fraction(ROUNDS),
+        std_bits=8,
     )
     assert form.most_number == 3
     counters = AxisTickCounts(slots=SLOTS, form=form, decoding=4)

@@ -11,7 +11,7 @@ from support.simulate import clock_by_clock
 from tachometry.hdl.axes import axis_window
 from tachometry.sim.golden.methods.s import alterations, windows
 
-OUTPUTS = ["m_s", "base", "numerator", "update", "forced", "stalled"]
+OUTPUTS = ["m_s", "base", "numerator", "update", "forced", "standstill"]
 
 
 class Followed(wiring.Component):
@@ -33,7 +33,7 @@ class Followed(wiring.Component):
             window.m_e.eq(self.m_e),
             self.m_s.eq(kept.m_s),
             self.base.eq(kept.previous),
-            self.stalled.eq(window.next.rests),
+            self.standstill.eq(window.next.rests),
             *(getattr(self, name).eq(getattr(window, name)) for name in ("numerator", "update", "forced")),
         ]
         return m
@@ -56,7 +56,7 @@ def check(m_e: list[int], *, max_ticks: int = 4, cancel: bool = True) -> None:
             assert length * row["base"] + row["numerator"] == sum(inside), tick
     for tick, row in enumerate(seen):
         latest = numbers[tick + 1 - max_ticks : tick + 2] if tick + 1 >= max_ticks else [1]
-        assert bool(-row["stalled"]) == (not any(latest)), tick
+        assert bool(-row["standstill"]) == (not any(latest)), tick
 
 
 def random(seed: int) -> list[int]:

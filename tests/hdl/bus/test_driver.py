@@ -370,13 +370,13 @@ WRITTEN = [
     ("modulo_offset", 1999),
     ("probe_arm", 2),
     ("probe_edges", 9),
-    ("compare_next", 7),
+    ("position_compare_next", 7),
 ]
 
 
 def test_what_is_written_in_c_is_what_the_client_in_python_writes(tmp_path: Path) -> None:
     texts = {"ppr": "500", "preset": "5", "position-width": "40", "index": "yes", "index-once": "yes", "probe": "2"}
-    spec = of_texts("s", texts | {"position-modulo": "rev", "health": "yes", "compare": "list:3:2clk"})
+    spec = of_texts("s", texts | {"position-modulo": "rev", "health": "yes", "position-compare": "list:3:2clk"})
     registers = RegisterMap(spec)
     places = {one.name: one.offset for one in registers}
     calls = [f"  spindle_write_{name}(&bus, {value});" for name, value in WRITTEN]
@@ -469,7 +469,8 @@ def test_drivers_of_all_methods_are_strict_c(tmp_path: Path) -> None:
     lines = []
     specs = {f"{m}_{seed}": random_case(seed, m)[0] for m in ("s", "m", "t", "mt", "rairan") for seed in range(3)}
     specs |= {
-        f"list_{n}": of_texts("s", {"ppr": "9", "position-width": str(n), "compare": "list:4:1us"}) for n in (32, 33)
+        f"list_{n}": of_texts("s", {"ppr": "9", "position-width": str(n), "position-compare": "list:4:1us"})
+        for n in (32, 33)
     }
     for name, spec in specs.items():
         for file, text in register_files(RegisterMap(spec), name).items():

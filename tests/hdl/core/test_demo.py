@@ -15,7 +15,7 @@ from tachometry.spec.registers.demo import DemoMap, demo_manifest
 from tachometry.spec.registers.emulator import EmulatorSettings, fastest, rate_of, speed_of
 
 _COMMON = {"ppr": "16", "clock": "8MHz", "tick": "20us"}
-WATCHED = {"health": "yes", "complements": "9"}
+WATCHED = {"health": "yes", "differential": "9"}
 CORES = {
     "index, filter, age": of_texts(
         "s", {**_COMMON, "max-time": "2ms", "index": "yes", "age": "yes", "filter": "2"} | WATCHED

@@ -152,7 +152,7 @@ def test_lines_at_fault() -> None:
 def test_a_core_tells_them(fault: dict[str, int], code: Fault) -> None:
     """Within twice as many edges of the line that still works as make a fault, as docs/guides/encoder.md has it."""
     words = {"ppr": "25", "clock": "1MHz", "tick": "100us", "health": "yes", "health-edges": "5", "health-errors": "3"}
-    spec = of_texts("m", words | ({"complements": "3"} if code == Fault.B_OPEN else {}))
+    spec = of_texts("m", words | ({"differential": "3"} if code == Fault.B_OPEN else {}))
     begins = 20 * PERIOD
     changes = [Change(-1, STEADY), Change(begins, replace(STEADY, **fault))]
     emulated = GoldenEmulator(complemented=spec.front_end.complemented)

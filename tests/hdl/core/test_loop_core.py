@@ -52,7 +52,7 @@ def test_a_reset_amid_a_program() -> None:
     for clock, *values in changes[changes[:, 0] < len(rows)].tolist():
         rows[clock] = dict(zip(names, values, strict=True))
     rows[0]["rst"] = 0
-    outputs = ("control_tick", "current_valid", "current", "filtered_velocity", "disturbance", "drive")
+    outputs = ("control_tick", "current_valid", "current", "filtered_velocity", "disturbance", "current_pdm")
     whole = clock_by_clock(Resettable(LoopCore(CORE)), rows, outputs)
     ticks = [clock for clock, row in enumerate(whole) if row["control_tick"]]
     for amid in (9, CORE.latency.tick_to_result - 1):
@@ -66,8 +66,8 @@ def check_drive(width: int) -> None:
     """Over 2^width clocks the bits add up to the value, whatever it is."""
     most = 1 << (width - 1)
     for value in (-most, -most + 1, -3, 0, 1, most // 3, most - 1):
-        seen = clock_by_clock(SigmaDelta(width), [{"value": value}] * ((1 << width) + 1), ["drive"])
-        ones = [row["drive"] for row in seen[1:]]
+        seen = clock_by_clock(SigmaDelta(width), [{"value": value}] * ((1 << width) + 1), ["current_pdm"])
+        ones = [row["current_pdm"] for row in seen[1:]]
         assert sum(ones) == value + most
         # And every stretch of them does, within one.
         expected = (value + most) / (1 << width)

@@ -85,7 +85,7 @@ def test_every_component_says_what_its_limits_are() -> None:
     assert list(itertools.chain(core.datapath.probes))[:2] == ["alteration", "m_s"]
 
 
-GOES_ON = {"position", "age", "swallowed_edges"}
+GOES_ON = {"position", "age", "filtered_edges"}
 
 
 def shown(spec: TachometerSpec) -> Seen:

@@ -31,7 +31,7 @@ KINDS = {
     "axes of track": ("method=track ppr=500 axes=3", "none"),
     "loop": ("method=s ppr=500 loop=yes", "none"),
     "wishbone": ("method=s ppr=500 index=yes health=yes", "wishbone"),
-    "axi-lite": ("method=mt ppr=500 index=yes compare=0:16:8:10us probe=2", "axi-lite"),
+    "axi-lite": ("method=mt ppr=500 index=yes position-compare=0:16:8:10us probe=2", "axi-lite"),
     "uart": ("method=t ppr=500", "uart"),
     "stream": ("method=s ppr=500 stream=axi lowpass=100Hz bounds=yes age=yes", "none"),
     "step-dir": ("method=m sensor=step-dir ppr=200 clock=1MHz tick=37clk max-time=740clk", "none"),

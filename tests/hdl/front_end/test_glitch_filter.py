@@ -89,13 +89,13 @@ def test_the_first_samples_are_filtered(line: str) -> None:
         run = found.actual
         assert np.abs(run.ticks.position).tolist() == [0] * 11 + [1] * 3
         assert len(run.errors) == len(run.index) == 0
-        assert not run.ticks["swallowed_edges"].any()
+        assert not run.ticks["filtered_edges"].any()
 
 
 def test_swallowed_edges_of_both_lines_are_counted() -> None:
     rows = [{"a": 0, "b": 0}] * 4 + [{"a": 1, "b": 1}, {"a": 0, "b": 0}, {}, {"a": 1}, {"a": 0}] + [{}] * 5
-    seen = clock_by_clock(InputConditioner(3), rows, ["swallowed_edges"])
-    assert seen[-1]["swallowed_edges"] == 6
+    seen = clock_by_clock(InputConditioner(3), rows, ["filtered_edges"])
+    assert seen[-1]["filtered_edges"] == 6
 
 
 def test_bad_clocks() -> None:

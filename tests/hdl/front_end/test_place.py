@@ -24,7 +24,7 @@ BASE = {"ppr": "8", "clock": "1MHz", "tick": "40us", "max-time": "400us"}
 CASES = (
     {"preset": "-7", "index": "yes", "health": "yes", "health-errors": "9"},
     {"preset": "99", "index": "yes", "index-reset": "yes", "index-once": "yes", "filter": "2"},
-    {"preset": "-3", "position-modulo": "7", "index": "yes", "index-reset": "yes", "compare": "2:3:0:1clk"},
+    {"preset": "-3", "position-modulo": "7", "index": "yes", "index-reset": "yes", "position-compare": "2:3:0:1clk"},
     {"position-modulo": "rev", "index": "yes", "index-once": "yes", "position-width": "8"},
 )
 
@@ -99,7 +99,7 @@ def test_a_preset_moves_the_position_alone_and_by_no_count_too_many(method: str)
         for name, column in table.columns.items():
             off = other[name].astype(np.int64) - column
             if name.startswith("position") and name != "position_modulo":
-                size = 1 << getattr(spec, "fine_bits", 0) * (name == "position_fine")
+                size = 1 << getattr(spec, "position_fine_bits", 0) * (name == "position_fine")
                 # 2000 edges came before, the step in the clock of the preset is still added.
                 assert {*off.tolist()} == {0, (1000 - 1999) * size}, name
                 assert np.count_nonzero(np.diff(off)) == 1
@@ -157,7 +157,7 @@ def test_registers_set_the_position_and_let_the_index_through(texts: dict[str, s
         ({"preset": "200", "position-width": "8"}, "preset must be from -128 to 127, a position, not 200"),
         ({"preset": "x"}, "preset must be a whole number, not 'x'"),
         ({"index-once": "yes"}, "index_once must be given together with --index"),
-        ({"position-modulo": "rev/5"}, "a revolution of 32 has no 5 equal parts"),
+        ({"position-modulo": "rev/5"}, "must divide the 32 counts of a revolution"),
         ({"position-modulo": "1"}, "position_modulo must be from 2 to 16777216 counts, not 1"),
         ({"position-modulo": "turn"}, "must be a number of counts, rev, or rev/P for P pole pairs, not 'turn'"),
     ],

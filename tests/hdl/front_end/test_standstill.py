@@ -1,4 +1,4 @@
-"""`stalled` rises after the same silence with all methods but tracking, and falls with the next count."""
+"""`standstill` rises after the same silence with all methods but tracking, and falls with the next count."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ def check(box: wiring.Component, max_ticks: int, name: str, pause: int, shifts: 
     rows: list[dict[str, int]] = []
     for number, shift in zip(m_e, k, strict=True):
         rows += [{"tick": 1, name: number} | ({"shift": shift} if shifts else {}), *[{"tick": 0}] * pause]
-    seen = [row["stalled"] for row in clock_by_clock(box, rows, ["stalled"])]
+    seen = [row["standstill"] for row in clock_by_clock(box, rows, ["standstill"])]
     wanted = expected(m_e, max_ticks, [1 << shift for shift in k])
     assert seen == [value for value in wanted for _ in range(1 + pause)]
     assert {*wanted} == {0, 1}
@@ -63,7 +63,7 @@ def check_s(max_ticks: int = 5) -> None:
     for clocks in (3, 40):
         box = SMethod(STachometer(encoder=Encoder(25), timing=Timing(1_000_000, clocks, max_ticks)))
         m_e = numbers(max_ticks)
-        seen = [row["stalled"] for row in clock_by_clock(box, ticks(box, m_e, clocks), ["stalled"])][1:]
+        seen = [row["standstill"] for row in clock_by_clock(box, ticks(box, m_e, clocks), ["standstill"])][1:]
         assert seen == [value for value in expected(m_e, max_ticks, [1] * len(m_e)) for _ in range(clocks)]
 
 
@@ -75,15 +75,15 @@ def test_after_the_maximum_time(max_ticks: int) -> None:
     check_long_ticks(max_ticks)
 
 
-@pytest.mark.parametrize("method", [name for name, kind in METHODS.items() if kind.facts.stalls_with == TICK])
+@pytest.mark.parametrize("method", [name for name, kind in METHODS.items() if kind.facts.rests_with == TICK])
 def test_methods(method: str) -> None:
     """By the golden models, whose outputs those of the hardware are; see tests/test_matrix.py."""
     texts = {"ppr": "1", "clock": "1MHz", "tick": "5clk", "max-time": "30clk", "frac-bits": "4", "position-width": "8"}
     for more in ({}, {"adaptive": "25%"} if method == "rairan" else {"external-tick": "yes"}):
         spec = of_texts(method, had_by(method, texts | more))
-        assert manifest(spec)["stalled_after_ticks"] == 7
+        assert manifest(spec)["standstill_after_ticks"] == 7
         ticks = golden.run(spec, stress(spec, 1, 30)).ticks
         if "adaptive" not in more:
             ones = [1] * len(ticks)
-            assert ticks.stalled.astype(int).tolist() == expected(ticks.pulse_count.tolist(), 6, ones)
-        assert np.count_nonzero(np.diff(ticks.stalled.astype(int))) > 2
+            assert ticks.standstill.astype(int).tolist() == expected(ticks.pulse_count.tolist(), 6, ones)
+        assert np.count_nonzero(np.diff(ticks.standstill.astype(int))) > 2

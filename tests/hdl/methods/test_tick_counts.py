@@ -26,8 +26,8 @@ FORM = Tracking(
     max_time=MAX_TICKS * T,
     velocity_out=8,
     slope=Fraction(1, 2),
-    quality=Fraction(T),
-    quality_bits=8,
+    velocity_std=Fraction(T),
+    std_bits=8,
 )
 NAMES = ["number", "times", "places", "last", "moved", "kind", "down", "end", "length"]
 

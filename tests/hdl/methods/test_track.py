@@ -24,12 +24,12 @@ SPEC = TrackTachometer(
     frac_bits=20,
     max_speed=Speed.parse("40rad/s"),
     position_width=8,
-    fine_bits=16,
+    position_fine_bits=16,
 )
 EXTERNAL = replace(
     SPEC, timing=Timing(1_000_000, 1400, 10), external_tick=True, max_tick_cycles=1400, multiplier="serial"
 )
-NAMES = ["velocity", "acceleration", "position_fine", "quality", "interval", "forced", "stalled"]
+NAMES = ["velocity", "acceleration", "position_fine", "velocity_std", "interval", "forced", "standstill"]
 COMPILED = compiled.clock_by_clock
 Update = tuple[int, ...]  # clock, and what the update says
 

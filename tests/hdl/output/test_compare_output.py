@@ -12,7 +12,7 @@ from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import of_texts
 from tachometry.spec.core.compare import Compare
 
-SEEN = ["compare", "compare_valid", "compare_position", "compare_count"]
+SEEN = ["position_compare", "position_compare_valid", "position_compare_position", "position_compare_count"]
 CASES = [
     (Compare(2, 3, 0, "4clk"), 4),
     (Compare(-4, 1, 5, "1clk"), 1),
@@ -44,8 +44,8 @@ class Listed:
             self.awaited = [self.waiting.pop(0)]
         elif reached:
             self.awaited = []
-        self.waiting += [row["compare_next"]] if row["compare_append"] and room else []
-        if row["compare_clear"]:
+        self.waiting += [row["position_compare_next"]] if row["position_compare_append"] and room else []
+        if row["position_compare_clear"]:
             self.waiting, self.awaited = [], []
 
 
@@ -84,19 +84,19 @@ def test_every_clock_is_as_the_rules_say(case: tuple[Compare, int], seed: int) -
         row = {"step": step, "position": position}
         if compare.depth:
             place = (position + way * int(rng.integers(0, 6)) + 16) % 32 - 16
-            row |= {"compare_next": place, "compare_append": int(rng.random() < 0.3)}
-            row |= {"compare_clear": int(rng.random() < 0.02)}
+            row |= {"position_compare_next": place, "position_compare_append": int(rng.random() < 0.3)}
+            row |= {"position_compare_clear": int(rng.random() < 0.02)}
         rows.append(row)
-    names = [*SEEN, "compare_waiting"][: 5 if compare.depth else 4]
+    names = [*SEEN, "position_compare_waiting"][: 5 if compare.depth else 4]
     seen = clock_by_clock(compare_output.CompareOutput(compare, clocks, WIDTH), rows, names)
     rule = Listed(compare) if compare.depth else Computed(compare)
     begun = list[int]()
     wanted = dict.fromkeys(names, 0)
     for clock, row in enumerate(rows):
-        wanted["compare"] = int(bool(begun) and clock - begun[-1] < clocks)
-        wanted["compare_valid"] = int(bool(begun) and clock == begun[-1])
+        wanted["position_compare"] = int(bool(begun) and clock - begun[-1] < clocks)
+        wanted["position_compare_valid"] = int(bool(begun) and clock == begun[-1])
         if isinstance(rule, Listed):
-            wanted["compare_waiting"] = len(rule.waiting) + len(rule.awaited)
+            wanted["position_compare_waiting"] = len(rule.waiting) + len(rule.awaited)
         assert seen[clock] == wanted, (case, seed, clock)
         down, awaited = row["step"] < 0, rule.place(row["step"])
         edge = (row["position"] + (down and compare.direction == "both") + 16) % 32 - 16
@@ -104,7 +104,7 @@ def test_every_clock_is_as_the_rules_say(case: tuple[Compare, int], seed: int) -
         reached = row["step"] != 0 and not wrong and edge == awaited
         if reached and awaited is not None:
             begun.append(clock + 1)
-            wanted |= {"compare_position": awaited, "compare_count": len(begun)}
+            wanted |= {"position_compare_position": awaited, "position_compare_count": len(begun)}
         rule.move(row, reached)
     assert len(begun) > 5 or (len(begun) == compare.count and compare.direction != "both")
 
@@ -128,14 +128,14 @@ def test_a_position_that_is_set_moves_what_is_awaited(compare: Compare) -> None:
             wanted += [place + (step < 0)] if there else []
             rows.append({"step": step, "position": place})
     seen = clock_by_clock(compare_output.CompareOutput(compare, 1, WIDTH, aims=True), [*rows, {"step": 0}], SEEN)
-    assert [row["compare_position"] for row in seen if row["compare_valid"]] == wanted
+    assert [row["position_compare_position"] for row in seen if row["position_compare_valid"]] == wanted
     assert len({*wanted}) > 1
 
 
 @pytest.mark.parametrize("places", ["-20:7:0:1clk:both", "-90:3:50:2clk:both"])
 def test_presets_and_indices_aim_as_in_the_golden_model(places: str) -> None:
     texts = {"ppr": "50", "clock": "1MHz", "tick": "6clk", "max-time": "60clk", "position-width": "8"}
-    spec = of_texts("m", texts | {"preset": "100", "index": "yes", "index-reset": "yes", "compare": places})
+    spec = of_texts("m", texts | {"preset": "100", "index": "yes", "index-reset": "yes", "position-compare": places})
     found = lockstep(spec, stress(spec, 0, 60), PySim())
     assert found.n_mismatches == 0, found.first
-    assert len({*found.actual.tables["compare_valid"].compare_position.tolist()}) > 5
+    assert len({*found.actual.tables["position_compare_valid"].position_compare_position.tolist()}) > 5

@@ -16,8 +16,8 @@ from tachometry.spec.core.compare import Compare
 from tachometry.spec.formats.carrying import Carrying
 from tachometry.spec.formats.velocity_output import VelocityOutput
 
-SEEN = ["compare", "compare_valid", "compare_position", "compare_count"]
-CARRYING = Carrying(VelocityOutput(Fraction(1, 10), 200, 12), shift=1, fine_bits=2, more_bits=2, late=12)
+SEEN = ["position_compare", "position_compare_valid", "position_compare_position", "position_compare_count"]
+CARRYING = Carrying(VelocityOutput(Fraction(1, 10), 200, 12), shift=1, position_fine_bits=2, more_bits=2, late=12)
 SPACING = CARRYING.latency + 4
 WIDTH, HALF = 5, 1 << 8  # bits of a position in counts; of the place that is carried on, without its sign
 
@@ -32,7 +32,7 @@ CASES = ["1.25:2.5:0:3clk:fine", "-3:0.75:30:3clk:backward:fine"]
 @pytest.mark.parametrize("asked", CASES)
 def test_every_clock_is_as_the_rules_say(asked: str) -> None:
     """Play updates whose places follow from each other more or less, with jumps now and then."""
-    compare = Compare.parse("compare", asked)
+    compare = Compare.parse("position_compare", asked)
     rng = np.random.default_rng(1)
     rows, fine, velocity = [], 0, 0
     for clock in range(3000):
@@ -49,8 +49,8 @@ def test_every_clock_is_as_the_rules_say(asked: str) -> None:
     armed = of_tick = of_update = moved = False
     wanted = dict.fromkeys(SEEN, 0)
     for clock, row in enumerate(rows):
-        wanted["compare"] = int(bool(begun) and clock - begun[-1] < 3)
-        wanted["compare_valid"] = int(bool(begun) and clock == begun[-1])
+        wanted["position_compare"] = int(bool(begun) and clock - begun[-1] < 3)
+        wanted["position_compare_valid"] = int(bool(begun) and clock == begun[-1])
         assert seen[clock] == wanted, (asked, clock)
         if row["tick"]:
             of_tick, moved = moved, False
@@ -60,7 +60,7 @@ def test_every_clock_is_as_the_rules_say(asked: str) -> None:
         ahead = beyond < 0 if sign > 0 else beyond >= 0
         if armed and not ahead and (not compare.count or len(begun) < compare.count):
             begun.append(clock + 1)
-            wanted |= {"compare_position": awaited, "compare_count": len(begun)}
+            wanted |= {"position_compare_position": awaited, "position_compare_count": len(begun)}
             awaited = wrapped(awaited + apart, HALF >> 2)
         armed = armed or ahead
         place = wrapped(place + turn, HALF)
@@ -74,9 +74,9 @@ def test_every_clock_is_as_the_rules_say(asked: str) -> None:
 
 @nightly  # a build takes seconds; the matrix has another core
 def test_hardware_is_the_golden_model() -> None:
-    texts = {"ppr": "20", "clock": "1MHz", "tick": "1000clk", "max-time": "4000clk", "fine-bits": "3"}
+    texts = {"ppr": "20", "clock": "1MHz", "tick": "1000clk", "max-time": "4000clk", "position-fine-bits": "3"}
     more = {"position-width": "8", "index": "yes", "index-reset": "yes", "preset": "3"}
-    spec = of_texts("track", {**texts, **more, "compare": "1.5:1.25:40:1clk:fine"})
+    spec = of_texts("track", {**texts, **more, "position-compare": "1.5:1.25:40:1clk:fine"})
     found = lockstep(spec, stress(spec, 1, 60), Cxxrtl())
     assert found.n_mismatches == 0, found.first
-    assert len(found.actual.tables["compare_valid"]) > 20
+    assert len(found.actual.tables["position_compare_valid"]) > 20

@@ -14,7 +14,7 @@ module axi_lite #(
   wire [31:0] rdata;
   tachometer core (
       .clk(clk), .rst(rst), .a(a), .b(b), .tick(tick), .pulse_count(pulse_count), .velocity(velocity),
-      .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .stalled(stalled), .overflow(overflow),
+      .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .standstill(standstill), .overflow(overflow),
       .position(position), .decode_error(decode_error), .capture(capture), .s_axi_awaddr(awaddr), .s_axi_awprot(awprot),
       .s_axi_awvalid(awvalid), .s_axi_awready(awready), .s_axi_wdata(wdata), .s_axi_wstrb(wstrb), .s_axi_wvalid(wvalid),
       .s_axi_wready(wready), .s_axi_bresp(bresp), .s_axi_bvalid(bvalid), .s_axi_bready(bready), .s_axi_araddr(araddr),

@@ -1,7 +1,7 @@
   // Registers behind a bus, of a core of the M method: included by the checkers of the buses. What reads must show follows
   // from the ports of the core and from the accesses that reach the registers.
   localparam C = COUNT_WIDTH, V = COUNT_WIDTH + FRAC_BITS;
-  wire tick, velocity_valid, forced, stalled, overflow, decode_error;
+  wire tick, velocity_valid, forced, standstill, overflow, decode_error;
   wire signed [C-1:0] pulse_count;
   wire signed [V-1:0] velocity;
   wire [1:0] interval;
@@ -16,7 +16,7 @@
   wire [1:0] core_interval;
   wire signed [C-1:0] core_pulse_count;
   wire signed [7:0] core_position;
-  wire core_updated, core_forced, core_overflow, core_stalled;
+  wire core_updated, core_forced, core_overflow, core_standstill;
   wire [7:0] core_errors, core_overflows, core_lost;
 
   localparam CONTROL = 2, COUNTERS = 3, VELOCITY = 4, REGISTERS = 9;
@@ -48,7 +48,7 @@
         kept_interval <= interval;
         kept_pulse_count <= pulse_count;
         kept_position <= at_tick;
-        kept_flags <= {stalled, overflow, forced, waits || velocity_valid};
+        kept_flags <= {standstill, overflow, forced, waits || velocity_valid};
       end
       waits <= (waits || velocity_valid) && !captures;
       if (writes_control) hold <= core_write_data[1];
@@ -82,7 +82,7 @@
     lemma_tick: assert (core_at_tick == at_tick);
     pb_snapshot: assert (core_velocity == kept_velocity && core_interval == kept_interval
         && core_pulse_count == kept_pulse_count && core_position == kept_position
-        && {core_stalled, core_overflow, core_forced, core_updated} == kept_flags);
+        && {core_standstill, core_overflow, core_forced, core_updated} == kept_flags);
     pb_write: assert (core_hold == hold && core_clear == clears
         && {core_lost, core_overflows, core_errors} == {lost, overflows, errors});
     pb_read: assert (core_read_data == (was_read ? word : 0));

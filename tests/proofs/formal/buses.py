@@ -29,7 +29,7 @@ _BANK_PROBES = {
     "core_updated": "captured_updated",
     "core_forced": "captured_forced",
     "core_overflow": "captured_overflow",
-    "core_stalled": "captured_stalled",
+    "core_standstill": "captured_standstill",
     "core_errors": "decode_errors.count",
     "core_overflows": "overflows.count",
     "core_lost": "lost_updates.count",

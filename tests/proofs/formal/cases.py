@@ -287,7 +287,7 @@ PROOFS = [
     after_upset("upset, eq. (21)", method("", small(tick_cycles=1)), "lemma_core"),
     after_upset("upset, carried", method("", small(tick_cycles=1, max_ticks=5), max_table=4), "lemma_core"),
     after_upset("upset, M of 4", m_method("", small_m(4)), "lemma_bounded"),
-    after_upset("upset, Rairán", rairan("", 2, 3, 2), "lemma_flags lemma_left", "pr_stalled"),
+    after_upset("upset, Rairán", rairan("", 2, 3, 2), "lemma_flags lemma_left", "pr_standstill"),
     after_upset("upset, T", timed("", TTachometer, 2, 1), "lemma_timer"),
     *mt_after_upset("upset, M/T", timed("", MTTachometer, 2, 1)),
     *COUNTS_OF_A_TICK,

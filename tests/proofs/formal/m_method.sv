@@ -13,14 +13,14 @@ module m_method #(
     input clk, input rst, input a, input b
 );
   localparam V = COUNT_WIDTH + FRAC_BITS, I = INTERVAL_WIDTH, S = COUNT_WIDTH + 8;
-  wire tick, velocity_valid, forced, stalled, bounds_valid, overflow;
+  wire tick, velocity_valid, forced, standstill, bounds_valid, overflow;
   wire signed [COUNT_WIDTH-1:0] pulse_count;
   wire signed [V-1:0] velocity;
   wire signed [BOUND_WIDTH-1:0] velocity_lower, velocity_upper;
   wire [I-1:0] interval;
   tachometer core (
       .clk(clk), .rst(rst), .a(a), .b(b), .tick(tick), .pulse_count(pulse_count), .velocity(velocity),
-      .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .stalled(stalled), .overflow(overflow),
+      .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .standstill(standstill), .overflow(overflow),
       .velocity_lower(velocity_lower), .velocity_upper(velocity_upper), .bounds_valid(bounds_valid)
   );
 
@@ -70,7 +70,7 @@ module m_method #(
         && (quiet == 0 || rested || core_empty == MAX_TICKS - 1 - $signed({1'b0, quiet})));
     pm_update: assert (velocity_valid == tick_ && interval == N && !forced);
     pm_velocity: assert (!velocity_valid || (2 * shown <= 2 * scaled + N && 2 * scaled + N < 2 * shown + 2 * N));
-    pm_stalled: assert (stalled == rests);
+    pm_standstill: assert (standstill == rests);
     pm_bounds: assert (!velocity_valid || (below >= 0 && below < N && above >= 0 && above < N));
     pm_known: assert (!velocity_valid || bounds_valid == known_);
   end

@@ -23,13 +23,13 @@ module method #(
     input clk, input rst, input a, input b
 );
   localparam V = COUNT_WIDTH + FRAC_BITS, I = INTERVAL_WIDTH, S = COUNT_WIDTH + INTERVAL_WIDTH + 2, KEPT = MAX_TICKS / 2;
-  wire tick, velocity_valid, forced, stalled;
+  wire tick, velocity_valid, forced, standstill;
   wire signed [COUNT_WIDTH-1:0] pulse_count;
   wire signed [V-1:0] velocity;
   wire [I-1:0] interval;
   tachometer core (
       .clk(clk), .rst(rst), .a(a), .b(b), .tick(tick), .pulse_count(pulse_count), .velocity(velocity),
-      .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .stalled(stalled)
+      .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .standstill(standstill)
   );
   wire [I-1:0] core_m_s;
   wire core_longest, core_rests, core_nearly, core_alteration;
@@ -223,7 +223,7 @@ module method #(
     p4_held: assert (velocity_valid || outputs == held);
     p5_numerator: assert (!tick || sum == reduced);
     p5_velocity: assert ((have <= wanted && wanted < have + divisor) || (shown_m_s == 0 && velocity == 0));
-    p7_stalled: assert (stalled == rests);
-    p7_falls: assert (!(tick && pulse_count != 0) || !stalled);
+    p7_standstill: assert (standstill == rests);
+    p7_falls: assert (!(tick && pulse_count != 0) || !standstill);
   end
 endmodule

@@ -14,10 +14,10 @@ module outputs #(
 );
   wire signed [1:0] step = way == 2 ? 0 : way;
   wire [2:0] modulo, probe_time, health;
-  wire signed [3:0] position, index_position, probe_position, compare_position, both_position;
-  wire index_valid, homed, probed, probe_valid, over_speed, open, seen, compare, compare_valid, both, both_valid;
+  wire signed [3:0] position, index_position, probe_position, position_compare_position, both_position;
+  wire index_valid, homed, probed, probe_valid, over_speed, open, seen, compare, position_compare_valid, both, both_valid;
   wire [7:0] faults;
-  wire [15:0] compare_count;
+  wire [15:0] position_compare_count;
   tachometer core (
       .clk(clk), .rst(rst), .modulo_step(step), .modulo_clear(clear), .modulo_count(modulo),
       .position_step(step), .position_clear(clear), .position_load(load), .position_value(value),
@@ -32,10 +32,10 @@ module outputs #(
       .watch_level_a(level_a), .watch_level_b(level_b), .watch_ready(ready), .watch_step(step),
       .watch_decode_error(decode_error), .watch_clear(clear), .watch_seen(seen), .watch_health(health),
       .watch_faults(faults),
-      .compare_position(value), .compare_step(step), .compare_compare(compare), .compare_compare_valid(compare_valid),
-      .compare_compare_position(compare_position), .compare_compare_count(compare_count),
-      .both_position(value), .both_step(step), .both_moves(load), .both_compare(both), .both_compare_valid(both_valid),
-      .both_compare_position(both_position)
+      .position_compare_position(value), .compare_step(step), .compare_compare(compare), .compare_position_compare_valid(position_compare_valid),
+      .compare_position_compare_position(position_compare_position), .compare_position_compare_count(position_compare_count),
+      .both_position(value), .both_step(step), .both_moves(load), .both_compare(both), .both_position_compare_valid(both_valid),
+      .both_position_compare_position(both_position)
   );
 
   // What was there in the clock before, and what is remembered of all before; after a reset it is as at the begin.
@@ -60,7 +60,7 @@ module outputs #(
     {value_, velocity_, index_, latched, time_} <= {value, velocity, index_position, probe_position, probe_time};
     {health_, faults_, level_a_, level_b_} <= {health, faults, level_a, level_b};
     {was_a, was_b} <= {level_a_, level_b_};
-    {pulse, pulse_both} <= rst ? 2'b0 : {compare_valid, both_valid};
+    {pulse, pulse_both} <= rst ? 2'b0 : {position_compare_valid, both_valid};
     step_ <= rst ? 0 : step;
     late <= rst ? 0 : step_;
     level_ <= !rst && level;
@@ -105,12 +105,12 @@ module outputs #(
     po_probed: assert (probed == (!was_reset && (was_probed || turned_) && !armed));
     po_latched: assert (probe_position == (was_reset ? 4'sd0 : probe_valid ? value_ : latched));
     po_since: assert (probe_time == (was_reset ? 0 : probe_valid ? since_ : time_));
-    po_pulse: assert (compare == (compare_valid || pulse) && both == (both_valid || pulse_both));
-    po_place: assert (!compare_valid || compare_position == value_);
+    po_pulse: assert (compare == (position_compare_valid || pulse) && both == (both_valid || pulse_both));
+    po_place: assert (!position_compare_valid || position_compare_position == value_);
     po_edge: assert (!both_valid || (step_ != 0 && both_position == $signed(value_ - (step_ >>> 1))));
     if (!UPSET) begin
       po_range: assert (modulo < MODULUS && (health[2] ? health == 4 : health != 3));
-      po_due: assert (compare_valid == hit_ && compare_count == number);
+      po_due: assert (position_compare_valid == hit_ && position_compare_count == number);
       po_aimed: assert (stands < 4 || core_number == (value_ >= 1) + (value_ >= 1 + APART));
       po_grid: assert (!both_valid || both_position == 1 || both_position == 1 + APART);
       // Lemmas: what the induction needs to know of the state.

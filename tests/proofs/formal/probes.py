@@ -5,9 +5,9 @@ from typing import Any
 from tachometry.spec import Encoder, Speed, Timing
 
 STANDSTILL_PROBES = {
-    "core_rests": "standstill.shown",
-    "core_empty": "standstill.ticks.left",
-    "core_silent": "standstill.was_silent",
+    "core_rests": "rest.shown",
+    "core_empty": "rest.ticks.left",
+    "core_silent": "rest.was_silent",
 }
 
 

@@ -13,14 +13,14 @@ module rairan #(
     input clk, input rst, input a, input b
 );
   localparam V = VELOCITY_WIDTH, W = 8;
-  wire tick, velocity_valid, forced, stalled, overflow;
+  wire tick, velocity_valid, forced, standstill, overflow;
   wire signed [V-1:0] velocity;
   wire signed [COUNT_WIDTH-1:0] pulse_count;
   wire [$clog2(MAX_COUNT+1)-1:0] n_ep1;
   wire [$clog2(MAX_TICKS+1)-1:0] n_dt1;
   tachometer core (
       .clk(clk), .rst(rst), .a(a), .b(b), .tick(tick), .pulse_count(pulse_count), .velocity(velocity), .velocity_valid(velocity_valid),
-      .forced(forced), .stalled(stalled), .overflow(overflow), .n_ep1(n_ep1), .n_dt1(n_dt1)
+      .forced(forced), .standstill(standstill), .overflow(overflow), .n_ep1(n_ep1), .n_dt1(n_dt1)
   );
   wire signed [1:0] core_step;
   wire signed [$clog2(T):0] core_left;
@@ -145,7 +145,7 @@ module rairan #(
     pr_update: assert (velocity_valid == update_);
     pr_estimate: assert (n_ep1 == ep_ && n_dt1 == dt_ && forced == alone_);
     pr_velocity: assert (ep_ == 0 ? velocity == 0 : have <= wanted && wanted < have + 2 * q);
-    pr_stalled: assert (stalled == still);
+    pr_standstill: assert (standstill == still);
     pr_rest: assert (idle_ < MAX_TICKS * T || velocity == 0);
     pr_flag: assert (!more_ || overflow);
   end

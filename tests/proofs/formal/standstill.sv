@@ -1,4 +1,4 @@
-// What `stalled` must show: more than MAX_TICKS ticks in a row without a count, the one before the first included.
+// What `standstill` must show: more than MAX_TICKS ticks in a row without a count, the one before the first included.
 module standstill #(
     parameter MAX_TICKS = 4,
     parameter COUNT_WIDTH = 3

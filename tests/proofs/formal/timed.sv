@@ -32,13 +32,13 @@ module timed #(
   localparam V = VELOCITY_WIDTH, I = INTERVAL_WIDTH, Q = INTEGER_BITS, N = QUOTIENT_BITS, W = 8;
   localparam P = LATTICE ? 1 : T, B = DIVISION_CLOCKS, LONG = MAX_PERIODS * (LATTICE ? T : 1), PHASES = LATTICE ? T : 1;
   localparam PATIENCE = MIN_PERIODS * (CYCLE > 1 ? 2 : 1);  // timer periods after which any count closes a window
-  wire tick, velocity_valid, forced, stalled;
+  wire tick, velocity_valid, forced, standstill;
   wire signed [COUNT_WIDTH-1:0] pulse_count;
   wire signed [V-1:0] velocity;
   wire [I-1:0] interval;
   tachometer core (
       .clk(clk), .rst(rst), .a(a), .b(b), .tick(tick), .pulse_count(pulse_count), .velocity(velocity),
-      .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .stalled(stalled)
+      .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .standstill(standstill)
   );
   wire core_running, core_done, core_measuring, core_forced, core_opened, core_nearer;
   wire signed [$clog2(MAX_TICKS - 1):0] core_empty;
@@ -366,7 +366,7 @@ module timed #(
         && (past < 0 ? velocity <= 0 && velocity > past : velocity >= 0 && velocity < past)));
     pt_bound: assert (!fresh_past || !fresh_due || !due || due_measuring || (velocity >= 0 ? have <= wanted : have + divisor > wanted));
     pt_rest: assert (idle < LONG + B || velocity == 0);
-    pt_stalled: assert (stalled == rests);
+    pt_standstill: assert (standstill == rests);
     pt_held: assert (velocity_valid || outputs == held);
   end
 endmodule

@@ -12,7 +12,7 @@ module wishbone #(
   wire wb_ack_o, wb_err_o;
   tachometer core (
       .clk(clk), .rst(rst), .a(a), .b(b), .tick(tick), .pulse_count(pulse_count), .velocity(velocity),
-      .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .stalled(stalled), .overflow(overflow),
+      .velocity_valid(velocity_valid), .interval(interval), .forced(forced), .standstill(standstill), .overflow(overflow),
       .position(position), .decode_error(decode_error), .capture(capture), .wb_adr_i(wb_adr_i), .wb_dat_i(wb_dat_i),
       .wb_dat_o(wb_dat_o), .wb_sel_i(wb_sel_i), .wb_we_i(wb_we_i), .wb_cyc_i(wb_cyc_i), .wb_stb_i(wb_stb_i),
       .wb_ack_o(wb_ack_o), .wb_err_o(wb_err_o)

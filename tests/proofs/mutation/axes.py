@@ -116,7 +116,12 @@ def _case(axes: int, tick_cycles: int, max_ticks: int, mutants: int, *, parallel
 AXES = [_case(5, 55, 4, 240, parallel=False, index=True), _case(2, 35, 3, 120, parallel=True, index=False)]
 
 _TEXTS = {"ppr": "8", "clock": "1MHz", "position-width": "8", "index": "yes", "index-reset": "yes", "preset": "5"}
-_FINE = {"tick": "1000clk", "max-time": "4000clk", "fine-bits": "3", "compare": "1.5:1.25:40:3clk:fine"}
+_FINE = {
+    "tick": "1000clk",
+    "max-time": "4000clk",
+    "position-fine-bits": "3",
+    "position-compare": "1.5:1.25:40:3clk:fine",
+}
 # What has no wrong core in tests/proofs/formal/mutants.json.
 EXTRAS = [
     PartCase(

@@ -18,7 +18,7 @@ SETTLED = 900  # counts, after which the noise and the edges of the disc are kno
 ALLOWED = 1300  # counts
 TRACK = ("track", "track, serial")
 SHARE = 1000  # of the velocity that it may be off by
-_GRADUAL = ("velocity", "acceleration", "position_fine", "quality")
+_GRADUAL = ("velocity", "acceleration", "position_fine", "velocity_std")
 
 
 def _trace(n: int, gap: int) -> PinTrace:

@@ -14,7 +14,7 @@ from reference.front import CYCLE
 from tachometry.sim.engines.pysim import PySim
 from tachometry.sim.golden.front_end import Steps, count, decode, decoded, filter_line, first_beyond
 from tachometry.sim.golden.sampling import external_windows, windows
-from tachometry.sim.golden.standstill import with_stalled
+from tachometry.sim.golden.standstill import with_standstill
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.sim.studies.lockstep import lockstep
@@ -66,15 +66,15 @@ def test_a_glitch_is_counted_when_the_line_has_gone_back() -> None:
     assert found.clock.tolist() == [40 + 5, 50 + 5]
     ticks, _ = count(spec, found, np.arange(9, 76, 10))
     assert ticks.clock.tolist() == [11, 21, 31, 41, 51, 61, 71]
-    assert ticks["swallowed_edges"].tolist() == [0, 0, 2, 2, 2, 2, 2]
+    assert ticks["filtered_edges"].tolist() == [0, 0, 2, 2, 2, 2, 2]
     ticks, _ = count(spec, found, np.array([22, 23]))
-    assert ticks["swallowed_edges"].tolist() == [0, 2]  # with the strobes in clocks 24 and 25
+    assert ticks["filtered_edges"].tolist() == [0, 2]  # with the strobes in clocks 24 and 25
 
 
 def test_swallowed_edges_stay_at_the_last_even_number() -> None:
     steps = steps_of([], [], swallowed=np.arange(33_000))
     ticks, _ = count(spec_of(filter="3"), steps, np.array([0, 32_763, 32_764, 32_765, 32_770, 33_000]))
-    assert ticks["swallowed_edges"].tolist() == [6, 65_532, 65_534, 65_534, 65_534, 65_534]
+    assert ticks["filtered_edges"].tolist() == [6, 65_532, 65_534, 65_534, 65_534, 65_534]
 
 
 @pytest.mark.parametrize("width", [8, 11])
@@ -206,7 +206,7 @@ SPEC = of_texts("s", {"ppr": "8", "clock": "1MHz", "tick": "10clk", "max-time": 
 
 
 @pytest.mark.parametrize(
-    ("numbers", "lengths", "stalled"),
+    ("numbers", "lengths", "standstill"),
     [
         # The tick before the first one counts as empty.
         ("000000", "111111", "000111"),
@@ -219,11 +219,11 @@ SPEC = of_texts("s", {"ppr": "8", "clock": "1MHz", "tick": "10clk", "max-time": 
         ("0100", "1222", "0000"),
     ],
 )
-def test_rest(numbers: str, lengths: str, stalled: str) -> None:
+def test_rest(numbers: str, lengths: str, standstill: str) -> None:
     m_e = np.array([{"0": 0, "1": 1, "-": -1}[number] for number in numbers])
     ticks = Table(np.arange(len(m_e)), {"pulse_count": m_e})
-    found = with_stalled(SPEC, ticks, np.array([int(length) for length in lengths])).stalled
-    assert "".join(str(int(one)) for one in found) == stalled
+    found = with_standstill(SPEC, ticks, np.array([int(length) for length in lengths])).standstill
+    assert "".join(str(int(one)) for one in found) == standstill
 
 
 PAGE = Path(__file__).parents[3] / "docs/concepts/verification.md"

@@ -52,7 +52,7 @@ def test_every_output_of_the_manifest_is_compared(method: str) -> None:
     compared = {name for strobe, names in spec.ports.strobes.items() for name in (strobe, *names)}
     assert compared == {port.name for port in spec.ports.outputs}
     bounds = {"velocity_lower", "velocity_upper", "bounds_valid"} if METHODS[method].facts.bounds else set[str]()
-    assert {*bounds, "interval", "stalled", "age"} <= compared
+    assert {*bounds, "interval", "standstill", "age"} <= compared
 
 
 @pytest.mark.parametrize("change", [1, 1 << 40, 1 << 62])

@@ -69,7 +69,7 @@ def test_a_run_is_read_from_the_ports() -> None:
         (2, "tick", 1),
         (2, "position", -6),
         (2, "velocity", 8),
-        (2, "stalled", 1),
+        (2, "standstill", 1),
     ):
         rows[row, 1 + names.index(name)] = value
     run = observed(spec, 30, rows)
@@ -80,8 +80,8 @@ def test_a_run_is_read_from_the_ports() -> None:
         "index_valid": [],
     }
     assert run.ticks.position.tolist() == [-5, -6]
-    assert run.ticks.stalled.tolist() == [False, True]
-    assert run.ticks.stalled.dtype == np.bool_
+    assert run.ticks.standstill.tolist() == [False, True]
+    assert run.ticks.standstill.dtype == np.bool_
     assert run.updates.velocity.tolist() == [77]
     assert (run.n_clocks, run.index.index_position.tolist()) == (30, [])
 

@@ -28,8 +28,8 @@ APART = {
             ("health", "yes"),
             ("health", "yes health-edges 5"),
             ("health", "yes health-errors 0"),
-            ("health", "yes complements 2"),
-            ("health", "yes complements 40"),
+            ("health", "yes differential 2"),
+            ("health", "yes differential 40"),
             ("index", "yes index-at A=0,B=1"),
             ("index", "yes index-at A=1,B=1"),
         )

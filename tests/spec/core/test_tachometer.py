@@ -136,7 +136,7 @@ def test_ticks_between_a_cause_and_its_update() -> None:
 
 def test_standstill() -> None:
     spec = spec_of(20, 10)
-    assert (spec.times.longest, spec.times.stalled_after_ticks, spec.times.max_tick_shift) == (200, 11, 0)
+    assert (spec.times.longest, spec.times.standstill_after_ticks, spec.times.max_tick_shift) == (200, 11, 0)
     assert (spec.times.shortest, spec.words.memory, MTachometer.facts.last_at_rest) == (None, None, False)
     assert STachometer(encoder=Encoder(8), timing=Timing(1_000_000, 20, 10)).times.standstill_ticks == 15
     assert TTachometer(encoder=Encoder(8), timing=Timing(1_000_000, 20, 10)).times.standstill_ticks == 10

@@ -52,7 +52,7 @@ def test_ports_that_have_a_sign_and_those_of_16_bits() -> None:
     signed = [port.name for port in spec.ports if port.signed]
     assert signed == ["velocity", "pulse_count", "position", "velocity_lower", "velocity_upper", "index_position"]
     widths = {port.name: port.width for port in spec.ports}
-    assert (widths["swallowed_edges"], widths["index_position"], widths["position"]) == (16, 40, 40)
+    assert (widths["filtered_edges"], widths["index_position"], widths["position"]) == (16, 40, 40)
     assert {port.name for port in spec.ports if port.is_strobe} == set(spec.ports.strobes)
 
 

@@ -113,12 +113,12 @@ def test_every_option_does_what_it_says() -> None:
         "health",
         "health-edges",
         "health-errors",
-        "complements",
+        "differential",
         *(about.name for extra in EXTRAS for about in options_of(extra)),
         "preset",
         "index-once",
         "position-modulo",
-        "compare",
+        "position-compare",
     } == {word.split("=")[0] for word in texts.split()}
 
 

@@ -85,7 +85,7 @@ def test_manifest() -> None:
     assert told["velocity"] == manifest(ALONE)["velocity"]
     assert manifest(spec_of(8, max_speed=None))["velocity"]["full_scale"] == 120
     assert told["parameters"]["axes"] == 8
-    with pytest.raises(ParameterError, match=r"^name must not be that of a port, which 'position_4' is$"):
+    with pytest.raises(ParameterError, match=r"^name must not be the name of a port: 'position_4'$"):
         manifest(spec_of(5, parallel=True), "position_4")
 
 

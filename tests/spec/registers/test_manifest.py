@@ -46,7 +46,7 @@ def test_tracking_has_no_bounds() -> None:
 
 def test_acceleration_and_fine_position() -> None:
     """An LSB of the acceleration: 2^−F of a count per tick², or of the unit of the velocity per second."""
-    base = had_by("track", BASE | {"fine-bits": "3"})
+    base = had_by("track", BASE | {"position-fine-bits": "3"})
     count = 2 * math.pi / 32
     tick = int(base["tick"].removesuffix("clk")) / 1e6
     units = {

@@ -72,10 +72,10 @@ def test_bits_of_control_counters_and_status() -> None:
         ("tick_errors", 24, 8),
     ]
     assert bits(registers, "STATUS") == [
-        (name, low, 1) for low, name in enumerate(("updated", "indexed", "forced", "overflow", "stalled"))
+        (name, low, 1) for low, name in enumerate(("updated", "indexed", "forced", "overflow", "standstill"))
     ]
     ports = [field.port for field in registers["STATUS"].fields]
-    assert ports == ["", "", "forced", "overflow", "stalled"]  # what is not of the core comes first
+    assert ports == ["", "", "forced", "overflow", "standstill"]  # what is not of the core comes first
     assert registers["IDENTIFICATION"].reset == 0x54414348  # TACH
     assert [one.reset for one in registers if not one.constant] == [0] * 8
 
@@ -154,5 +154,5 @@ def test_a_demo_shows_of_its_core_the_drive_of_the_loop_alone() -> None:
     assert bus is not None
     ports = [[port for port in demo_ports(demo, bus) if port.direction == "output"] for demo in (core, loop)]
     alone, driven = ([port.name for port in each] for each in ports)
-    assert alone == [port for port in driven if port != "drive"]
-    assert driven == ["uart_tx", "emulated_a", "emulated_b", "drive", "leds"]
+    assert alone == [port for port in driven if port != "current_pdm"]
+    assert driven == ["uart_tx", "emulated_a", "emulated_b", "current_pdm", "leds"]

@@ -191,7 +191,7 @@ def check_axis(
             "position": (count + OFFSET) / SCALE,
             "count": count,
             "index-enable": enabled,
-            **{name: ticks.get(name.replace("-", "_"))[at] for name in ("age", "swallowed-edges") if name in found},
+            **{name: ticks.get(name.replace("-", "_"))[at] for name in ("age", "filtered-edges") if name in found},
             **{name: np.count_nonzero(events < clock) for name, events in counted.items()},
         }
         if spec.velocity.output:
@@ -294,7 +294,7 @@ def test_axes_must_have_pins_for_each() -> None:
 def test_the_page_has_every_pin_and_its_command_makes_the_plugin(tmp_path: Path) -> None:
     rows = dict(re.findall(r"^\| `([\w-]+)` \| (\w+)", PAGE, re.MULTILINE))
     found = {name: pin.kind for method in METHODS for name, pin in hal_pins(core(method)).items()}
-    found |= {"age": "u32", "tick-errors": "u32", "swallowed-edges": "u32"}
+    found |= {"age": "u32", "tick-errors": "u32", "filtered-edges": "u32"}
     assert rows == found | {"position-scale": "float", "position-offset": "float"}
     (command,) = re.findall(r"```sh\n(tachometry .*?)```", PAGE, re.DOTALL)
     assert command_line(*shlex.split(command.replace("\\\n", ""))[1:-1], tmp_path) == 0

@@ -12,7 +12,7 @@ from reference.tsuji import s_updates
 
 from tachometry.sim.golden.methods.s import Model
 from tachometry.sim.golden.quotient import round_quotient
-from tachometry.sim.golden.standstill import with_stalled
+from tachometry.sim.golden.standstill import with_standstill
 from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, STachometer, Timing
 
@@ -29,12 +29,12 @@ def as_ticks(m_e: list[int]) -> Table:
 
 
 def results(m_e: list[int], max_ticks: int, **options: bool) -> list[tuple[int, int, bool, bool, int]]:
-    """Return (tick, m_s, forced, stalled, raw velocity) of every update; `stalled` is that of the tick."""
+    """Return (tick, m_s, forced, standstill, raw velocity) of every update; `standstill` is that of the tick."""
     s_model, ticks = model(max_ticks, **options), as_ticks(m_e)
     found = s_model.updates(ticks, None, 1 << 40)
     cause = (found.clock - s_model._spec.latency.datapath) // 16
-    stalled = with_stalled(s_model._spec, ticks, np.ones(len(m_e), dtype=np.int64)).stalled[cause]
-    columns = (cause, found.interval, found.forced, stalled, found.velocity)
+    standstill = with_standstill(s_model._spec, ticks, np.ones(len(m_e), dtype=np.int64)).standstill[cause]
+    columns = (cause, found.interval, found.forced, standstill, found.velocity)
     return list(zip(*(column.tolist() for column in columns), strict=True))
 
 

@@ -51,12 +51,12 @@ def test_twins(name: str) -> None:
 @pytest.mark.parametrize("name", only(["default"], CORES))
 def test_what_is_shown_fits_the_ports(name: str) -> None:
     spec = CORES[name]
-    velocity, _, quality, acceleration, _ = np.concatenate(
+    velocity, _, velocity_std, acceleration, _ = np.concatenate(
         [compiled(spec, windows(spec, seed, 20_000)) for seed in range(2)]
     ).T
     assert np.abs(velocity).max() < 1 << spec.velocity.native - 1
-    assert quality.min() >= 0
-    assert quality.max() < 1 << spec.form.quality_bits
+    assert velocity_std.min() >= 0
+    assert velocity_std.max() < 1 << spec.form.std_bits
     assert 1 << spec.acceleration.width - 3 < np.abs(acceleration).max() < 1 << spec.acceleration.width - 1
 
 
@@ -90,7 +90,7 @@ def test_the_fine_position_stays_at_an_edge_that_no_count_has_shown(seed: int) -
 
 
 @pytest.mark.parametrize("name", only(["external"], CORES))
-def test_a_stalled_shaft_has_no_velocity(name: str) -> None:
+def test_a_shaft_at_standstill_has_no_velocity(name: str) -> None:
     """Both come with the first tick that ends when the last count, or the reset, is the maximum time ago.
 
     Ticks of the first core come from outside, and their lengths differ.
@@ -100,10 +100,10 @@ def test_a_stalled_shaft_has_no_velocity(name: str) -> None:
     held = windows(spec, 1, 2500)
     end = np.cumsum(held.length)
     latest = np.maximum.accumulate(np.where(held.number > 0, end - held.last, 0))
-    velocity, *_, stalled = compiled(spec, held).T
-    assert np.array_equal(stalled, (held.number == 0) & (end - latest >= spec.form.max_time))
-    assert not velocity[stalled > 0].any()
-    assert velocity[np.flatnonzero(np.diff(stalled) > 0)].any()
+    velocity, *_, standstill = compiled(spec, held).T
+    assert np.array_equal(standstill, (held.number == 0) & (end - latest >= spec.form.max_time))
+    assert not velocity[standstill > 0].any()
+    assert velocity[np.flatnonzero(np.diff(standstill) > 0)].any()
 
 
 def test_gains_are_those_of_least_squares() -> None:
@@ -193,8 +193,8 @@ def test_quality_of_the_first_velocity_is_more_than_all_of_it() -> None:
     spec = core()
     found = golden.run(spec, trace_of(np.arange(1, 500) * 10 * spec.timing.tick_cycles, np.arange(1, 500))).updates
     first = np.flatnonzero(found.velocity)[0]
-    assert found.velocity[first] < found.quality[first] < 2 * found.velocity[first]
-    assert found.quality[-1] == 1
+    assert found.velocity[first] < found.velocity_std[first] < 2 * found.velocity[first]
+    assert found.velocity_std[-1] == 1
 
 
 def test_quality_is_the_velocity_at_least_while_the_shaft_has_stopped() -> None:
@@ -203,13 +203,13 @@ def test_quality_is_the_velocity_at_least_while_the_shaft_has_stopped() -> None:
     cycles = spec.timing.tick_cycles
     moves = trace_of(np.arange(1, 500) * 10 * cycles, np.arange(1, 500))
     found = golden.run(spec, replace(moves, n_clocks=moves.n_clocks + 7500 * cycles)).updates
-    assert (found.quality[2000:4990] == 1).all()
+    assert (found.velocity_std[2000:4990] == 1).all()
     silent = slice(5005, 7400)
-    assert (found.velocity[silent] <= found.quality[silent]).all()
-    assert (found.quality[silent] < found.velocity[silent] * 1.01).all()
+    assert (found.velocity[silent] <= found.velocity_std[silent]).all()
+    assert (found.velocity_std[silent] < found.velocity[silent] * 1.01).all()
     assert (found.velocity[7600:] == 0).all()
-    assert found.quality[9900] > 0
-    assert not found.quality[10_100:].any()
+    assert found.velocity_std[9900] > 0
+    assert not found.velocity_std[10_100:].any()
 
 
 def test_quality_is_greater_after_counts_were_lost() -> None:
@@ -222,11 +222,11 @@ def test_quality_is_greater_after_counts_were_lost() -> None:
         clock = np.round(place * spec.timing.tick_cycles / 0.9).astype(np.int64)  # so a tick holds a count, or none
         found = golden.run(spec, trace_of(clock[kept], np.arange(1, len(kept) + 1))).updates
         wrong = np.abs(found.velocity - np.median(found.velocity))
-        before, after = found.quality[at - 10], found.quality[at + 10 : at + 3000]
+        before, after = found.velocity_std[at - 10], found.velocity_std[at + 10 : at + 3000]
         assert wrong[at + 10 : at + 3000].max() > 20 * before
         assert after[0] > 15 * before
         covered.append(np.mean(wrong[at + 10 : at + 3000] <= after))
-        last.append(found.quality[-1] / before)
+        last.append(found.velocity_std[-1] / before)
     assert 0.5 < np.mean(covered) < 0.9
     assert np.median(last) < 2
 
