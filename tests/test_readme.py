@@ -164,7 +164,7 @@ def test_files_that_are_named_are_there(page: Path) -> None:
     layers = "spec|hdl|sim|cli|tests|bench|docs"
     named = re.findall(rf"`((?:{layers})/[\w/]+\.(?:py|md|h|sv|toml))`", page.read_text("utf-8"))
     for file in named:
-        assert (ROOT / file).exists(), file
+        assert (ROOT / file).exists() or "NAME" in file, file
 
 
 def test_every_page_is_one_step_from_the_readme() -> None:

@@ -4,10 +4,8 @@ import importlib.util
 from importlib.metadata import version as version_of
 from pathlib import Path
 
-from amaranth.back import verilog
-
 from tachometry.hdl.export import export
-from tachometry.hdl.export.verilog import bundled_yosys
+from tachometry.hdl.export.modules import write
 from tachometry.sim import build
 from tachometry.sim.engines.compiled import CompiledEngine, Design
 
@@ -69,8 +67,7 @@ class Verilator(CompiledEngine):
         """Return the Verilog: what is exported, or, if signals are to be shown, a core with these as outputs."""
         if not design.n_words:
             return export(design.spec)["tachometer.v"]
-        with bundled_yosys():
-            return str(verilog.convert(design.component, name="tachometer", emit_src=False))
+        return write(design.component, "tachometer").text
 
     def library(self, design: Design) -> Path:
         """Build the library, as `CompiledEngine.library` says."""
