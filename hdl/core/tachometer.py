@@ -197,7 +197,7 @@ class Tachometer(wiring.Component):
         if isinstance(self.datapath, OwnStandstill):
             m.d.comb += self.standstill.eq(self.datapath.standstill)
         if self.rest is not None:
-            m.submodules.rest = rest = self.rest
+            m.submodules.silence = rest = self.rest
             m.d.comb += [
                 rest.tick.eq(self.tick),
                 rest.m_e.eq(self.pulse_count),
@@ -301,18 +301,13 @@ class Tachometer(wiring.Component):
 
         `level_a`, `ready` and `step` are of the decoder; `level_NAME` and `ready_NAME` of an asynchronous input, a bit
         for each line; `equal_a` says that a line equals its complement; `preset_rises` sets the position, and
-        `next_position` is `position` of the next clock. `update` is high with an update of the datapath, `new_velocity`
-        and so on; `index_rises` a clock before `index_valid`.
+        `next_position` is `position` of the next clock.
         """
         decoder, box = self.decoder, self.conditioner
         taps: dict[str, Value] = {"next_position": self.position_counter.next}
         taps |= {
             name: getattr(decoder, name) for name in decoder.signature.members if name[:5] in ("level", "ready", "step")
         }
-        updates = self.datapath.updates
-        taps |= {"update": updates.valid, **{f"new_{name}": updates.p[name] for name in updates.p.shape().members}}
-        if self.index_capture is not None:
-            taps["index_rises"] = self.index_capture.rises
         taps |= {f"{name}_rises": control.rises for name, control in self.controls.items()}
         for pin in self._spec.front_end.pins:
             name = pin.port.name

@@ -54,14 +54,13 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
         measured = measured.having(cause=measured.clock - spec.latency.datapath)
     updates = in_unit(spec, filtered(spec, ticks, measured))
     pulses = compare.pulses(spec, steps, trace, measured)
-    without = {"tick": ticks, "velocity_valid": updates, "index_valid": index, "update": measured}
+    without = {"tick": ticks, "velocity_valid": updates, "index_valid": index}
     added = extras.tables(extras.View(spec, trace, steps, without))
     ticks = ticks.having(**compare.shown(spec, pulses, ticks.clock), **extras.shown(spec, added, ticks.clock))
     found = {
         "tick": with_age(spec, ticks, updates),
         "velocity_valid": updates,
         "index_valid": index,
-        "update": measured,
         WIDE: Table(steps.wide + spec.latency.tick, {}),
         MISSED: Table(steps.missed + spec.latency.tick, {}),
         "decode_error": Table(steps.errors, {}),

@@ -11,7 +11,6 @@ from tachometry.spec.core.recovery import Recovery
 from tachometry.spec.core.tick import Scale, Tick
 from tachometry.spec.core.times import Times, Widths
 from tachometry.spec.core.velocity import Bound, Velocity
-from tachometry.spec.formats.angles import Tracked
 from tachometry.spec.language.port import Port, Ports
 
 
@@ -102,11 +101,6 @@ class Numbers(Asked):
     def method_entries(self) -> dict[str, dict[str, Any]]:
         """Entries of the manifest that describe outputs of this method alone, by the names of the ports."""
         return {}
-
-    @property
-    def tracked(self) -> Tracked | None:
-        """Formats of the place and the acceleration of a method that tracks these; None: it does not."""
-        return None
 
     @property
     def method_ports(self) -> tuple[Port, ...]:

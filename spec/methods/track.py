@@ -14,7 +14,6 @@ from tachometry.spec.core.tick import Scale
 from tachometry.spec.core.timing import Timing, parse_clocks
 from tachometry.spec.core.velocity import Velocity
 from tachometry.spec.core.words import Words
-from tachometry.spec.formats.angles import Tracked
 from tachometry.spec.formats.carrying import Carrying
 from tachometry.spec.formats.tracking import MOST_MEMORY, RESULT_BITS, WIDTH, Tracking
 from tachometry.spec.formats.tracking_code import Program
@@ -61,11 +60,6 @@ class Acceleration:
         """Fraction bits of the acceleration: the greatest one fits, and what an event adds to it before it is held."""
         greatest = (2 ** (WIDTH - 2) + 2**RESULT_BITS) * self.of_form
         return math.floor(math.log2(((1 << (self.width - 1)) - 2) / greatest))
-
-    @property
-    def counts_per_clock2(self) -> Fraction:
-        """One LSB in counts per clock²."""
-        return Fraction(1, 2) ** self.frac_bits / self._per_count / self.asked.timing.tick_cycles**2
 
     @property
     def rad_per_s2_per_lsb(self) -> float:
@@ -196,10 +190,6 @@ class TrackTachometer(TachometerSpec):
         latency = self.latency
         late = latency.pin_to_count + latency.tick + latency.datapath + per_clock.serial_latency + 3
         return Carrying(per_clock, shift, self.position_fine_bits, bits - self.position_fine_bits, late)
-
-    @cached_property
-    def tracked(self) -> Tracked:
-        return Tracked(self.position_fine_bits, self.acceleration.counts_per_clock2, self.program.times == BLOCK)
 
     @property
     def remembered(self) -> None:
