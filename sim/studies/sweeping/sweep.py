@@ -177,6 +177,7 @@ _CODE = (
     "spec",
     "sim/build.py",
     "sim/golden",
+    "sim/captures",
     "sim/encoder",
     "sim/signals",
     *(f"sim/studies/{name}.py" for name in ("__init__", "lockstep", "sweeping/__init__", "sweeping/sweep")),

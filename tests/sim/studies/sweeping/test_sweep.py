@@ -182,7 +182,7 @@ def test_code_that_decides_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
     def folders(files: set[Path]) -> set[str]:
         return {file.relative_to(ROOT).parts[0 if file.parts[len(ROOT.parts)] != "sim" else 1] for file in files}
 
-    assert folders(golden) == {"spec", "build.py", "golden", "encoder", "signals", "studies"}
+    assert folders(golden) == {"spec", "build.py", "captures", "golden", "encoder", "signals", "studies"}
     assert folders(hardware) == folders(golden) | {"hdl", "engines"}
     studies = {file.stem for file in golden if file.is_relative_to(ROOT / "sim" / "studies")}
     assert studies == {"__init__", "sweep", "compare", "baselines", "lockstep"}
