@@ -34,7 +34,7 @@ ALLOWED = {
     "hdl/axes": {"hdl/arithmetic", "hdl/front_end", "hdl/methods", "hdl/output", "hdl/wires", "spec"},
     "hdl/bus": {"hdl/wires", "spec"},
     "hdl/control": {"hdl/arithmetic", "hdl/wires", "spec"},
-    "hdl/extras": {"hdl/arithmetic", "hdl/front_end", "hdl/output", "hdl/wires", "spec"},
+    "hdl/extras": {"hdl/arithmetic", "hdl/front_end", "hdl/wires", "spec"},
     "hdl/core": {
         "hdl/arithmetic",
         "hdl/axes",
@@ -209,9 +209,7 @@ def test_it_needs_only_the_standard_library(room: str) -> None:
 
 def test_golden_models_need_only_numpy() -> None:
     for file in files("sim/golden"):
-        twin = (
-            {"ctypes", "importlib", "itertools"} if file.name in ("track.py", "phase.py") else set()
-        )  # which have C++
+        twin = {"ctypes", "importlib"} if file.name == "track.py" else set()  # which is in C++
         twin |= {"importlib", "types"} if file.parent.name == "extras" else set()  # which have the names of their files
         top = {name.split(".")[0] for name in imports(file)}
         assert top <= {"tachometry", "numpy", "typing", "collections", "dataclasses", "bisect", "functools", *twin}, (
@@ -308,14 +306,14 @@ def has_a_broken_docstring(node: ast.AST) -> bool:
 
 # What may only fall, with the rule by which it is counted. A change that brings a capability raises lines alone.
 CEILING: dict[str, tuple[int, Callable[[], Counter[str]]]] = {
-    "lines of Python of the product": (51266, lambda: lines(*PRODUCT)),
+    "lines of Python of the product": (50069, lambda: lines(*PRODUCT)),
     "lines of Python of the tests": (42648, lambda: lines("tests")),
     "lines of Python of the benchmarks": (3150, lambda: lines("bench")),
     "functions over 40 lines": (44, lambda: every(is_long, *PRODUCT)),
     "functions with more than 6 parameters": (29, lambda: every(has_many_parameters, *PRODUCT)),
     "getattr and hasattr in hdl": (36, lambda: every(lambda node: calls(node, "getattr", "hasattr"), "hdl")),
     "places that tell kinds of core apart": (22, lambda: every(tells_kinds_apart, *PRODUCT)),
-    "broken docstrings": (63, lambda: every(has_a_broken_docstring, *PRODUCT, "bench", "tests")),
+    "broken docstrings": (61, lambda: every(has_a_broken_docstring, *PRODUCT, "bench", "tests")),
 }
 
 
@@ -335,7 +333,6 @@ OTHER_MEANINGS = {
     "cli/explore/server.py": {"stream"},
     "cli/options/capture.py": {"differential"},
     "sim/captures/sigrok.py": {"probe"},
-    "sim/engines/gate_loop.py": {"lead"},
     "sim/encoder/virtual.py": {"stream"},
 }
 
@@ -365,4 +362,4 @@ def test_only_extras_name_an_extra() -> None:
     for layer in LAYERS:
         for file in (file for file in (ROOT / layer).rglob("*.py") if "extras" not in file.parts):
             place = file.relative_to(ROOT).as_posix()
-            assert names & named_in(file) - {"angle"} == OTHER_MEANINGS.get(place, set()), place  # of every shaft
+            assert names & named_in(file) == OTHER_MEANINGS.get(place, set()), place

@@ -102,7 +102,7 @@ def test_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
         assert "[auto|s|m|t|mt|rairan|track|x]" in text
         assert "x does what m does" in text
     if command == "verify":
-        assert "of s, m, t, mt, rairan, track, x." in text
+        assert "They are s, m, t, mt, rairan, track, x." in text
 
 
 def test_generate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

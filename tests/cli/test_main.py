@@ -90,7 +90,7 @@ def test_ctrl_c_during_an_import(module: str, tmp_path: Path) -> None:
 
 
 COMMANDS = {
-    "generate": (["generate", "--ppr", "9", "-o", "out"], "tachometry.cli.commands.generate.export"),
+    "generate": (["generate", "--ppr", "9", "-o", "out"], "tachometry.cli.commands.generate.core_files"),
     "simulate": ([*SIMULATE, "--trace", "out/t.csv"], "tachometry.cli.options.outputs.write_trace"),
     "monitor": (
         "monitor sim:icebreaker --ppr 9 --max-speed 9rad/s --record out/r.csv".split(),

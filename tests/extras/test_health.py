@@ -101,7 +101,7 @@ test_refusals = refused(
     {
         "health=yes differential=1": "differential must be from 2us to 1.048576s at this clock, not 1us",
         "health=yes differential=0": "differential must be from 2us to 1.048576s at this clock, not 0s",
-        "health=yes complements=soon": "differential must be",
+        "health=yes differential=soon": "differential must be",
         "differential=1us": "differential must be given together with --health",
         "health=no health-edges=9": "health_edges must be given together with --health",
         "health=yes sensor=hall": "health must be left out for hall",

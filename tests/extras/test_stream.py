@@ -39,7 +39,11 @@ DATA, VALID, LAST = "m_axis_tdata", "m_axis_tvalid", "m_axis_tlast"
 
 # Of each core the bytes of a record, as `struct` has them, their names, and the bits of `flags` from the lowest on.
 LAYOUTS = {
-    "s": ("<IIii", "time flags position velocity", "forced overflow standstill homed probed compare fault over_speed"),
+    "s": (
+        "<IIii",
+        "time flags position velocity",
+        "forced overflow standstill homed probed position_compare fault over_speed",
+    ),
     "mt": ("<IIqi12x", "time flags position velocity", "forced overflow standstill out_of_range"),
     "track": (
         "<IIqiii4x",

@@ -1,5 +1,6 @@
 """RIO is imitated as far as its plugins meet it: names, and the C code around that of a plugin."""
 
+import re
 import sys
 import types
 from collections.abc import Mapping
@@ -89,7 +90,7 @@ def component(plugin: Any) -> str:
         bodies.append(f"static void convert_{variable}(data_t *data) {{\n" + "\n".join(body))
         bodies[-1] += f"\n*data->{variable} = value;\n}}\n"
         calls.append(f"convert_{variable}(data);")
-    positions = [pin["varname"] for name, pin in pins.items() if name.startswith("position")]
+    positions = [pin["varname"] for name, pin in pins.items() if re.fullmatch(r"position(-\d+)?", name)]
     enables = [pin["varname"] for name, pin in pins.items() if name.startswith("index-enable")]
     read = [f'if (scanf("%lf", &number) != 1) return 1;\ndata->{one["variable"]} = number;' for one in sent.values()]
     show = [f'printf("%.17g ", (double)*data->{pin["varname"]});' for pin in pins.values()]

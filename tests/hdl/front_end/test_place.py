@@ -157,7 +157,7 @@ def test_registers_set_the_position_and_let_the_index_through(texts: dict[str, s
         ({"preset": "200", "position-width": "8"}, "preset must be from -128 to 127, a position, not 200"),
         ({"preset": "x"}, "preset must be a whole number, not 'x'"),
         ({"index-once": "yes"}, "index_once must be given together with --index"),
-        ({"position-modulo": "rev/5"}, "must divide the 32 counts of a revolution"),
+        ({"position-modulo": "rev/5"}, "a revolution of 32 has no 5 equal parts"),
         ({"position-modulo": "1"}, "position_modulo must be from 2 to 16777216 counts, not 1"),
         ({"position-modulo": "turn"}, "must be a number of counts, rev, or rev/P for P pole pairs, not 'turn'"),
     ],

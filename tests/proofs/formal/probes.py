@@ -5,9 +5,9 @@ from typing import Any
 from tachometry.spec import Encoder, Speed, Timing
 
 STANDSTILL_PROBES = {
-    "core_rests": "rest.shown",
-    "core_empty": "rest.ticks.left",
-    "core_silent": "rest.was_silent",
+    "core_rests": "silence.shown",
+    "core_empty": "silence.ticks.left",
+    "core_silent": "silence.was_silent",
 }
 
 

@@ -173,12 +173,12 @@ def test_swallowed_edges_are_two_for_each_glitch_since_they_were_cleared() -> No
     a[high] = 1
     bank = Bank(PinTrace(np.arange(n_clocks), a, np.zeros_like(a), n_clocks), filter="3")
     for clock, wanted in ((13, 0), (14, 2), (18, 2), (19, 4), (114, 42), (150_000, 59_996), (199_000, 65_534)):
-        assert bank.at(clock, "SWALLOWED_EDGES") == [wanted], clock
-    assert bank.at(11 + 5 * 32_766 + 2, "SWALLOWED_EDGES") == [65_532]
-    assert bank.at(11 + 5 * 32_766 + 3, "SWALLOWED_EDGES") == [65_534]
+        assert bank.at(clock, "FILTERED_EDGES") == [wanted], clock
+    assert bank.at(11 + 5 * 32_766 + 2, "FILTERED_EDGES") == [65_532]
+    assert bank.at(11 + 5 * 32_766 + 3, "FILTERED_EDGES") == [65_534]
     # The counter is set to 0 in the clock after the write.
     for cleared, wanted in ((14, 2), (13, 2), (12, 4), (18, 0), (19, 0)):
-        found = bank.ask((cleared, "CONTROL", 1), (24, "SWALLOWED_EDGES", None), captures=(23,))
+        found = bank.ask((cleared, "CONTROL", 1), (24, "FILTERED_EDGES", None), captures=(23,))
         assert found[1] == wanted, cleared
 
 

@@ -214,7 +214,7 @@ def test_every_register_of_a_control_loop_is_there(file: str, command: str, tmp_
 def test_the_configurations_have_all_kinds() -> None:
     """Values of two words, signed and not, and every option that adds a register."""
     names = {one.name for method in METHODS for registers in maps(method) for one in registers}
-    assert {"VELOCITY_HIGH", "POSITION_HIGH", "INDEX_POSITION", "AGE", "VELOCITY_LOWER", "SWALLOWED_EDGES"} <= names
+    assert {"VELOCITY_HIGH", "POSITION_HIGH", "INDEX_POSITION", "AGE", "VELOCITY_LOWER", "FILTERED_EDGES"} <= names
     assert {"N_EP1", "DT_SHIFT", "ACCELERATION", "POSITION_FINE", "POSITION_FINE_HIGH"} <= names
     assert any("tick_errors" in registers.counted for registers in maps("s"))
 

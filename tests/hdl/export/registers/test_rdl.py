@@ -116,4 +116,4 @@ def test_every_register_and_field_is_checked_on_the_core(tmp_path: Path) -> None
         "COUNTERS.tick_errors",
         "DT_SHIFT.value",
     } <= fields
-    assert {"INDEX_POSITION_HIGH.value", "STATUS.out_of_range", "N_EP1.value", "SWALLOWED_EDGES.value"} <= fields
+    assert {"INDEX_POSITION_HIGH.value", "STATUS.out_of_range", "N_EP1.value", "FILTERED_EDGES.value"} <= fields
