@@ -202,7 +202,7 @@ def test_code_that_decides_no_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
     before = digests()
     assert before == (code_digest(), code_digest(hardware=True))
-    for file in ("sim/plots/run.py", "sim/captures/vcd.py", "sim/studies/plan.py", "cli/main.py"):
+    for file in ("sim/plots/run.py", "sim/studies/plan.py", "cli/main.py"):
         assert digests(file) == before, file
     for file in ("hdl/core/tachometer.py", "sim/engines/driver.h"):
         golden, hardware = digests(file)
