@@ -32,9 +32,9 @@ module outputs #(
       .watch_level_a(level_a), .watch_level_b(level_b), .watch_ready(ready), .watch_step(step),
       .watch_decode_error(decode_error), .watch_clear(clear), .watch_seen(seen), .watch_health(health),
       .watch_faults(faults),
-      .position_compare_position(value), .compare_step(step), .compare_compare(compare), .compare_position_compare_valid(position_compare_valid),
+      .compare_position(value), .compare_step(step), .compare_position_compare(compare), .compare_position_compare_valid(position_compare_valid),
       .compare_position_compare_position(position_compare_position), .compare_position_compare_count(position_compare_count),
-      .both_position(value), .both_step(step), .both_moves(load), .both_compare(both), .both_position_compare_valid(both_valid),
+      .both_position(value), .both_step(step), .both_moves(load), .both_position_compare(both), .both_position_compare_valid(both_valid),
       .both_position_compare_position(both_position)
   );
 
