@@ -85,9 +85,9 @@ class Tachometer(wiring.Component):
         self.low_pass = (
             None if spec.lowpass is None else LowPass(spec.velocity.low_pass, layout, clears=spec.facts.last_at_rest)
         )
-        self.rest: Standstill | None = None
+        self.silence: Standstill | None = None
         if not isinstance(self.datapath, OwnStandstill) and spec.facts.rests_with == TICK:
-            self.rest = Standstill(spec.timing.max_ticks, spec.widths.count, max_shift=spec.times.max_tick_shift)
+            self.silence = Standstill(spec.timing.max_ticks, spec.widths.count, max_shift=spec.times.max_tick_shift)
         self.update_age = UpdateAge(spec.timing.max_ticks, spec.widths.stamp) if spec.age else None
         self.velocity_output: SerialVelocityOutput | PipelinedVelocityOutput | None = None
         if spec.velocity.output is not None:
@@ -196,15 +196,15 @@ class Tachometer(wiring.Component):
         """Drive `standstill`."""
         if isinstance(self.datapath, OwnStandstill):
             m.d.comb += self.standstill.eq(self.datapath.standstill)
-        if self.rest is not None:
-            m.submodules.silence = rest = self.rest
+        if self.silence is not None:
+            m.submodules.silence = silence = self.silence
             m.d.comb += [
-                rest.tick.eq(self.tick),
-                rest.m_e.eq(self.pulse_count),
-                self.standstill.eq(rest.standstill),
+                silence.tick.eq(self.tick),
+                silence.m_e.eq(self.pulse_count),
+                self.standstill.eq(silence.standstill),
             ]
             if isinstance(self.datapath, LongTicks):
-                m.d.comb += rest.shift.eq(self.datapath.tick_shift)
+                m.d.comb += silence.shift.eq(self.datapath.tick_shift)
 
     def _output(self, m: Module) -> stream.Interface:
         """Lead updates from the datapath to the ports, through low-pass filter and unit if they are there."""

@@ -14,14 +14,14 @@ from tachometry.sim.captures.file import CaptureError, Channel, OptionError, che
 from tachometry.sim.captures.header import Header, TextOptions, check_seconds, read_header
 from tachometry.sim.captures.rows import Lines, Times, blocks, check_rows, opened, refuse
 from tachometry.sim.captures.time_unit import parted
+from tachometry.spec.language.units import ANGLE, SPEED
 
 Floats = NDArray[np.float64]
 _MOST = 1 << 53  # counts that a number of a spreadsheet holds
 _SLOWEST = 1.0  # seconds between two rows of a log, unless their times have a unit
-_TURN = 2 * math.pi
 # rad, or rad/s, in the units that a column of angles or speeds may have
-ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180, "turn": _TURN}
-SPEEDS = {"rad/s": 1.0, "rev/s": _TURN, "rpm": math.pi / 30, "deg/s": math.pi / 180}
+ANGLES = {name: float(unit.exact) for name, unit in ANGLE.items()} | {"turn": 2 * math.pi}
+SPEEDS = {name: float(unit.exact) for name, unit in SPEED.items()} | {"deg/s": ANGLES["deg"]}
 _ALIKE = {
     "deg": "degree degrees",
     "turn": "turns rev revs revolution revolutions rotation rotations",
