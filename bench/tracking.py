@@ -62,7 +62,7 @@ def rms(wrong: NDArray[np.float64] | None) -> float:
 
 
 def row(situation: Situation, n_seeds: int, beside: bool = True) -> list[str]:
-    """Return a situation's row: at each tick the error, that of floating point, and the share within `velocity_std`."""
+    """Return a row: at each tick the errors of the core and in floating point, and the share in `velocity_std`."""
     seeds = range(FIRST_SEED, FIRST_SEED + (n_seeds if situation.random else 1))
     cells = [situation.name]
     for tick in TICKS:

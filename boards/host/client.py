@@ -66,7 +66,7 @@ class Client:
         return self.registers.fields("COUNTERS", self._word("COUNTERS"))
 
     def clear(self) -> None:
-        """Set all counters to 0, and what the core keeps of its faults and of filtered edges."""
+        """Set all counters to 0, and clear the faults and the filtered edges of the core."""
         self.control("clear")
 
     def control(self, field: str) -> None:

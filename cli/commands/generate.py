@@ -63,7 +63,7 @@ class Asked:
     spec: AnySpec
     # name, bus, baud, target and irq: see `hdl.export.export`
     name: str
-    # testbench and ci: what is written beside the core; writer: of the Verilog
+    # testbench and ci: further files; writer: the one of the Verilog
     testbench: str | None
     bus: str
     baud: int | None

@@ -77,7 +77,7 @@ def loop(
     csv: Path | None,
     **_: Any,
 ) -> int:
-    """Close a velocity loop about a core, and show what it does.
+    """Simulate a velocity loop: a core, its motor and its controller.
 
     Pins of the core see the encoder of a motor with friction, load and torque noise. Its velocity and position go to a
     controller with a disturbance observer (Tsuji 2009, Figs. 2 and 11), which commands the motor's current. Core,
