@@ -68,7 +68,7 @@ class BoardSimulation:
     def __init__(self, registers: DemoMap, bus: Bus) -> None:
         uart_rx = next(port for port in bus.ports(registers) if port.name == "uart_rx")
         pins = [port for port in registers.inputs if port.name not in ("clk", "rst")]
-        design = _BoardDesign(registers.spec, [*pins, uart_rx], None, registers, bus)
+        design = _BoardDesign(registers.spec, [*pins, uart_rx], registers=registers, bus=bus)
         # The pins of an encoder are low; that which enables a drive has a pull-up.
         self._lines = sum(1 << place for place, pin in enumerate(pins) if pin.name == "enable")
         self._library = ctypes.CDLL(str(Cxxrtl().library(design)))

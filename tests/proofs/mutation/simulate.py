@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from proofs.mutation.cases import Pins
 from proofs.mutation.netlist import SELECTOR, WIDTH, Mutant, grouped
+from support.compiled import HEADERS
 
 from tachometry.sim import build
-from tachometry.sim.engines.cxxrtl import headers, mangled, translate
+from tachometry.sim.engines.cxxrtl import mangled, translate
 
 _OPTIONS = ("-O1", "-DNDEBUG")  # a mutant may read beyond the end of a memory
 _DRIVER = Path(__file__).with_name("driver.h").read_text(encoding="utf-8")
@@ -43,7 +44,7 @@ def library(pins: Pins, flat: str, group: list[Mutant]) -> Path:
 
     def make(folder: Path) -> Path:
         source = translate(grouped(flat, group, folder)) + _ports(pins) + _DRIVER
-        return build.compile_library(source, folder, f"-I{headers()}", *_OPTIONS)
+        return build.compile_library(source, folder, f"-I{HEADERS}", *_OPTIONS)
 
     key = build.digest("mutants", tools, _OPTIONS, _PORTS, _DRIVER, flat, commands, pins, _GROUPING)
     return build.cached(key, ".so", make)

