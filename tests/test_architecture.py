@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tachometry.spec import of_texts
+from tachometry.spec import Port, of_texts
 from tachometry.spec.core.extras import EXTRAS
 from tachometry.spec.language.option import options_of
 
@@ -34,7 +34,7 @@ ALLOWED = {
     "hdl/axes": {"hdl/arithmetic", "hdl/front_end", "hdl/methods", "hdl/output", "hdl/wires", "spec"},
     "hdl/bus": {"hdl/wires", "spec"},
     "hdl/control": {"hdl/arithmetic", "hdl/wires", "spec"},
-    "hdl/extras": {"hdl/arithmetic", "hdl/front_end", "hdl/wires", "spec"},
+    "hdl/extras": {"hdl/arithmetic", "hdl/front_end", "hdl/output", "hdl/wires", "spec"},
     "hdl/core": {
         "hdl/arithmetic",
         "hdl/axes",
@@ -309,11 +309,11 @@ CEILING: dict[str, tuple[int, Callable[[], Counter[str]]]] = {
     "lines of Python of the product": (50069, lambda: lines(*PRODUCT)),
     "lines of Python of the tests": (42648, lambda: lines("tests")),
     "lines of Python of the benchmarks": (3150, lambda: lines("bench")),
-    "functions over 40 lines": (44, lambda: every(is_long, *PRODUCT)),
+    "functions over 40 lines": (43, lambda: every(is_long, *PRODUCT)),
     "functions with more than 6 parameters": (29, lambda: every(has_many_parameters, *PRODUCT)),
-    "getattr and hasattr in hdl": (36, lambda: every(lambda node: calls(node, "getattr", "hasattr"), "hdl")),
+    "getattr and hasattr in hdl": (34, lambda: every(lambda node: calls(node, "getattr", "hasattr"), "hdl")),
     "places that tell kinds of core apart": (22, lambda: every(tells_kinds_apart, *PRODUCT)),
-    "broken docstrings": (61, lambda: every(has_a_broken_docstring, *PRODUCT, "bench", "tests")),
+    "broken docstrings": (60, lambda: every(has_a_broken_docstring, *PRODUCT, "bench", "tests")),
 }
 
 
@@ -338,12 +338,15 @@ OTHER_MEANINGS = {
 
 
 def names_of_extras() -> set[str]:
-    """Return the options and ports of a core with every extra."""
-    options = [(about, extra) for extra in EXTRAS for about in options_of(extra)]
-    texts = {about.name: "yes" if about.flag else next(filter(None, about.tests or ())) for about, _ in options}
-    spec = of_texts("track", {"ppr": "25", "index": "yes", "max-speed": "100rad/s", **texts})
-    ports = [port for extra in spec.extras for port in extra.ports(spec)]
-    ports += [pin.port for pin in spec.front_end.pins if not pin.of]  # wiring has complements, too
+    """Return the options and ports of cores with every extra."""
+    texts = dict[str, str]()
+    ports = list[Port]()
+    for test in (0, -1):
+        for about in (about for extra in EXTRAS for about in options_of(extra)):
+            texts[about.name] = "yes" if about.flag else [*filter(None, about.tests or ())][test]
+        spec = of_texts("track", {"ppr": "25", "index": "yes", "max-speed": "100rad/s", **texts})
+        ports += [port for extra in spec.extras for port in extra.ports(spec)]
+        ports += [pin.port for pin in spec.front_end.pins if not pin.of]  # wiring has complements, too
     return {*texts, *(name.replace("-", "_") for name in texts), *(port.name for port in ports)}
 
 
@@ -358,7 +361,7 @@ def named_in(file: Path) -> set[str]:
 
 def test_only_extras_name_an_extra() -> None:
     names = names_of_extras()
-    assert len(names) > 30
+    assert len(names) > 40
     for layer in LAYERS:
         for file in (file for file in (ROOT / layer).rglob("*.py") if "extras" not in file.parts):
             place = file.relative_to(ROOT).as_posix()

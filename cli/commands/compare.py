@@ -28,7 +28,7 @@ from tachometry.spec.core.extras import EXTRAS
 from tachometry.spec.language.units import parse_time
 
 # Options of a core that change its size alone.
-_NO_VELOCITY = ("preset", "index-once", "position-modulo", "position-compare")
+_NO_VELOCITY = ("preset", "index-once", "position-modulo")
 
 
 @click.command(

@@ -14,8 +14,7 @@ from tachometry.cli.reports.terminal import print_rows, stdout_console
 from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.simulation import Axis, Simulation
 from tachometry.spec import AxesSpec, CoreSpec
-from tachometry.spec.core.compare import BOTH
-from tachometry.spec.language.port import COMPARE, MISSED, WIDE
+from tachometry.spec.language.port import MISSED, WIDE
 from tachometry.spec.language.units import format_time, plural
 
 _Row = tuple[str, str]  # a name and its value
@@ -99,17 +98,6 @@ def _updates(run: Run) -> tuple[str, str]:
     return "updates", f"{len(run.updates.clock)} ({np.count_nonzero(run.updates.forced)} of them forced)"
 
 
-def _none(axis: Axis) -> str:
-    """Say why there were no pulses of the position compare."""
-    compare, position = axis.spec.position_compare, axis.run.ticks.position
-    assert compare is not None
-    if compare.depth:
-        return ": its list is empty here, and a program fills it"
-    first = str(compare).split(":")[0] if compare.fine else compare.ahead(axis.spec.position_width)
-    turning = "" if compare.direction == BOTH else f" while the shaft turned {compare.direction}"
-    return f": {first} was not reached{turning}, as position was {position.min()} to {position.max()}"
-
-
 def _rows(axis: Axis) -> list[tuple[str, str]]:
     """Return rows of the table of a core of one axis: a name and its value."""
     spec, run, truth = axis.spec, axis.run, axis.truth
@@ -144,13 +132,6 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         rows.append(("position", f"{run.ticks.position[-1]} at the end; counts out are without presets"))
     if spec.front_end.modulus is not None:
         rows.append(("position modulo", f"{run.ticks.position_modulo[-1]} of {spec.front_end.modulus} at the end"))
-    if spec.position_compare is not None:
-        pulses = run.tables[COMPARE]
-        one = 1 << getattr(spec, "position_fine_bits", 0) * spec.position_compare.fine
-        last = (
-            f", the last at position {pulses.position_compare_position[-1] / one:.15g}" if len(pulses) else _none(axis)
-        )
-        rows.append(("position compare", f"{plural(len(pulses), 'pulse')}{last}"))
     rows += filter(None, (extra.row(spec, run) for extra in spec.extras))
     if spec.external_tick:
         rows.append(("tick errors", f"{len(run.tick_errors)} (external tick too early or missing)"))

@@ -21,16 +21,13 @@ from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.front_end.standstill import Standstill
 from tachometry.hdl.methods import DATAPATHS
 from tachometry.hdl.methods.datapath import LongTicks, OwnStandstill, OwnTicks, TickSource
-from tachometry.hdl.output.compare_output import CompareOutput
-from tachometry.hdl.output.fine_compare_output import FineCompareOutput
 from tachometry.hdl.output.low_pass import LowPass
 from tachometry.hdl.output.update import update_layout
 from tachometry.hdl.output.update_age import UpdateAge
 from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput, SerialVelocityOutput
 from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import follow, members
-from tachometry.spec import TachometerSpec, TrackTachometer
-from tachometry.spec.core.compare import LIST_PINS
+from tachometry.spec import TachometerSpec
 from tachometry.spec.language.port import MISSED, TICK, UPDATE, WIDE
 
 
@@ -94,15 +91,6 @@ class Tachometer(wiring.Component):
             box = SerialVelocityOutput if spec.latency.output_serial else PipelinedVelocityOutput
             self.velocity_output = box(spec.velocity.output, layout)
 
-        self.compare_output: CompareOutput | None = None
-        if spec.position_compare is not None:
-            clocks = spec.position_compare.clocks(spec.timing.clock_hz)
-            if isinstance(spec, TrackTachometer) and spec.position_compare.fine:
-                given = spec.carrying, spec.velocity.native
-                self.compare_output = FineCompareOutput(spec.position_compare, clocks, spec.position_width, *given)
-            else:
-                aims = spec.position_compare.both and spec.front_end.moves_position
-                self.compare_output = CompareOutput(spec.position_compare, clocks, spec.position_width, aims=aims)
         self.extras = {extra.name: gates_of(extra, spec) for extra in spec.extras}
 
     @property
@@ -113,7 +101,7 @@ class Tachometer(wiring.Component):
     @property
     def idle(self) -> tuple[Idle, ...]:
         """Registers that a simulation may move on."""
-        names = ("conditioner", "compare_output", "datapath")
+        names = ("conditioner", "datapath")
         boxes: dict[str, object] = {name: getattr(self, name) for name in names}
         boxes |= {f"{name}_box": box for name, box in self.extras.items()}
         if not self._spec.facts.own_ticks:
@@ -138,7 +126,6 @@ class Tachometer(wiring.Component):
         self._age(m, ticks, updates)
         self._place(m)
         self._index(m)
-        self._compare(m)
         self._extend(m)
         if isinstance(self.sampling_clock, ExternalTick):
             m.d.comb += [
@@ -300,11 +287,14 @@ class Tachometer(wiring.Component):
         """Lead inputs of extras through the conditioner, and return what else they may be given, by name.
 
         `level_a`, `ready` and `step` are of the decoder; `level_NAME` and `ready_NAME` of an asynchronous input, a bit
-        for each line; `equal_a` says that a line equals its complement; `preset_rises` sets the position, and
-        `next_position` is `position` of the next clock.
+        for each line; `equal_a` says that a line equals its complement; `preset_rises` sets the position, and `moves`
+        is high when anything but a step changes it; `next_position` is `position` of the next clock;
+        `native_velocity` and others are of an update as the method makes it.
         """
-        decoder, box = self.decoder, self.conditioner
-        taps: dict[str, Value] = {"next_position": self.position_counter.next}
+        decoder, box, counter, updates = self.decoder, self.conditioner, self.position_counter, self.datapath.updates
+        moves = counter.clear if self._spec.preset is None else counter.clear | counter.load
+        taps: dict[str, Value] = {"next_position": counter.next, "moves": moves, "native_valid": updates.valid}
+        taps |= {f"native_{name}": updates.p[name] for name in update_layout(self._spec).members}
         taps |= {
             name: getattr(decoder, name) for name in decoder.signature.members if name[:5] in ("level", "ready", "step")
         }
@@ -320,27 +310,3 @@ class Tachometer(wiring.Component):
             for kind in ("level", "ready"):
                 taps[f"{kind}_{name}"] = Cat(getattr(box, f"{kind}_{line}") for line in pin.lines)
         return taps
-
-    def _compare(self, m: Module) -> None:
-        """Make pulses at positions, if they are asked for."""
-        if self.compare_output is None:
-            return
-        m.submodules.compare_output = box = self.compare_output
-        counter, updates = self.position_counter, self.datapath.updates
-        if hasattr(box, "moves"):
-            m.d.comb += box.moves.eq(counter.clear if self._spec.preset is None else counter.clear | counter.load)
-        if isinstance(box, FineCompareOutput):
-            follow(m, box, updates.p, ("velocity", "position_fine"))
-            m.d.comb += [box.valid.eq(updates.valid), box.tick.eq(self.tick)]
-        else:
-            (step,) = delay(m, self.decoder.step, clocks=self._spec.latency.tick)
-            m.d.comb += [box.step.eq(step), box.position.eq(self.position)]
-        follow(
-            m,
-            self,
-            box,
-            ("position_compare", "position_compare_valid", "position_compare_position", "position_compare_count"),
-        )
-        if "position_compare_waiting" in box.signature.members:
-            follow(m, box, self, LIST_PINS)
-            follow(m, self, box, ("position_compare_waiting",))

@@ -57,10 +57,9 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
         z |= np.repeat(rng.random(len(clock) // 12 + 1) < 0.1, 12)[: len(clock)].astype(np.uint8)
     n_clocks = int(clock[-1]) + spec.facts.rest_tenths * longest // 10 + 40 * cycles + 300
     a, b, c = (level >> np.uint8(line) & np.uint8(1) for line in range(3))
-    trace = _probed(spec, PinTrace(clock, a, b, n_clocks, z, c=c if "c" in sensor.lines else None), seed)
+    trace = PinTrace(clock, a, b, n_clocks, z, c=c if "c" in sensor.lines else None)
+    trace = _probed(spec, trace, np.interp(clock, edge, counts).astype(np.int64), seed)
     trace = _open(spec, trace, seed)
-    if spec.position_compare is not None and spec.position_compare.depth:
-        trace = _listed(spec, trace, np.interp(np.arange(edge[-1]), edge, counts), seed)
     for name in spec.front_end.controls:
         few = 30 if name == "preset" else 6
         high = spec.filter_clocks + int(rng.integers(1, 30))
@@ -74,19 +73,30 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     return trace.with_tick_in(np.cumsum(np.maximum(apart, 2)))
 
 
-def _probed(spec: TachometerSpec, trace: PinTrace, seed: int) -> PinTrace:
-    """Return the trace with edges of the inputs of extras in clocks of counts, beside them and anywhere."""
-    bits = {pin.port.name: pin.port.width for pin in spec.front_end.pins if not pin.of}
-    often = dict.fromkeys(bits, 0.4) | {pin.port.name: 0.2 for pin in spec.front_end.pins if pin.act}
-    if not bits:
+def _probed(spec: TachometerSpec, trace: PinTrace, went: NDArray[np.int64], seed: int) -> PinTrace:
+    """Return the trace with edges of the inputs of extras in clocks of counts, beside them and anywhere; of an input
+    that is a position, with positions near where the shaft is.
+    """
+    pins = [pin for pin in spec.front_end.pins if not pin.of]
+    if not pins:
         return trace
     rng = np.random.default_rng([seed, 2])
     near = rng.choice(trace.clock, len(trace.clock) // 2) + rng.integers(-2, 3, len(trace.clock) // 2)
     clock = merged(trace.clock, np.clip(near, 0, trace.n_clocks - 1), rng.integers(0, trace.n_clocks, 100))
-    lines = trace.at(clock)
-    for name in bits:
-        row = np.maximum.accumulate(np.where(rng.random(len(clock)) < often.get(name, 0.4), np.arange(len(clock)), 0))
-        lines[name] = rng.integers(0, 1 << bits[name], len(clock)).astype(np.uint8)[row]
+    lines: dict[str, NDArray[Any]] = {**trace.at(clock)}
+    place = went[np.searchsorted(trace.clock, clock, side="right") - 1]
+    for pin in pins:
+        often = (0.05 if pin.port.name.endswith("clear") else 0.2) if pin.act else 0.4
+        acts = rng.random(len(clock)) < often
+        row = np.maximum.accumulate(np.where(acts, np.arange(len(clock)), 0))
+        value: NDArray[Any]
+        if pin.port.signed:
+            value = place + rng.integers(-3, 4, len(clock)) & (1 << pin.port.width) - 1
+        elif pin.act and not pin.rest:
+            value = acts.astype(np.uint8)
+        else:
+            value = rng.integers(0, 1 << pin.port.width, len(clock)).astype(np.uint8)[row]
+        lines[pin.port.name] = value
     return PinTrace.of_lines(clock, trace.n_clocks, lines)
 
 
@@ -103,20 +113,6 @@ def _open(spec: TachometerSpec, trace: PinTrace, seed: int) -> PinTrace:
         lines[f"{line}_n"] = lines[line] ^ (~equal).astype(np.uint8)
         trace = PinTrace.of_lines(clock, trace.n_clocks, lines)
     return trace
-
-
-def _listed(spec: TachometerSpec, trace: PinTrace, went: NDArray[np.float64], seed: int) -> PinTrace:
-    """Return the trace with positions for the list of the compare output, near where the shaft is, often too many."""
-    rng = np.random.default_rng([seed, 3])
-    acts = np.unique(rng.integers(0, len(went), 200))
-    clock = merged(trace.clock, acts, acts + 1)
-    lines: dict[str, NDArray[Any]] = {**trace.at(clock)}
-    place = went.take(clock, mode="clip").astype(np.int64) + rng.integers(-3, 4, len(clock))
-    lines["position_compare_next"] = place & (1 << spec.position_width) - 1
-    for name, often in (("append", 0.6), ("clear", 0.1)):
-        act = np.isin(clock, acts) & (rng.random(len(clock)) < often)
-        lines[f"position_compare_{name}"] = act.astype(np.uint8)
-    return PinTrace.of_lines(clock, trace.n_clocks, lines)
 
 
 def stress_of(spec: CoreSpec, seed: int, n_edges: int = 300) -> Trace:

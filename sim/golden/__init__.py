@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from tachometry.sim.golden import compare, extras
+from tachometry.sim.golden import extras
 from tachometry.sim.golden.axes import run_axes
 from tachometry.sim.golden.front_end import Steps, count, decoded
 from tachometry.sim.golden.low_pass import filtered
@@ -53,19 +53,15 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
     if "cause" not in measured.columns:
         measured = measured.having(cause=measured.clock - spec.latency.datapath)
     updates = in_unit(spec, filtered(spec, ticks, measured))
-    pulses = compare.pulses(spec, steps, trace, measured)
-    without = {"tick": ticks, "velocity_valid": updates, "index_valid": index}
+    without = {"tick": ticks, "velocity_valid": updates, "index_valid": index, "measured": measured}
     added = extras.tables(extras.View(spec, trace, steps, without))
-    ticks = ticks.having(**compare.shown(spec, pulses, ticks.clock), **extras.shown(spec, added, ticks.clock))
-    found = {
+    ticks = ticks.having(**extras.shown(spec, added, ticks.clock))
+    found = without | {
         "tick": with_age(spec, ticks, updates),
-        "velocity_valid": updates,
-        "index_valid": index,
         WIDE: Table(steps.wide + spec.latency.tick, {}),
         MISSED: Table(steps.missed + spec.latency.tick, {}),
         "decode_error": Table(steps.errors, {}),
         "tick_error": Table(tick_errors, {}),
         **added,
-        **pulses,
     }
     return {name: table.rows(slice(np.searchsorted(table.clock, trace.n_clocks))) for name, table in found.items()}

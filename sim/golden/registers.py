@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tachometry.sim import golden
-from tachometry.sim.golden import compare, extras
+from tachometry.sim.golden import extras
 from tachometry.sim.golden.front_end import decoded, homed
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec.language.field import WORD, Field, Register
@@ -227,15 +227,13 @@ class GoldenBank:
             "filtered_edges": 2 * min(glitches, (1 << 15) - 1),
             **self._shown(extras.shown(self._map.spec, self._tables, np.array([clock]), self._cleared)),
             "homed": int(homed(self._map.spec, self._steps, np.array([clock]))[0]),
-            **self._shown(compare.shown(self._map.spec, self._tables, np.array([clock]))),
         }
 
     def _act(self, accesses: Sequence[Access]) -> None:
-        """Find what extras show, and where pulses are, when a program writes what are inputs without a bus."""
+        """Find what extras show when a program writes what are inputs without a bus."""
         spec = self._map.spec
         added = {name for extra in spec.extras for name, *_ in extra.registers(spec)}
         fields = {field for name in added for field in self._map[name].fields}
-        fields |= {field for field in self._map.settings if field.port.startswith("position_compare_")}
         if not fields and not spec.extras:
             return
         control = self._map.registers.index(self._map["CONTROL"])
@@ -256,8 +254,6 @@ class GoldenBank:
         }
         pins = PinTrace.of_lines(clock, self._trace.n_clocks, lines)
         self._tables |= extras.tables(extras.View(spec, pins, self._steps, self._tables, clears))
-        if "position_compare_next" in lines:
-            self._tables |= compare.listed(spec, self._steps, pins)
 
     @staticmethod
     def _shown(found: dict[str, np.ndarray]) -> dict[str, int]:

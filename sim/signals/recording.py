@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from tachometry.sim.signals.source import Source
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.compare import LIST_PINS
 from tachometry.spec.core.front_end import OF_CONTROLS
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 from tachometry.spec.language.units import format_time
@@ -196,7 +195,7 @@ class PinTrace(_Lines):
         A third line.
     more : mapping of str to integer array, shape (n,)
         Further inputs by name, such as `preset`. `probe` and `probe_arm` have a bit for each probe, the first lowest;
-        A setting, such as `probe_edges`, is what a program has written. `position_compare_next` has bits of a position.
+        A setting, such as `probe_edges`, is what a program has written.
     """
 
     clock: NDArray[np.int64]
@@ -274,8 +273,6 @@ class PinTrace(_Lines):
         low = {name: np.zeros_like(self.a) for name in spec.front_end.controls if name not in self.lines}
         low |= {pin.port.name: np.full_like(self.a, pin.rest) for pin in spec.front_end.pins if not pin.of}
         low |= {f"{line}_n": self.lines[line] ^ np.uint8(1) for line in spec.front_end.complemented}
-        if spec.position_compare is not None and spec.position_compare.depth:
-            low |= dict.fromkeys(LIST_PINS, np.zeros_like(self.a))
         return PinTrace.of_lines(self.clock, self.n_clocks, low | self.lines) if low else self
 
 

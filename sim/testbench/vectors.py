@@ -20,7 +20,6 @@ from tachometry.sim.testbench.loop_inputs import changes as loop_changes
 from tachometry.sim.testbench.loop_inputs import loop_inputs
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control import AnySpec
-from tachometry.spec.core.compare import LIST_PINS
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.provenance import LICENSE, generator, notice
 
@@ -85,7 +84,7 @@ def _vectors(core: AnySpec, traces: Sequence[PinTrace]) -> dict[str, Any]:
 
 def _acts(core: AnySpec) -> set[str]:
     """Return inputs, or registers on a bus, which no bench writes."""
-    return {*LIST_PINS, *(pin.port.name for pin in core.tachometer.front_end.pins if pin.act)}
+    return {pin.port.name for pin in core.tachometer.front_end.pins if pin.act}
 
 
 def _unarmed(core: AnySpec, trace: PinTrace) -> dict[str, NDArray[np.uint8]]:
@@ -115,7 +114,7 @@ def usual_motion(spec: TachometerSpec, seed: int = 1, most: int = _MOVING) -> Re
     """Return fast and slow, forward, backward and back over the index, with jitter and illegal transitions, then at
     rest.
 
-    With a compare output it goes over its first positions before that. It moves for at most so many clocks. The rest
+    It makes the tours of extras before that. It moves for at most `most` clocks. The rest
     outlasts the maximum time, so that the core reads zero, if that takes at most five times as many; else it is short.
     """
     bounces = spec.filter_clocks and spec.encoder.sensor in ("quadrature", "pulses", "hall")
@@ -130,7 +129,8 @@ def usual_motion(spec: TachometerSpec, seed: int = 1, most: int = _MOVING) -> Re
         index_state=spec.front_end.index_place,
     )
     usual = _usual_form(spec, most, backward=seed % 2 == 0)
-    return encoder.record(parse_motion("+".join([*_to_compare(spec, 5 * most), usual]))).recording
+    tours = [part for extra in spec.extras for part in _tour(spec, extra.tour(spec), 5 * most)]
+    return encoder.record(parse_motion("+".join([*tours, usual]))).recording
 
 
 def _fastest(spec: TachometerSpec) -> float:
@@ -139,16 +139,14 @@ def _fastest(spec: TachometerSpec) -> float:
     return spec.timing.tick_cycles * spec.encoder.decoding / edges / (1 + spec.filter_clocks)
 
 
-def _to_compare(spec: TachometerSpec, longest: int) -> list[str]:
-    """Return segments over the first three positions of the compare output, if that takes no more clocks."""
-    if spec.position_compare is None or spec.position_compare.depth:
+def _tour(spec: TachometerSpec, positions: Sequence[int], longest: int) -> list[str]:
+    """Return segments over these positions, if that takes no more clocks."""
+    if not positions:
         return []
-    start, apart = (
-        spec.position_compare.in_lsb(place, 0) for place in (spec.position_compare.start, spec.position_compare.apart)
-    )
-    most, more = _fastest(spec), 3 + abs(start) // 16  # since illegal transitions lose counts
-    ahead = start - int(math.copysign(more, apart))  # whence it is reached in its direction
-    ways = [ahead, start + 2 * apart + int(math.copysign(more, apart)) - ahead]
+    first, last = positions[0], positions[-1]
+    most, more = _fastest(spec), 3 + abs(first) // 16  # since illegal transitions lose counts
+    beyond = int(math.copysign(more, last - first))
+    ways = [first - beyond, last + beyond - (first - beyond)]
     seconds = [abs(way) / most * float(spec.timing.tick_seconds) for way in ways]
     if sum(seconds) * spec.timing.clock_hz > longest:
         return []

@@ -10,6 +10,7 @@ from tachometry.spec.control.form import ControlForm, Term, factor_bits
 from tachometry.spec.control.generator import GeneratorForm, generator_clocks, generator_form
 from tachometry.spec.control.law import Law
 from tachometry.spec.control.units import Units
+from tachometry.spec.core.extras.extra import refuse
 from tachometry.spec.core.front_end import OF_CONTROLS
 from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.language.option import ParameterError, check_options, option
@@ -100,10 +101,7 @@ class Loop(Law):
             raise ParameterError(named, "must not be given together with --loop, which takes A and B as they come")
         for name in self.tachometer.front_end.controls:
             raise ParameterError(OF_CONTROLS[name], "must not be given together with --loop, whose position would jump")
-        if self.tachometer.position_compare is not None and self.tachometer.position_compare.depth:
-            raise ParameterError(
-                "position_compare", "must not be a list together with --loop, whose inputs are commands"
-            )
+        refuse(self.tachometer.extras, "loop")
         check_options(self)
         self._check_formats()
         if self.period < self.latency.least_period:

@@ -30,13 +30,6 @@ def check(spec: Core) -> None:
         raise ParameterError("bounds", "must not be given with --missing-teeth: teeth that are not there have no edges")
     _check_index_state(spec)
     _check_place(spec)
-    if spec.position_compare is not None:
-        fastest = Fraction(0)
-        if spec.max_speed is not None:
-            fastest = min(spec.max_speed.counts(spec.encoder.counts_per_rev, spec.tick.seconds(1)), Fraction(1))
-        spec.position_compare.check(
-            spec.timing.clock_hz, spec.position_width, fastest, getattr(spec, "position_fine_bits", None)
-        )
     for extra in spec.extras:
         extra.check(spec)
     if spec.facts.bounds:

@@ -4,13 +4,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, Literal
 
-from tachometry.spec.core.compare import Compare
 from tachometry.spec.core.extras import EXTRAS, Extra
 from tachometry.spec.core.front_end import FrontEnd
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 from tachometry.spec.core.numbers import Numbers
 from tachometry.spec.core.words import Words, speed_notes
-from tachometry.spec.language.option import option
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,19 +16,6 @@ class Core(Numbers):
     """Features beside the measurement, and the inputs of a core."""
 
     extras: tuple[Extra, ...] = field(default=(), metadata={"extras": EXTRAS})  # see `spec.core.extras`
-    position_compare: Compare | None = option(  # noqa: RUF009
-        None,
-        "Pulses at positions, such as 100:100:50:10us. Output position_compare has pulses of WIDTH, a "
-        "time or clocks, at COUNT positions (0: no end) from START on, STEP counts apart. They come while "
-        "the shaft turns forward; with :backward at the end backward, with :both either way. "
-        "list:DEPTH:WIDTH takes positions that a program writes, up to DEPTH ahead. With :fine at the end "
-        "START and STEP may lie between counts, at places that track finds.",
-        metavar="[START:STEP:COUNT|list:DEPTH]:WIDTH",
-        parse=Compare.parse,
-        tests=("", "2:3:0:2clk", "1.5:2.5:0:2clk:fine", "-2:3:40:1clk:backward", "3:4:9:1clk:both", "list:3:2clk"),
-        few=3,
-        tacit=True,
-    )
     # why this method was taken, where none was named; empty: it was named
     chosen: str = field(default="", compare=False, repr=False)
 
@@ -53,8 +38,6 @@ class Core(Numbers):
             "tick_latency": latency.tick,
             "tick_to_velocity": latency.tick_to_velocity,
         }
-        if self.position_compare is not None and not self.position_compare.fine:  # else it is at the place itself
-            found["pin_to_position_compare"] = latency.pin_to_count + latency.tick + 1
         for extra in self.extras:
             found |= extra.latency(self)
         return found | ({"tick_in_to_window_end": TICK_IN_TO_WINDOW_END} if self.external_tick else {})

@@ -11,6 +11,7 @@ from tachometry.spec.core.recovery import Recovery
 from tachometry.spec.core.tick import Scale, Tick
 from tachometry.spec.core.times import Times, Widths
 from tachometry.spec.core.velocity import Bound, Velocity
+from tachometry.spec.formats.carrying import Carrying
 from tachometry.spec.language.port import Port, Ports
 
 
@@ -46,6 +47,11 @@ class Numbers(Asked):
     def latency(self) -> Latency:
         """Clocks from a pin to the velocity."""
         raise NotImplementedError
+
+    @cached_property
+    def carrying(self) -> Carrying | None:
+        """How `position_fine` is carried on to the next update; None: the method has none."""
+        return None
 
     @cached_property
     def times(self) -> Times:

@@ -2,9 +2,8 @@
 
 from collections.abc import Iterable, Iterator
 
-from tachometry.spec.core.compare import COUNT_WIDTH
 from tachometry.spec.core.core import Core
-from tachometry.spec.language.port import COMPARE, INDEX, MISSED, TICK, UPDATE, WIDE, Port, held, pin, strobe
+from tachometry.spec.language.port import INDEX, MISSED, TICK, UPDATE, WIDE, Port, held, pin, strobe
 
 # The ends of what encloses the true speed, and which way each is rounded: outward.
 BOUNDS = {"velocity_lower": -1, "velocity_upper": 1}
@@ -55,7 +54,6 @@ def ports_of(spec: Core, own: Iterable[Port]) -> Iterator[Port]:
         text += "external tick came too early and was left out."
         yield strobe("tick_error", text)
     yield from _of_extras(spec, -1)
-    yield from _compare_ports(spec)
     yield from _of_extras(spec, 0)
     if spec.filter_clocks:
         text = "Edges that the glitch filter has kept out, two for each glitch; it stays at 65534. Between the ticks "
@@ -85,10 +83,8 @@ def _inputs(spec: Core) -> Iterator[Port]:
         yield pin("preset", text)
     if front.index_once:
         yield pin("home", "Homing, asynchronous; its rising edge lets the next index be taken.")
-    pins = [(pin.port, extra.place) for extra in spec.extras for pin in extra.pins(spec) if not pin.of]
-    yield from (port for port, place in pins if place < 0)
-    yield from _list_pins(spec)
-    yield from (port for port, place in pins if place >= 0)
+    for extra in sorted(spec.extras, key=lambda extra: extra.place):
+        yield from (pin.port for pin in extra.pins(spec) if not pin.of)
 
 
 def _index_ports(spec: Core) -> Iterator[Port]:
@@ -115,40 +111,6 @@ def _wrong(spec: Core) -> str:
     if spec.encoder.missing:
         return "the gap was not where it had to be, as of a tooth lost or extra; the next gap is taken."
     return spec.encoder.kind.wrong
-
-
-def _list_pins(spec: Core) -> Iterable[Port]:
-    if spec.position_compare is None or not spec.position_compare.depth:
-        return
-    texts = {
-        "next": "Position that position_compare_append appends to the list of the position compare.",
-        "append": "Appends it, in each clock in which it is high; if there is room in the list.",
-        "clear": "Empties the list of the position compare.",
-    }
-    for name, text in texts.items():
-        width = spec.position_width if name == "next" else 1
-        yield Port(f"position_compare_{name}", "input", width, signed=width > 1, help=f"{text} Synchronous to clk.")
-
-
-def _compare_ports(spec: Core) -> Iterable[Port]:
-    if spec.position_compare is None:
-        return
-    yield held(
-        TICK,
-        "position_compare",
-        help=f"Pulse at a position, of {spec.position_compare.width}. It does not wait for a tick.",
-    )
-    yield held(
-        TICK, "position_compare_count", COUNT_WIDTH, help="Pulses of the position compare since reset; it wraps."
-    )
-    if depth := spec.position_compare.depth:
-        text = f"Positions in the list of the position compare, with the one that is awaited: {depth} are all."
-        yield held(TICK, "position_compare_waiting", depth.bit_length(), help=text)
-    yield strobe(COMPARE, "The first clock of a pulse of the position compare.")
-    text = "Position of the latest pulse of the position compare."
-    fine = getattr(spec, "position_fine_bits", 0) * spec.position_compare.fine
-    unit = f"2^-{fine} counts" if fine else "counts"
-    yield held(COMPARE, "position_compare_position", spec.position_width + fine, signed=True, unit=unit, help=text)
 
 
 def bound_ports(spec: Core) -> Iterator[Port]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 WORD = 32  # bits
@@ -68,3 +69,22 @@ class Register:
 
 
 Draft = tuple[str, str, tuple[Field, ...], dict[str, bool]]  # name, help, fields, and what is true of the register
+
+
+def position_words(name: str, help: str, port: str, width: int, reset: int = 0) -> Iterable[Draft]:
+    """Yield the register of a position that a program writes, or two if it is wider than a word."""
+    for shift, end in ({0: ""} if width <= WORD else {0: "_LOW", WORD: "_HIGH"}).items():
+        last = width <= shift + WORD
+        field = Field(
+            "value",
+            WORD,
+            help=help,
+            writable=True,
+            reset=reset >> shift if last else reset & (1 << WORD) - 1,
+            signed=last,
+            unit="counts",
+            port=port,
+            shift=shift,
+            bits=width - shift if last else 0,
+        )
+        yield f"{name}{end}", ("Upper word. " if shift else "" if last else "Lower word. ") + help, (field,), {}

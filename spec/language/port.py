@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-TICK, UPDATE, INDEX, COMPARE = "tick", "velocity_valid", "index_valid", "position_compare_valid"
+TICK, UPDATE, INDEX = "tick", "velocity_valid", "index_valid"
 WIDE, MISSED = "index_wide", "index_missed"
 FINE = "position_fine"
 STREAM = "m_axis"  # names of ports of a stream begin with it

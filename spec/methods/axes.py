@@ -27,7 +27,6 @@ _FOR_ONE = "is for one axis"
 _LEFT_OUT: tuple[tuple[str, Any, str], ...] = (
     ("age", False, f"what counts the ticks {_FOR_ONE}"),
     ("bounds", False, f"what finds them {_FOR_ONE}"),
-    ("position_compare", None, f"what compares positions {_FOR_ONE}"),
     ("preset", None, f"what sets the position {_FOR_ONE}"),
     ("position_modulo", None, f"its counter {_FOR_ONE}"),
     ("lowpass", None, f"the filter {_FOR_ONE}"),

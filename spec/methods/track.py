@@ -181,7 +181,6 @@ class TrackTachometer(TachometerSpec):
 
     @cached_property
     def carrying(self) -> Carrying:
-        """How `position_fine` is carried on to the pulses of a fine compare output."""
         native, cycles = self.velocity.native_frac_bits, self.timing.tick_cycles
         bits = self.position_fine_bits + 1 + (2 * self.tick.longest).bit_length()
         shift = max(0, bits - (native + cycles.bit_length() - 3))  # an LSB has to be that of four of the velocity
@@ -244,16 +243,6 @@ class TrackTachometer(TachometerSpec):
                 "max_ticks",
                 f"must be from 2 to {most} with method track, not {self.timing.max_ticks}: try --max-time {typed}",
                 f"takes at most {most} ticks",
-            )
-        self._check_fine()
-
-    def _check_fine(self) -> None:
-        """Check that the place of an update is carried on before the next; ParameterError if it is not."""
-        if self.position_compare is None or not self.position_compare.fine:
-            return
-        if self.carrying.latency > self.times.shortest_tick:
-            raise ParameterError(
-                "position_compare", "must not be fine here: it takes a longer tick or a shorter --filter"
             )
 
     @property

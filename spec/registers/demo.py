@@ -47,8 +47,6 @@ class DemoMap(RegisterMap):
     """
 
     def __post_init__(self) -> None:
-        if self.spec.position_compare is not None and self.spec.position_compare.depth:
-            raise ParameterError("position_compare", "must not be a list with a demo, which has no input for it")
         if not self.spec.encoder.plain:
             raise ParameterError("sensor", "must be quadrature with a demo, its lines as they come: it emulates these")
         refuse(self.spec.extras, "demo")

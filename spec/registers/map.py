@@ -22,7 +22,7 @@ from typing import Any, Self
 
 from tachometry.spec.control import AnySpec
 from tachometry.spec.core.tachometer import TachometerSpec
-from tachometry.spec.language.field import WORD, Draft, Field, Register
+from tachometry.spec.language.field import WORD, Draft, Field, Register, position_words
 from tachometry.spec.language.port import INDEX, MISSED, UPDATE, WIDE, Port
 from tachometry.spec.registers.manifest import manifest
 
@@ -60,7 +60,6 @@ class RegisterMap:
             *self._captured(),
             *self._placing(),
             *(draft for extra in self.spec.extras for draft in extra.registers(self.spec)),
-            *self._listing(),
             *self._added(),
             *self._interrupting(),
         )
@@ -268,54 +267,13 @@ class RegisterMap:
         spec = self.spec
         if spec.preset is not None:
             help = "Position that the input preset, or CONTROL.preset, sets."
-            yield from self._position("PRESET", help, "preset_value", spec.preset)
+            yield from position_words("PRESET", help, "preset_value", spec.position_width, spec.preset)
         if spec.front_end.modulus is not None:
             help = "Counts by which position_modulo is ahead of counts since reset, or since an index that resets."
             width = (spec.front_end.modulus - 1).bit_length()
             more: dict[str, Any] = {"unit": "counts", "bits": width, "least": 0, "most": spec.front_end.modulus - 1}
             field = Field("value", WORD, help=help, writable=True, port="modulo_offset", **more)
             yield "MODULO_OFFSET", help, (field,), {}
-
-    def _position(self, name: str, help: str, port: str, reset: int = 0) -> Iterable[Draft]:
-        """Return what holds a position that a program writes, in two words if it is wide."""
-        width = self.spec.position_width
-        for shift, end in ({0: ""} if width <= WORD else {0: "_LOW", WORD: "_HIGH"}).items():
-            last = width <= shift + WORD
-            field = Field(
-                "value",
-                WORD,
-                help=help,
-                writable=True,
-                reset=reset >> shift if last else reset & (1 << WORD) - 1,
-                signed=last,
-                unit="counts",
-                port=port,
-                shift=shift,
-                bits=width - shift if last else 0,
-            )
-            yield f"{name}{end}", ("Upper word. " if shift else "" if last else "Lower word. ") + help, (field,), {}
-
-    def _listing(self) -> Iterable[Draft]:
-        """Return registers that fill the list of the compare output."""
-        if self.spec.position_compare is None or not self.spec.position_compare.depth:
-            return
-        yield from self._position(
-            "POSITION_COMPARE_NEXT", "Position for the list of the position compare.", "position_compare_next"
-        )
-        acts = {
-            "append": "Writing 1 appends POSITION_COMPARE_NEXT, if there is room.",
-            "clear": "Writing 1 empties the list.",
-        }
-        fields = (
-            Field(name, 1, place, help, writable=True, single=True, port=f"position_compare_{name}")
-            for place, (name, help) in enumerate(acts.items())
-        )
-        yield (
-            "POSITION_COMPARE_LIST",
-            "Changes the list of the position compare; POSITION_COMPARE_WAITING says how long it is.",
-            tuple(fields),
-            {},
-        )
 
     def _added(self) -> Iterable[Draft]:
         """Return what a design around the core adds."""

@@ -11,6 +11,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -95,6 +96,11 @@ class Case:
         levels: list[int] = trace.lines[line][rows].tolist()
         return levels
 
+    def steps(self) -> list[int]:
+        """Return the count of each clock, by lines A and B alone: 1, −1 or 0."""
+        place = [(0, 1, 3, 2).index(a | b << 1) for a, b in zip(self.level("a"), self.level("b"), strict=True)]
+        return [0] + [{1: 1, 3: -1}.get((now - before) % 4, 0) for before, now in pairwise(place)]
+
 
 @cache
 def _run(case: Case) -> Run:
@@ -157,7 +163,7 @@ def _accesses(case: Case, registers: RegisterMap, trace: PinTrace) -> list[Acces
         if clock in aimed or rng.random() < 0.04:
             address = int(rng.choice(len(writes), p=writes / writes.sum()))
             clears = registers.registers[address].name == "CONTROL"
-            accesses.append(Access(clock, address, 1 if clears else int(rng.integers(1 << 8))))
+            accesses.append(Access(clock, address, 1 if clears else int(rng.integers(1 << rng.integers(1, 9)))))
         elif rng.random() < 0.36:
             accesses.append(Access(clock, int(rng.choice(len(reads), p=reads / reads.sum()))))
     return accesses

@@ -2,7 +2,6 @@
 
 import re
 import zipfile
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +17,7 @@ CASES = (
     Case("track", "probe=2 tick=500clk max-time=2000clk preset=40 unit=rpm lowpass=100Hz", edges=10, clocks=20_000),
     Case("m", "probe=both,both filter=3clk max-speed=100rev/s position-width=8"),
 )
-BUS = Case("s", "probe=rising,falling,both position-compare=list:3:2clk position-width=8", edges=40)
-_FORWARD = (0, 1, 3, 2)  # A is bit 0
+BUS = Case("s", "probe=rising,falling,both position-width=8", edges=40)
 
 
 def rule(case: Case) -> None:
@@ -32,14 +30,12 @@ def rule(case: Case) -> None:
         spec.latency_entries["pin_to_probe"],
         2 ** next(port.width for port in spec.ports if port.name == "probe_time_0") - 1,
     )
-    levels = [a | b << 1 for a, b in zip(case.level("a"), case.level("b"), strict=True)]
-    place = [_FORWARD.index(level) for level in levels]
-    steps = [0] + [{1: 1, 3: -1}.get((now - before) % 4, 0) for before, now in pairwise(place)]
+    steps = case.steps()
     sums, counted = np.cumsum(steps), np.maximum.accumulate(np.where(steps, np.arange(len(steps)), -1))
     probe, arm = case.level("probe"), case.level("probe_arm")
     for number, kind in enumerate(case.texts["probe"].split(",")):
         latched, wanted = False, []
-        for clock in range(1, len(levels) - late):
+        for clock in range(1, len(steps) - late):
             edge = (probe[clock] >> number & 1) - (probe[clock - 1] >> number & 1) in edges[kind]
             if edge and not latched:
                 since = clock - counted[clock] if counted[clock] >= 0 else end

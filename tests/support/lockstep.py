@@ -26,9 +26,9 @@ from tachometry.spec import (
     TachometerSpec,
     Timing,
 )
-from tachometry.spec.core.compare import DIRECTIONS, Compare
 from tachometry.spec.core.extras.health import Health
 from tachometry.spec.core.extras.over_speed import OverSpeed
+from tachometry.spec.core.extras.position_compare import DIRECTIONS, Compare, PositionCompare
 from tachometry.spec.core.index import Index
 from tachometry.spec.methods.timed import TimedTachometer
 
@@ -143,7 +143,8 @@ def watched(spec: TachometerSpec, rng: np.random.Generator) -> TachometerSpec:
     compare = Compare(int(rng.integers(-3, 4)), int(rng.integers(3, 6)), int(rng.choice([0, 3, 25])), "2clk")
     compare = replace(compare, direction=str(rng.choice(DIRECTIONS)))
     limit = Speed(Fraction(str(round(spec.velocity.greatest_speed * rng.uniform(0.02, 0.5), 3) or 0.001)))
-    return replace(spec, extras=(Health(edges=edges, errors=errors), OverSpeed(limit=limit)), position_compare=compare)
+    health, over_speed = Health(edges=edges, errors=errors), OverSpeed(limit=limit)
+    return replace(spec, extras=(health, over_speed, PositionCompare(places=compare)))
 
 
 def filter_of(method: str, clocks: int, tick_cycles: int) -> int:

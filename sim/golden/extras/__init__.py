@@ -29,7 +29,7 @@ class View:
     spec: TachometerSpec
     trace: PinTrace  # with what a program writes in place of inputs, and in fields that are no inputs
     steps: Steps
-    tables: Mapping[str, Table]  # by strobes
+    tables: Mapping[str, Table]  # by strobes; `measured` has updates as the method makes them
     clears: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))  # when a program clears
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.golden import compare, extras
+from tachometry.sim.golden import extras
 from tachometry.sim.golden.extras import View
 from tachometry.sim.golden.front_end import Steps, homed, positions_at
 from tachometry.sim.signals.recording import PinTrace
@@ -87,7 +87,7 @@ def records(
         for name, column in tables[strobe].columns.items()
     }
     shown = Table(clock, held).having(homed=homed(spec, steps, clock), **{LOST: np.append(False, ~free[:-1])})
-    shown = shown.having(**extras.shown(spec, tables, clock), **compare.shown(spec, dict(tables), clock))
+    shown = shown.having(**extras.shown(spec, tables, clock))
     found = np.zeros(len(clock), dtype=np.dtype(entry["dtype"]))
     bits = [shown[name].astype(np.uint32) << np.uint32(place) for place, name in enumerate(extra.flags(spec))]
     position = positions_at(spec, steps, clock - spec.latency.tick, reset=True)

@@ -8,9 +8,10 @@ ports and registers.
 from tachometry.spec.core.extras.extra import Extra
 from tachometry.spec.core.extras.health import Health
 from tachometry.spec.core.extras.over_speed import OverSpeed
+from tachometry.spec.core.extras.position_compare import PositionCompare
 from tachometry.spec.core.extras.probe import Probe
 from tachometry.spec.core.extras.stream import Stream
 
-EXTRAS: tuple[type[Extra], ...] = (Health, OverSpeed, Probe, Stream)
+EXTRAS: tuple[type[Extra], ...] = (Health, OverSpeed, Probe, Stream, PositionCompare)
 
 __all__ = ["EXTRAS", "Extra"]

@@ -1,6 +1,6 @@
 """An extra is one feature beside the measurement: its option, its rules, and what it adds to the core."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -29,13 +29,16 @@ class Extra:
 
     name: ClassVar[str]  # of the files, and of the box in the gates
     place: ClassVar[int] = 0  # its ports are behind (1) or before (-1) those of others, as drivers know them
-    missing: ClassVar[Mapping[str, str]] = {}  # the refusals of cores that cannot have it: of axes, demo or rio
     texts: ClassVar[Mapping[str, Mapping[Any, str]]] = {}  # what values of its ports mean, by the names of the ports
 
     @classmethod
     def of(cls, extras: "Iterable[Extra]") -> Self | None:
         """Return the extra of this class among those of a core."""
         return next((one for one in extras if isinstance(one, cls)), None)
+
+    def missing(self) -> Mapping[str, str]:
+        """Return the refusals of kinds of core that cannot have it: axes, demo, loop or rio."""
+        return {}
 
     def check(self, spec: Numbers) -> None:
         """Raise ParameterError if a core cannot have it."""
@@ -64,6 +67,10 @@ class Extra:
         """Return the entry of the manifest that has its name; None: there is none."""
         return None
 
+    def tour(self, spec: Numbers) -> Sequence[int]:
+        """Return positions between which a motion shows that it works, in the order in which it goes over them."""
+        return ()
+
     def row(self, spec: Numbers, run: Any) -> tuple[str, str] | None:
         """Return name and value that a simulation prints of it."""
         return None
@@ -72,5 +79,5 @@ class Extra:
 def refuse(extras: Iterable[Extra], kind: str) -> None:
     """Raise ParameterError for the first extra that a kind of core, such as `axes`, does not have."""
     for extra in extras:
-        if why := extra.missing.get(kind):
+        if why := extra.missing().get(kind):
             raise ParameterError(extra.name, why)

@@ -49,7 +49,6 @@ class Health(Extra):
     """Outputs `health`, the first fault, `faults`, how many, and `fault`; a reset or CONTROL.clear clears them."""
 
     name = "health"
-    missing = {"axes": "must be left out with --axes: what watches the lines is for one axis"}  # noqa: RUF012
     texts = {"health": FAULT_TEXTS}  # noqa: RUF012
 
     on: bool = option(
@@ -96,6 +95,9 @@ class Health(Extra):
 
     def __post_init__(self) -> None:
         check_options(self)
+
+    def missing(self) -> Mapping[str, str]:
+        return {"axes": "must be left out with --axes: what watches the lines is for one axis"}
 
     def check(self, spec: Numbers) -> None:
         if not self.on:

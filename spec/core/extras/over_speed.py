@@ -17,7 +17,6 @@ class OverSpeed(Extra):
     """Output `over_speed` rises when |velocity| exceeds a limit, and stays high until a reset or CONTROL.clear."""
 
     name = "over_speed"
-    missing = {"axes": "must be left out with --axes: what trips is for one axis"}  # noqa: RUF012
 
     limit: Speed = option(  # noqa: RUF009
         REQUIRED,
@@ -34,6 +33,9 @@ class OverSpeed(Extra):
         """Return the greatest |velocity|, in its LSB, that does not trip."""
         counts = self.limit.counts(spec.encoder.counts_per_rev, spec.timing.tick_seconds)
         return math.floor(counts * spec.scale.per_count * 2**spec.velocity.frac_bits)
+
+    def missing(self) -> Mapping[str, str]:
+        return {"axes": "must be left out with --axes: what trips is for one axis"}
 
     def check(self, spec: Numbers) -> None:
         if self.greatest(spec) < spec.velocity.full_scale:

@@ -46,10 +46,6 @@ class Probe(Extra):
 
     name = "probe"
     place = -1
-    missing = {  # noqa: RUF012
-        "axes": "must be left out with --axes: what latches is for one axis",
-        "demo": "must be left out of a demo, which emulates an encoder and no probe",
-    }
 
     probes: str = option(
         REQUIRED,
@@ -90,6 +86,12 @@ class Probe(Extra):
     def age_width(self, spec: Numbers) -> int:
         """Return the bits of the time from the end of a period whose update is shown to a probe."""
         return (spec.tick.longest + spec.latency.tick_to_velocity + 2).bit_length()
+
+    def missing(self) -> Mapping[str, str]:
+        return {
+            "axes": "must be left out with --axes: what latches is for one axis",
+            "demo": "must be left out of a demo, which emulates an encoder and no probe",
+        }
 
     def check(self, spec: Numbers) -> None:
         parse_probes("probe", self.probes)

@@ -1,7 +1,7 @@
 """Stream: records of what the ports show, as AXI4-Stream."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -66,11 +66,6 @@ class Stream(Extra):
 
     name = "stream"
     place = 1
-    missing = {  # noqa: RUF012
-        "axes": "must be left out with --axes: what sends records is for one axis",
-        "demo": "must be left out of a demo, whose pins lead to no DMA",
-        "rio": "must not be given for RIO, which has no DMA for it",
-    }
 
     records: Records = option(  # noqa: RUF009
         REQUIRED,
@@ -83,6 +78,13 @@ class Stream(Extra):
         tests=("", "axi:update:3", "axi:edge:2", "axi:tick:1"),
         tacit=True,
     )
+
+    def missing(self) -> Mapping[str, str]:
+        return {
+            "axes": "must be left out with --axes: what sends records is for one axis",
+            "demo": "must be left out of a demo, whose pins lead to no DMA",
+            "rio": "must not be given for RIO, which has no DMA for it",
+        }
 
     def parts(self, spec: Numbers) -> tuple[Part, ...]:
         """Return what is in a record, without gaps: behind time and flags the numbers of two words come first."""

@@ -19,7 +19,7 @@ from tachometry.sim import golden
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.testbench.vectors import usual_motion
 from tachometry.spec import Encoder, STachometer, Timing
-from tachometry.spec.core.compare import Compare
+from tachometry.spec.core.extras.position_compare import Compare, PositionCompare
 from tachometry.spec.language.provenance import notice
 
 SMALL = "--ppr 8 --clock 1MHz --tick 8us --max-time 160us"
@@ -168,7 +168,7 @@ def test_usual_motion_stays_short_for_every_timing() -> None:
 @pytest.mark.parametrize("asked", ["-2000:500:0:10us", "300:100:0:1us:backward"])
 def test_usual_motion_goes_over_the_positions_of_compare(asked: str) -> None:
     compare = Compare.parse("position_compare", asked)
-    spec = STachometer(encoder=Encoder(500, 4), timing=Timing.parse(), position_compare=compare)
+    spec = STachometer(encoder=Encoder(500, 4), timing=Timing.parse(), extras=(PositionCompare(places=compare),))
     run = golden.run(spec, PinTrace.of(usual_motion(spec), spec))
     assert run.tables["position_compare_valid"].position_compare_position[:3].tolist() == [
         compare.start + k * compare.apart for k in range(3)

@@ -5,16 +5,15 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 from proofs.formal.prove import Proof
 
-from tachometry.hdl.extras import health, over_speed, probe
+from tachometry.hdl.extras import health, over_speed, position_compare, probe
 from tachometry.hdl.front_end import (
     index_capture,
     modulo_counter,
     open_circuit,
     position_counter,
 )
-from tachometry.hdl.output import compare_output
 from tachometry.spec import Encoder, STachometer
-from tachometry.spec.core.compare import Compare
+from tachometry.spec.core.extras.position_compare import Compare
 
 OPEN, MODULUS, LIMIT, PULSE, APART = 3, 5, 5, 2, 3
 _WIDTH = 4  # of positions
@@ -40,8 +39,8 @@ class Outputs(wiring.Component):
             "trip": over_speed.Gates(LIMIT, _WIDTH),
             "open": open_circuit.OpenCircuit(OPEN),
             "watch": health.Gates(second=6, edges=2, errors=1),
-            "compare": compare_output.CompareOutput(Compare(1, APART, 2, "2clk"), PULSE, _WIDTH),
-            "both": compare_output.CompareOutput(Compare(1, APART, 2, "2clk", "both"), PULSE, _WIDTH, aims=True),
+            "compare": position_compare.Gates(Compare(1, APART, 2, "2clk"), PULSE, _WIDTH),
+            "both": position_compare.Gates(Compare(1, APART, 2, "2clk", "both"), PULSE, _WIDTH, aims=True),
         }
         super().__init__(
             {

@@ -130,5 +130,5 @@ EXTRAS = [
         60,
         files=("index_state", "pin_rise"),
     ),
-    PartCase("track, fine compare", of_texts("track", _TEXTS | _FINE), 60, files=("fine_compare_output",)),
+    PartCase("track, fine compare", of_texts("track", _TEXTS | _FINE), 60, files=("position_compare",)),
 ]

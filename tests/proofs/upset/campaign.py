@@ -15,9 +15,9 @@ from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.sim.signals.run import Run
 from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
 from tachometry.spec.control import AnySpec
-from tachometry.spec.core.compare import Compare
 from tachometry.spec.core.extras.health import Health
 from tachometry.spec.core.extras.over_speed import OverSpeed
+from tachometry.spec.core.extras.position_compare import Compare, PositionCompare
 from tachometry.spec.core.extras.probe import Probe
 from tachometry.spec.core.index import Index
 
@@ -30,8 +30,12 @@ _OPTIONS: dict[str, dict[str, Any]] = {
         "index": Index(once=True),
         "preset": 0,
         "position_modulo": "7",
-        "extras": (Health(differential=4), OverSpeed(limit=Speed.parse("1rad/s")), Probe(probes="both")),
-        "position_compare": Compare(2, 3, 0, "7clk", "both"),
+        "extras": (
+            Health(differential=4),
+            OverSpeed(limit=Speed.parse("1rad/s")),
+            Probe(probes="both"),
+            PositionCompare(places=Compare(2, 3, 0, "7clk", "both")),
+        ),
     },
     "track": {"timing": Timing(5_000_000, 340, 20), "max_speed": Speed.parse("75rev/s"), "multiplier": "block"},
     "track, serial": {"timing": Timing(5_000_000, 1000, 20), "multiplier": "serial"},

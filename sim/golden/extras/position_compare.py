@@ -1,18 +1,28 @@
-"""The golden compare output finds the steps that lead to positions, one after the other."""
+"""Golden model of `spec.core.extras.position_compare`: the steps that lead to positions, one after the other."""
 
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim.golden.extras import View
 from tachometry.sim.golden.front_end import Steps, positions_at
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
-from tachometry.spec import TachometerSpec, TrackTachometer
-from tachometry.spec.core.compare import BACKWARD, BOTH, COUNT_WIDTH, FORWARD, LIST_PINS, Compare
-from tachometry.spec.formats.carrying import FASTER_BITS
-from tachometry.spec.language.port import COMPARE
+from tachometry.spec import TachometerSpec
+from tachometry.spec.core.extras.position_compare import (
+    BACKWARD,
+    BOTH,
+    COUNT_WIDTH,
+    FORWARD,
+    LIST_PINS,
+    VALID,
+    Compare,
+    PositionCompare,
+)
+from tachometry.spec.formats.carrying import FASTER_BITS, Carrying
 
 _NEVER = 1 << 62
 _WAITING = "position_compare_waiting"
@@ -33,27 +43,18 @@ class _Passes:
         return int(self._clock[row]) if row < end else _NEVER
 
 
-def pulses(spec: TachometerSpec, steps: Steps, trace: PinTrace, updates: Table) -> dict[str, Table]:
-    """Return the first clocks of pulses, and their positions; of a list, which `trace` fills, also how long it is.
-
-    `updates` have velocity and place as the method has them.
-    """
-    if (compare := spec.position_compare) is None:
-        return {}
-    if compare.depth:
-        return listed(spec, steps, trace)
-    if isinstance(spec, TrackTachometer) and compare.fine:
-        return {COMPARE: _table([*_carried(spec, compare, steps, updates, trace.n_clocks)])}
-    return {COMPARE: _table([*_computed(spec, compare, steps, trace.n_clocks)])}
-
-
-def listed(spec: TachometerSpec, steps: Steps, trace: PinTrace) -> dict[str, Table]:
-    """Return the same of a list alone."""
-    assert spec.position_compare is not None
-    ways = _ways(spec, spec.position_compare, steps)
-    found, changes = _listed(spec.position_compare.depth, ways, trace, 1 << spec.position_width - 1)
-    at, level = np.array([(0, 0), *changes], dtype=np.int64).T
-    return {COMPARE: _table(found), _WAITING: Table(at, {_WAITING: np.cumsum(level)})}
+def tables(extra: PositionCompare, view: View) -> dict[str, Table]:
+    """Return the first clocks of pulses, and their positions; of a list, which the trace fills, also how long it is."""
+    spec, places = view.spec, extra.places
+    if places.depth:
+        found, changes = _listed(
+            places.depth, _ways(spec, places, view.steps), view.trace, 1 << spec.position_width - 1
+        )
+        at, level = np.array([(0, 0), *changes], dtype=np.int64).T
+        return {VALID: _table(found), _WAITING: Table(at, {_WAITING: np.cumsum(level)})}
+    if places.fine and spec.carrying:
+        return {VALID: _table([*_carried(view, places, spec.carrying)])}
+    return {VALID: _table([*_computed(spec, places, view.steps, view.trace.n_clocks)])}
 
 
 def _ways(spec: TachometerSpec, compare: Compare, steps: Steps) -> dict[str, _Passes]:
@@ -76,17 +77,15 @@ def _sets(spec: TachometerSpec, steps: Steps) -> NDArray[np.int64]:
     return np.sort(np.concatenate([steps.presets, resets])) + spec.latency.tick
 
 
-def _carried(
-    spec: TrackTachometer, compare: Compare, steps: Steps, updates: Table, n_clocks: int
-) -> Iterator[tuple[int, int]]:
+def _carried(view: View, compare: Compare, way: Carrying) -> Iterator[tuple[int, int]]:
     """Yield the same of places between counts: that of an update, and eight times its velocity per clock for each clock
     in which it catches up, then the velocity once a clock.
     """
-    way = spec.carrying
+    spec, updates = view.spec, view.tables["measured"]
     half = 1 << spec.position_width - 1 + way.position_fine_bits
     widest = half << way.more_bits
-    before = np.searchsorted(_sets(spec, steps), updates.clock - spec.latency.datapath, side="right")
-    begins = [*(updates.clock + way.latency).tolist(), n_clocks]
+    before = np.searchsorted(_sets(spec, view.steps), updates.clock - spec.latency.datapath, side="right")
+    begins = [*(updates.clock + way.latency).tolist(), view.trace.n_clocks]
     columns = (updates.velocity, updates.position_fine, np.diff(before, prepend=0))
     rows = zip(begins[:-1], begins[1:], *(column.tolist() for column in columns), strict=True)
     awaited = compare.in_lsb(compare.start, way.position_fine_bits)
@@ -202,18 +201,18 @@ def _writes(trace: PinTrace) -> Iterator[tuple[int, int, int, int]]:
             yield clock, place, append, clear
 
 
-def shown(spec: TachometerSpec, found: dict[str, Table], clock: NDArray[np.int64]) -> dict[str, NDArray[np.int64]]:
-    """Return what is shown of pulses in these clocks."""
-    if spec.position_compare is None:
-        return {}
-    pulses = found[COMPARE]
+def shown(
+    extra: PositionCompare, spec: TachometerSpec, found: Mapping[str, Table], clock: NDArray[np.int64], cleared: int
+) -> dict[str, NDArray[Any]]:
+    """Return the pulse, the number of pulses, and the length of a list; a program that clears does not change them."""
+    pulses = found[VALID]
     number = np.searchsorted(pulses.clock, clock, side="right")
     begun = np.append(np.iinfo(np.int64).min // 2, pulses.clock)[number]
     values = {
-        "position_compare": clock - begun < spec.position_compare.clocks(spec.timing.clock_hz),
+        "position_compare": clock - begun < extra.clocks(spec),
         "position_compare_count": number % (1 << COUNT_WIDTH),
     }
-    if spec.position_compare.depth:
+    if extra.places.depth:
         waiting = found[_WAITING]
         values[_WAITING] = waiting[_WAITING][np.searchsorted(waiting.clock, clock, side="right") - 1]
     return values
