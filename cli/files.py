@@ -24,19 +24,11 @@ class Outputs:
     no temporary, no directory that was made for a target, and every target is as it was before. What a process that
     was killed has left is removed by the next one that writes to the same place.
 
-    Parameters
-    ----------
-    targets : mapping of str to path or None
-        Where each output goes; None: it is not wanted. The keys are what messages call it, such as `--plot`.
-    inputs : iterable of path
-        Files that the command reads; no target may be one of them.
+    - `targets`: Where each output goes; None: it is not wanted. The keys are what messages call it, such as `--plot`.
+    - `inputs`: Files that the command reads; no target may be one of them.
 
-    Raises
-    ------
-    ValueError
-        If two targets are one file, or one is an input or no regular file.
-    OSError
-        On entering and leaving, if a target cannot be written; also for a full disk in the block, with the target.
+    It raises ValueError if two targets are one file, or one is an input or no regular file; OSError on entering and
+    leaving, if a target cannot be written; also for a full disk in the block, with the target.
     """
 
     def __init__(self, targets: Mapping[str, Path | None], inputs: Iterable[Path] = ()) -> None:

@@ -177,12 +177,7 @@ def cached(key: str, suffix: str, make: Callable[[Path], Path]) -> Path:
     A file is named by its own content, and renamed into the cache when it is whole; a file `key` says which it is. So
     builds of one thing at the same time do no harm, and a file that is not whole is made anew.
 
-    Parameters
-    ----------
-    key : str
-        Digest of all that decides what `make` makes.
-    suffix : str
-        Of the file.
+    - `key`: Digest of all that decides what `make` makes.
     """
     folder = cache_folder()
     if (found := _intact(folder, key)) is not None:

@@ -43,21 +43,14 @@ def _alone(spec: TachometerSpec) -> TachometerSpec:
 def of_texts(method: str, texts: Mapping[str, str | None], build_core: Build = _alone) -> TachometerSpec:
     """Return the core that texts of options describe, as on the command line, in files of sweeps and in tests.
 
-    Parameters
-    ----------
-    method : str
-        One of `METHODS`, or `auto`: track where its program fits the tick, else M/T where its division does, else S.
-        An option that only some methods have leaves the others out. `chosen` then has the reason.
-    texts : mapping of str to str or None
-        By the names of the options without dashes, `{"ppr": "500", "max-speed": "400rad/s"}`; flags are `yes` or `no`.
-        None stands for leaving the option out. Without a tick it is 20 µs, or as long as the method needs at the clock.
-    build_core : callable
-        Makes the whole core of the tachometer; if it raises ParameterError, `auto` takes another method.
+    - `method`: One of `METHODS`, or `auto`: track where its program fits the tick, else M/T where its division does,
+      else S. An option that only some methods have leaves the others out. `chosen` then has the reason.
+    - `texts`: By the names of the options without dashes, `{"ppr": "500", "max-speed": "400rad/s"}`; flags are `yes` or
+      `no`. None stands for leaving the option out. Without a tick it is 20 µs, or as long as the method needs at the
+      clock.
+    - `build_core`: Makes the whole core of the tachometer; if it raises ParameterError, `auto` takes another method.
 
-    Raises
-    ------
-    ParameterError
-        If the method has no such option, or a text is not what it must be.
+    It raises ParameterError if the method has no such option, or a text is not what it must be.
     """
     given = {name: text for name, text in texts.items() if text is not None}
     method = method_named(method)
@@ -221,12 +214,7 @@ def _looped(spec: CoreSpec, texts: Mapping[str, str]) -> LoopSpec:
 def of_manifest(path: Path) -> AnySpec:
     """Return the core of a manifest, the file NAME.json that lies beside its Verilog.
 
-    Raises
-    ------
-    ValueError
-        If the file is no manifest.
-    ParameterError
-        If this version of tachometry makes no such core.
+    It raises ValueError if the file is no manifest; ParameterError if this version of tachometry makes no such core.
     """
     try:
         options = json.loads(read_text(path, MOST_JSON))["options"]

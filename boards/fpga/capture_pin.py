@@ -12,11 +12,7 @@ class CapturePin(wiring.Component):
 
     Latency: a rise that is sampled at clock edge c captures in clock c + 2.
 
-    Members
-    -------
-    pin : In(1)
-        Asynchronous; each level must hold for a clock.
-    capture : Out(1)
+    - `pin`: Asynchronous; each level must hold for a clock.
     """
 
     def __init__(self) -> None:

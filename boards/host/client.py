@@ -19,21 +19,12 @@ class Client:
 
     Several threads must not use it at the same time: a snapshot takes several accesses.
 
-    Parameters
-    ----------
-    read : callable of int
-        Reads the register at an offset in bytes.
-    write : callable of int and int
-        Writes a value to the register at an offset in bytes.
-    manifest : mapping
-        What `NAME.json` of a core on a bus says.
+    - `read`: Reads the register at an offset in bytes.
+    - `write`: Writes a value to the register at an offset in bytes.
+    - `manifest`: What `NAME.json` of a core on a bus says.
 
-    Raises
-    ------
-    ValueError
-        If the manifest is that of a core without registers.
-    WrongBoard
-        If what answers is not the core of the manifest.
+    It raises ValueError if the manifest is that of a core without registers; WrongBoard if what answers is not the core
+    of the manifest.
     """
 
     def __init__(self, read: Read, write: Write, manifest: Mapping[str, Any]) -> None:
@@ -77,12 +68,8 @@ class Client:
     def write(self, name: str, value: int) -> None:
         """Write a register, such as PRESET or PROBE_EDGES, or two of its name.
 
-        Raises
-        ------
-        KeyError
-            If the core has none that is written.
-        ValueError
-            If the value does not fit; then nothing is written.
+        It raises KeyError if the core has none that is written; ValueError if the value does not fit; then nothing is
+        written.
         """
         for offset, word in self.registers.written(name, value):
             self._write(offset, word)

@@ -16,21 +16,11 @@ SETTINGS = ("RATE", "ERRORS", "NOISE", "WIRES", "SPEED", "DEMO")
 class DemoBoard:
     """Talks to the demo on a board, or to a simulated one.
 
-    Parameters
-    ----------
-    manifest : mapping
-        What `NAME.json` of the demo says.
-    timeout : float
-        Seconds in which an answer must come.
+    - `manifest`: What `NAME.json` of the demo says.
+    - `timeout`: Seconds in which an answer must come.
 
-    Raises
-    ------
-    ValueError
-        If the manifest is not that of a demo.
-    NoAnswer
-        If nothing answers.
-    WrongBoard
-        If what answers is not the demo of the manifest.
+    It raises ValueError if the manifest is not that of a demo; NoAnswer if nothing answers; WrongBoard if what answers
+    is not the demo of the manifest.
     """
 
     def __init__(self, port: Port, manifest: Mapping[str, Any], timeout: float = 0.5) -> None:

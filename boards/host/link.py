@@ -25,10 +25,7 @@ class Port(Protocol):
 class NoAnswer(TimeoutError):
     """Nothing that answers a request came in time.
 
-    Parameters
-    ----------
-    foreign : int
-        Bytes that came instead and belong to no frame.
+    - `foreign`: Bytes that came instead and belong to no frame.
     """
 
     def __init__(self, text: str, foreign: int = 0) -> None:
@@ -140,12 +137,8 @@ class Receiver:
 class Link:
     """Reads and writes the registers of a core over a UART.
 
-    Parameters
-    ----------
-    timeout : float
-        Seconds in which an answer must come.
-    tries : int
-        Times that a request is sent.
+    - `timeout`: Seconds in which an answer must come.
+    - `tries`: Times that a request is sent.
     """
 
     def __init__(self, port: Port, registers: HostRegisters, timeout: float = 0.5, tries: int = 4) -> None:
@@ -157,12 +150,7 @@ class Link:
     def read(self, offset: int) -> int:
         """Return the register at an offset in bytes.
 
-        Raises
-        ------
-        NoAnswer
-            If nothing answers.
-        ValueError
-            If there is no such register.
+        It raises NoAnswer if nothing answers; ValueError if there is no such register.
         """
         return self.words(offset, 1)[0]
 

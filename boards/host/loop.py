@@ -23,17 +23,10 @@ _COMMANDS = {
 class LoopClient(Client):
     """Reads and writes a core with a control loop on a bus.
 
-    Parameters
-    ----------
-    read, write, manifest
-        See `Client`.
+    - `read`, `write`, `manifest`: See `Client`.
 
-    Raises
-    ------
-    ValueError
-        If the manifest is that of a core without registers or without a loop.
-    WrongBoard
-        If what answers is not the core of the manifest.
+    It raises ValueError if the manifest is that of a core without registers or without a loop; WrongBoard if what
+    answers is not the core of the manifest.
     """
 
     def __init__(self, read: Read, write: Write, manifest: Mapping[str, Any]) -> None:
@@ -56,12 +49,7 @@ class LoopClient(Client):
     def raw(self, name: str, value: float) -> int:
         """Return what stands in the registers for a value.
 
-        Raises
-        ------
-        KeyError
-            If there is no such setting.
-        ValueError
-            If it does not fit.
+        It raises KeyError if there is no such setting; ValueError if it does not fit.
         """
         if name not in self._scales:
             raise KeyError(f"there is no setting {name!r}; there are {', '.join(self.settings)}")
@@ -86,12 +74,7 @@ class LoopClient(Client):
     def set(self, *, mode: int | None = None, **values: float) -> None:
         """Write settings that the loop takes at once, with its next control tick; `mode` is that of the generator.
 
-        Raises
-        ------
-        KeyError
-            If there is no such setting.
-        ValueError
-            If one does not fit; then none is written.
+        It raises KeyError if there is no such setting; ValueError if one does not fit; then none is written.
         """
         if mode is not None and "generator_velocity" not in self._scales:
             raise KeyError("there is no setting 'mode': the core has no command generator")

@@ -9,15 +9,9 @@ from tachometry.boards.host.snapshot import Snapshot
 class HostRegisters:
     """Holds the registers by their names.
 
-    Parameters
-    ----------
-    manifest : mapping
-        What `NAME.json` of a core on a bus says.
+    - `manifest`: What `NAME.json` of a core on a bus says.
 
-    Raises
-    ------
-    ValueError
-        If it is that of a core without registers.
+    It raises ValueError if it is that of a core without registers.
     """
 
     def __init__(self, manifest: Mapping[str, Any]) -> None:

@@ -11,12 +11,8 @@ class Snapshot(Mapping[str, int]):
 
     Ports of one bit are there as 0 or 1, and so are `updated` and `indexed`, the events since the capture before.
 
-    Parameters
-    ----------
-    flags : iterable of str
-        Names of those that are flags.
-    rad_per_s_per_lsb : float
-        What one LSB of `velocity` is.
+    - `flags`: Names of those that are flags.
+    - `rad_per_s_per_lsb`: What one LSB of `velocity` is.
     """
 
     __slots__ = ("_flags", "_rad_per_s_per_lsb", "_values")

@@ -85,16 +85,10 @@ def selftest(
 ) -> list[Result]:
     """Run all steps, and hold what the board says against the golden models; NoAnswer if the board falls silent.
 
-    Parameters
-    ----------
-    registers : DemoMap
-        Of the core on the board.
-    period : int
-        Ticks between frames; 0: about 2 ms.
-    told : callable of Result
-        Is called after each step.
-    chosen : sequence of Step or None
-        None: those of `steps`.
+    - `registers`: Of the core on the board.
+    - `period`: Ticks between frames; 0: about 2 ms.
+    - `told`: Is called after each step.
+    - `chosen`: None: those of `steps`.
     """
     timing = registers.spec.timing
     period = period or max(1, math.ceil(timing.clock_hz / timing.tick_cycles / 500))

@@ -48,14 +48,9 @@ Answer = Callable[[str, Mapping[str, Any]], Mapping[str, Any]]
 def page(token: str, hosts: tuple[str, ...], answer: Answer) -> ASGIApp:
     """Return the application that serves the page, and answers what it asks.
 
-    Parameters
-    ----------
-    token : str
-        Without which nothing is served.
-    hosts : tuple of str
-        Names with ports by which a browser may call it; another name may be that of a foreign page.
-    answer : callable
-        Takes the name of a function and its arguments, see `cli.explore.answers`.
+    - `token`: Without which nothing is served.
+    - `hosts`: Names with ports by which a browser may call it; another name may be that of a foreign page.
+    - `answer`: Takes the name of a function and its arguments, see `cli.explore.answers`.
     """
     served = {file.name: file.read_bytes() for file in (files(__package__) / "static").iterdir()}
     served[""] = served["page.html"]
@@ -132,14 +127,9 @@ class Boards(Protocol):
 def serve(port: int, load: Callable[[], tuple[Answer, Boards]], told: Callable[[str], None]) -> None:
     """Serve the page until Ctrl-C; OSError if the port is taken.
 
-    Parameters
-    ----------
-    port : int
-        Of this machine; 0: one that is free.
-    load : callable
-        Gives what answers, and what is given back; who opens the page meanwhile waits.
-    told : callable of str
-        Is given the address, when it can be opened.
+    - `port`: Of this machine; 0: one that is free.
+    - `load`: Gives what answers, and what is given back; who opens the page meanwhile waits.
+    - `told`: Is given the address, when it can be opened.
     """
     token = secrets.token_urlsafe(24)
     try:

@@ -24,16 +24,10 @@ class Divider(wiring.Component):
     Latency: `done` is high as many clocks after `start` as the quotient has bits, and one; a `start` before `done`, or
     together with it, begins the next division.
 
-    Parameters
-    ----------
-    integer_bits : int
-        Of the quotient, without its sign: the quotient has as many, and s and the sign.
-    scale_bits : int
-        s.
-    nearest : bool
-        Round to the nearest integer, a tie up.
-    zeros : int
-        Bits at the end of each part of the dividend that are 0.
+    - `integer_bits`: Of the quotient, without its sign: the quotient has as many, and s and the sign.
+    - `scale_bits`: s.
+    - `nearest`: Round to the nearest integer, a tie up.
+    - `zeros`: Bits at the end of each part of the dividend that are 0.
     """
 
     def __init__(

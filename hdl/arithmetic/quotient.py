@@ -61,20 +61,13 @@ class Quotient(wiring.Component):
 
     Latency: that of the scaler, from `start` on.
 
-    Parameters
-    ----------
-    shape : spec.reciprocal.Reciprocal or spec.carried_reciprocal.CarriedReciprocal
-        Widths and contents of the reciprocal. A carried one is multiplied all at once.
-    quotients : dict
-        By the name of each quotient its bits, the way it is rounded: to the nearest (0), down (−1) or up (1), and what
-        is added to N for it.
-    numerator_width : int
-        Bits of N and of all that is added to it, signed.
-    serial : bool
-        Step by step: `start` may come again as soon as the result has, and m, which moves then, and `tag` must stay as
-        they are until then. Otherwise it may come in every clock.
-    constant : int or None
-        m, if it is always the same.
+    - `shape`: Widths and contents of the reciprocal. A carried one is multiplied all at once.
+    - `quotients`: By the name of each quotient its bits, the way it is rounded: to the nearest (0), down (−1) or up
+      (1), and what is added to N for it.
+    - `numerator_width`: Bits of N and of all that is added to it, signed.
+    - `serial`: Step by step: `start` may come again as soon as the result has, and m, which moves then, and `tag` must
+      stay as they are until then. Otherwise it may come in every clock.
+    - `constant`: m, if it is always the same.
     """
 
     def __init__(

@@ -32,12 +32,8 @@ class RemainderScaler(wiring.Component):
 
     Latency: a result comes as many clocks after `start` as N has bits and ⌊N·R/m⌋ has digits, and three more.
 
-    Parameters
-    ----------
-    tag : data.StructLayout
-        What travels along with a value; `m` is a field of it.
-    towards : int
-        Round to the nearest (0), down (−1) or up (1).
+    - `tag`: What travels along with a value; `m` is a field of it.
+    - `towards`: Round to the nearest (0), down (−1) or up (1).
     """
 
     def __init__(

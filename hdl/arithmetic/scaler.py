@@ -18,10 +18,7 @@ from tachometry.spec.formats.reciprocal import Reciprocal
 class _Scaler(wiring.Component):
     """Holds the parts that all scalers share.
 
-    Parameters
-    ----------
-    towards : int
-        Round to the nearest (0), down (−1) or up (1).
+    - `towards`: Round to the nearest (0), down (−1) or up (1).
     """
 
     def __init__(

@@ -19,12 +19,8 @@ class AxisCounters(wiring.Component):
     Latency: what is seen in a slot is at the outputs three clocks later. It is back in the memory a clock after that,
     when the axis has its next slot at the earliest: a round has four at least.
 
-    Parameters
-    ----------
-    rounds : int
-        Rounds of a tick: most steps of an axis in it.
-    reverse : bool
-        Forward is B before A.
+    - `rounds`: Rounds of a tick: most steps of an axis in it.
+    - `reverse`: Forward is B before A.
     """
 
     def __init__(self, *, slots: int, rounds: int, decoding: int, reverse: bool = False) -> None:

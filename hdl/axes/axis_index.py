@@ -15,10 +15,7 @@ class AxisIndex(wiring.Component):
 
     Latency: a rise that is seen in a slot is at the outputs four clocks later.
 
-    Parameters
-    ----------
-    resets : bool
-        A rise sets the position to 0.
+    - `resets`: A rise sets the position to 0.
     """
 
     def __init__(self, *, slots: int, width: int, resets: bool) -> None:

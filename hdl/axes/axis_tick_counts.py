@@ -35,10 +35,7 @@ class AxisTickCounts(AxisCounters):
     It does what `TickCounts` does for one axis. Members and latency are those of `AxisCounters`, but `count`:
     Out(counts_layout(form)), of this tick so far.
 
-    Parameters
-    ----------
-    reverse : bool
-        Forward is B before A.
+    - `reverse`: Forward is B before A.
     """
 
     def __init__(self, *, slots: int, form: Tracking, decoding: int, reverse: bool = False) -> None:

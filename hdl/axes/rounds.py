@@ -12,12 +12,8 @@ from tachometry.hdl.wires.ports import only_if
 class Rounds(wiring.Component):
     """Goes round the slots, one a clock; the first round begins with the first clock after reset.
 
-    Parameters
-    ----------
-    external : tuple of int or None
-        Fewest and most rounds of a tick whose end comes from outside.
-    warm_up : int
-        Rounds after reset in which there are no two real levels to be compared.
+    - `external`: Fewest and most rounds of a tick whose end comes from outside.
+    - `warm_up`: Rounds after reset in which there are no two real levels to be compared.
     """
 
     def __init__(self, slots: int, rounds: int, warm_up: int, external: tuple[int, int] | None = None) -> None:

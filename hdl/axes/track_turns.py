@@ -40,10 +40,7 @@ def turn_layout(axis: TrackAxis) -> data.StructLayout:
 class TrackTurns(wiring.Component):
     """Gives one machine to one axis after the other.
 
-    Parameters
-    ----------
-    machine : int
-        Which of `spec.plan.machines` it is.
+    - `machine`: Which of `spec.plan.machines` it is.
     """
 
     def __init__(self, spec: AxesSpec, machine: int) -> None:

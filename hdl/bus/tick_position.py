@@ -11,10 +11,7 @@ class TickPosition(wiring.Component):
     Latency: none. Where `open_sum` is the sum of all steps since, and nothing sets the position to 0, a subtraction
     gives it without a register.
 
-    Parameters
-    ----------
-    sum_width : int
-        Bits of `open_sum`; 0 if there is none, and a register keeps the position.
+    - `sum_width`: Bits of `open_sum`; 0 if there is none, and a register keeps the position.
     """
 
     def __init__(self, width: int, sum_width: int = 0) -> None:

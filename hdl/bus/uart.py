@@ -72,10 +72,7 @@ class UartBridge(Bridge):
     other has no effect, and the receiver waits until the line has been quiet for `QUIET_BITS` bits. One timer, one
     register for a word and one for the check serve both directions.
 
-    Parameters
-    ----------
-    bit_cycles : int
-        Clocks of a bit, at least 8.
+    - `bit_cycles`: Clocks of a bit, at least 8.
     """
 
     bus = "uart"

@@ -43,10 +43,7 @@ class CommandGenerator(wiring.Component):
     The commands are those of a control tick from its clock on, for at least two clocks. The next `tick` may come
     `generator_clocks` after it.
 
-    Parameters
-    ----------
-    multiplier : str
-        `serial` or `parallel`.
+    - `multiplier`: `serial` or `parallel`.
     """
 
     def __init__(self, form: GeneratorForm, multiplier: str = "serial") -> None:

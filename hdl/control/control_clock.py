@@ -11,10 +11,7 @@ from tachometry.hdl.wires.ports import only_if
 class ControlClock(wiring.Component):
     """Strobes every `period` clocks, for the first time in clock `first` after reset.
 
-    Parameters
-    ----------
-    tells : bool
-        It also tells of a tick in the clock before.
+    - `tells`: It also tells of a tick in the clock before.
     """
 
     def __init__(self, first: int, period: int, *, tells: bool = False) -> None:

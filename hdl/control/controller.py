@@ -64,10 +64,7 @@ class Controller(wiring.Component):
 
     Latency: `valid` is high `LoopSpec.latency` clocks after `tick`. The next `tick` may come a clock later.
 
-    Parameters
-    ----------
-    multiplier : str
-        `serial` or `parallel`.
+    - `multiplier`: `serial` or `parallel`.
     """
 
     def __init__(self, form: ControlForm, multiplier: str = "serial") -> None:

@@ -8,10 +8,7 @@ from amaranth.lib.wiring import In, Out
 class _Product(wiring.Component):
     """round(word · factor / 2^p).
 
-    Parameters
-    ----------
-    factor_bits : int
-        p.
+    - `factor_bits`: p.
     """
 
     def __init__(self, word_width: int, factor_bits: int) -> None:

@@ -31,10 +31,7 @@ def bridge_on(registers: RegisterMap, bus: Bus) -> Bridge:
 class BusTachometer(wiring.Component):
     """Puts the registers of a tachometer, maybe with a control loop, on a bus.
 
-    Raises
-    ------
-    ParameterError
-        If the clock cannot make the bits of the bus.
+    It raises ParameterError if the clock cannot make the bits of the bus.
     """
 
     def __init__(self, registers: RegisterMap, bus: Bus) -> None:

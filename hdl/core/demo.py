@@ -22,10 +22,7 @@ class Demo(wiring.Component):
 
     The settings survive a restart, which resets tachometer, loop, emulator and time.
 
-    Raises
-    ------
-    ParameterError
-        If the clock cannot make the bits of the bus.
+    It raises ParameterError if the clock cannot make the bits of the bus.
     """
 
     def __init__(self, registers: DemoMap, bus: Bus) -> None:

@@ -35,14 +35,9 @@ class EncoderEmulator(wiring.Component):
     chosen anew in the middle between two of them, so that it makes no edges of its own: all errors together must stay
     below an eighth of a period.
 
-    Parameters
-    ----------
-    lines_per_rev : int or None
-        Periods in a revolution, for the index line; None: there is none.
-    index_place : int
-        Quarter of its period in which the index is high, 0 to 3.
-    complemented : tuple of str
-        Lines whose complements are there as well, which no broken wire harms.
+    - `lines_per_rev`: Periods in a revolution, for the index line; None: there is none.
+    - `index_place`: Quarter of its period in which the index is high, 0 to 3.
+    - `complemented`: Lines whose complements are there as well, which no broken wire harms.
     """
 
     def __init__(

@@ -36,10 +36,7 @@ class Tachometer(wiring.Component):
 
     Latencies are those of the spec: `pin_to_count`, `tick_latency`, `tick_to_velocity`, in clocks of the `sync` domain.
 
-    Parameters
-    ----------
-    spec : TachometerSpec
-        For instance an `STachometer`.
+    - `spec`: For instance an `STachometer`.
 
     Members
     -------

@@ -15,12 +15,8 @@ class InputConditioner(wiring.Component):
 
     Latency: a level that is sampled at clock edge c is at the output in clock c + 2 + `filter_clocks`.
 
-    Parameters
-    ----------
-    filter_clocks : int
-        Clocks for which a level must hold; 0 for no filter.
-    complemented : tuple of str
-        Those of them that come with their complements.
+    - `filter_clocks`: Clocks for which a level must hold; 0 for no filter.
+    - `complemented`: Those of them that come with their complements.
     """
 
     def __init__(

@@ -18,19 +18,11 @@ class ExternalTick(wiring.Component):
     Latency: a rise that is sampled at clock edge c makes c + 2 the last clock of its window; `tick_error` is high
     `latency` clocks after its cause. For a tick that did not come it is high together with `tick`.
 
-    Parameters
-    ----------
-    min_cycles, max_cycles : int
-        Fewest and most clocks in a window.
-    latency : int
-        That of `tick`, at least 2.
-    synchronous : bool
-        `tick_in` is of the clock domain already, and a rise in a clock makes it the last of its window.
+    - `min_cycles`, `max_cycles`: Fewest and most clocks in a window.
+    - `latency`: That of `tick`, at least 2.
+    - `synchronous`: `tick_in` is of the clock domain already, and a rise in a clock makes it the last of its window.
 
-    Raises
-    ------
-    ValueError
-        If `min_cycles` is not in 2 … `max_cycles`.
+    It raises ValueError if `min_cycles` is not in 2 … `max_cycles`.
     """
 
     def __init__(self, min_cycles: int, max_cycles: int, latency: int = 2, *, synchronous: bool = False) -> None:

@@ -14,10 +14,7 @@ class GlitchFilter(wiring.Component):
 
     Latency: a level that holds from clock c on is at the output in clock c + `clocks`.
 
-    Raises
-    ------
-    ValueError
-        If `clocks` is less than 1.
+    It raises ValueError if `clocks` is less than 1.
     """
 
     def __init__(self, clocks: int) -> None:

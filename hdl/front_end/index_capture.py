@@ -14,12 +14,8 @@ class IndexCapture(wiring.Component):
     Latency: if `level_z` rises in clock c, `index_valid` is high in clock c + `latency`, and `index_position` is the
     sum of all steps through clock c. `position` has this value in that clock, unless the index sets it to 0.
 
-    Parameters
-    ----------
-    latency : int
-        That of the position, at least 2.
-    once : bool
-        An index is taken only if `arm` was high since the one before.
+    - `latency`: That of the position, at least 2.
+    - `once`: An index is taken only if `arm` was high since the one before.
     """
 
     def __init__(self, width: int, latency: int = 2, *, once: bool = False) -> None:

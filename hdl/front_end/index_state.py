@@ -22,10 +22,7 @@ class IndexState(wiring.Component):
     Latency: none of `index`; `index_wide` is high `latency` clocks after the state has come back, `index_missed` as
     many after the first step with Z low, in this clock and the one before.
 
-    Parameters
-    ----------
-    state, after : tuple of int
-        The levels of the lines, and those that follow them forward.
+    - `state`, `after`: The levels of the lines, and those that follow them forward.
     """
 
     def __init__(self, state: Levels, after: Levels, latency: int) -> None:

@@ -12,10 +12,7 @@ class ModuloCounter(wiring.Component):
 
     Latency: that of `PositionCounter`.
 
-    Parameters
-    ----------
-    modulus : int
-        N, at least 2.
+    - `modulus`: N, at least 2.
     """
 
     def __init__(self, modulus: int, latency: int = 2) -> None:

@@ -10,14 +10,9 @@ from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
 class OpenCircuit(wiring.Component):
     """Tells that a line has equalled its complement for longer than `clocks`, once until they differ again.
 
-    Members
-    -------
-    equal : In(1)
-        The line equals its complement.
-    clear : In(1)
-        What lasts is told again.
-    open : Out(1)
-        High in clock c + `clocks` if they have been equal from clock c on.
+    - `equal`: The line equals its complement.
+    - `clear`: What lasts is told again.
+    - `open`: High in clock c + `clocks` if they have been equal from clock c on.
     """
 
     def __init__(self, clocks: int) -> None:

@@ -13,10 +13,7 @@ class PinRise(wiring.Component):
     Latency: if `level` rises in clock c, `rises` is high in clock c + `latency` - 1, in which the position takes the
     step of clock c. What is asked for is told at once.
 
-    Parameters
-    ----------
-    latency : int
-        That of the position, at least 2.
+    - `latency`: That of the position, at least 2.
     """
 
     def __init__(self, latency: int) -> None:

@@ -14,15 +14,9 @@ class PositionCounter(wiring.Component):
     Latency: a step in clock c is in `position` from clock c + `latency` on, as late as `PulseCounter` shows it, so that
     the two agree while `tick` is high.
 
-    Parameters
-    ----------
-    preset : int or None
-        What `value` is where nothing drives it; None: the position cannot be set.
+    - `preset`: What `value` is where nothing drives it; None: the position cannot be set.
 
-    Raises
-    ------
-    ValueError
-        If `width` is less than 2.
+    It raises ValueError if `width` is less than 2.
     """
 
     def __init__(self, width: int, latency: int = 2, preset: int | None = None) -> None:

@@ -15,23 +15,14 @@ class PulseCounter(wiring.Component):
     Latency: `tick` is high two clocks after the window's last clock, or four. A step in the clock of the hand-over
     belongs to the next window; none is lost.
 
-    Parameters
-    ----------
-    tick_cycles : int
-        Most steps in a window.
-    max_count : int
-        Bound of |m_e|; beyond it m_e saturates.
-    stretched : bool
-        Windows may be longer, and hold any number of steps: once their sum has left ±`max_count`, m_e is saturated,
-        whatever comes after.
-    staged : bool
-        A register for the step, and one for the sum that has been held within its bound, so that `next_count` comes
-        from a register, and `tick` two clocks later.
+    - `tick_cycles`: Most steps in a window.
+    - `max_count`: Bound of |m_e|; beyond it m_e saturates.
+    - `stretched`: Windows may be longer, and hold any number of steps: once their sum has left ±`max_count`, m_e is
+      saturated, whatever comes after.
+    - `staged`: A register for the step, and one for the sum that has been held within its bound, so that `next_count`
+      comes from a register, and `tick` two clocks later.
 
-    Raises
-    ------
-    ValueError
-        If `max_count` is not in 1 … `tick_cycles`.
+    It raises ValueError if `max_count` is not in 1 … `tick_cycles`.
     """
 
     def __init__(self, tick_cycles: int, max_count: int, *, stretched: bool = False, staged: bool = False) -> None:

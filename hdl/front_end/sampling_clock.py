@@ -35,15 +35,9 @@ class SamplingClock(wiring.Component):
     Nothing needs the clocks of a window counted, so a shift register with feedback takes fewer cells than a counter.
     Whatever state an upset brings, it comes to the last one of a window.
 
-    Parameters
-    ----------
-    tick_cycles : int
-        T, clocks in a window.
+    - `tick_cycles`: T, clocks in a window.
 
-    Raises
-    ------
-    ValueError
-        If `tick_cycles` is less than 1.
+    It raises ValueError if `tick_cycles` is less than 1.
     """
 
     def __init__(self, tick_cycles: int) -> None:

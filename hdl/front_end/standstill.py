@@ -13,12 +13,8 @@ class Standstill(wiring.Component):
 
     The tick before the first one counts as empty. Latency: none.
 
-    Parameters
-    ----------
-    count_width : int
-        Bits of m_e, whose least number, without an opposite, never comes.
-    max_shift : int
-        A tick may be as long as 2^max_shift nominal ones.
+    - `count_width`: Bits of m_e, whose least number, without an opposite, never comes.
+    - `max_shift`: A tick may be as long as 2^max_shift nominal ones.
     """
 
     def __init__(self, max_ticks: int, count_width: int, *, max_shift: int = 0) -> None:

@@ -13,10 +13,7 @@ class AlterationDetector(wiring.Component):
 
     Latency: `alteration` is there with `tick`, a clock after m_e.
 
-    Parameters
-    ----------
-    seldom : bool
-        `tick` and `coming` are never high together.
+    - `seldom`: `tick` and `coming` are never high together.
     """
 
     def __init__(self, count_width: int, *, seldom: bool = False) -> None:

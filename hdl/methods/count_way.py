@@ -11,12 +11,8 @@ class CountWay(wiring.Component):
     It looks a clock ahead, so that all comes from registers, and distances can be added at once. Where the velocity
     decays, the way is that of a count and a half.
 
-    Parameters
-    ----------
-    half : int
-        Of a count.
-    decays, reversals : bool
-        Whether there are decays, and whether a count of the other sign leads nowhere.
+    - `half`: Of a count.
+    - `decays`, `reversals`: Whether there are decays, and whether a count of the other sign leads nowhere.
     """
 
     def __init__(self, half: int, *, decays: bool, reversals: bool) -> None:

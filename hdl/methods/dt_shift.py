@@ -14,10 +14,7 @@ class DtShift(wiring.Component):
 
     Latency: k and `last` are those of the new window in the clock after `opens`.
 
-    Parameters
-    ----------
-    spec : RairanTachometer
-        With a target.
+    - `spec`: With a target.
     """
 
     def __init__(self, spec: RairanTachometer, width: int) -> None:

@@ -11,12 +11,8 @@ class GapTimer(wiring.Component):
     Reset is treated as a count in the period before the first one; this count opens no window. Without latency: it
     looks a clock ahead, so that a division starts from registers.
 
-    Parameters
-    ----------
-    max_periods : int
-        Periods without a count after which `overdue` is high, and the time begins anew.
-    on_lattice : bool
-        Timer periods are ticks.
+    - `max_periods`: Periods without a count after which `overdue` is high, and the time begins anew.
+    - `on_lattice`: Timer periods are ticks.
     """
 
     def __init__(self, max_periods: int, *, on_lattice: bool) -> None:

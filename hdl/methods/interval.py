@@ -16,19 +16,12 @@ class IntervalAccumulator(wiring.Component):
     and eq. (17) is m_e(i−1) + d1/m_s. After an alteration the next window opens at that tick. At `max_ticks` the update
     is forced, and the window keeps its newer half. Without latency.
 
-    Parameters
-    ----------
-    max_ticks, kept_ticks : int
-        Longest window, and what a forced update leaves of it.
-    cancel : bool
-        Eq. (21) instead of eq. (17).
-    seldom : bool
-        A tick has at least three clocks, so that what the numerator has of the ticks before waits in a register.
+    - `max_ticks`, `kept_ticks`: Longest window, and what a forced update leaves of it.
+    - `cancel`: Eq. (21) instead of eq. (17).
+    - `seldom`: A tick has at least three clocks, so that what the numerator has of the ticks before waits in a
+      register.
 
-    Raises
-    ------
-    ValueError
-        If `max_ticks` is less than 2.
+    It raises ValueError if `max_ticks` is less than 2.
     """
 
     def __init__(

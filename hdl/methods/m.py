@@ -20,11 +20,6 @@ class MovingSum(wiring.Component):
     subtracted when a new one is added, would keep the error for ever.
 
     Latency: none. What was counted before the first tick after reset is 0, whatever the memory still holds.
-
-    Parameters
-    ----------
-    length : int
-        n.
     """
 
     def __init__(self, length: int, *, count_width: int, sum_width: int) -> None:

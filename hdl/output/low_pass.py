@@ -50,12 +50,8 @@ class LowPass(wiring.Component):
 
     Latency: an update is handed on `spec.latency` clocks after it comes, if the filter was at rest.
 
-    Parameters
-    ----------
-    layout : data.StructLayout
-        Of an update; all of it but the velocity is handed on as it is.
-    clears : bool
-        An update that `rests` is taken as it is, whatever its time.
+    - `layout`: Of an update; all of it but the velocity is handed on as it is.
+    - `clears`: An update that `rests` is taken as it is, whatever its time.
     """
 
     def __init__(self, spec: low_pass.LowPass, layout: data.StructLayout, *, clears: bool = False) -> None:

@@ -12,10 +12,7 @@ class UpdateAge(wiring.Component):
 
     Latency: none; in the clock of an update the age is `fresh`, and a tick in this clock counts already.
 
-    Parameters
-    ----------
-    fresh_width : int
-        Bits of `fresh`; 0: it is always 0.
+    - `fresh_width`: Bits of `fresh`; 0: it is always 0.
     """
 
     def __init__(self, max_age: int, fresh_width: int = 0) -> None:

@@ -20,11 +20,8 @@ from tachometry.spec.formats import velocity_output
 class _VelocityOutput(wiring.Component):
     """Holds the parts that both share.
 
-    Parameters
-    ----------
-    layout : data.StructLayout
-        Of an update in counts per tick. All its velocities become those of the unit, bounds rounded outward; the rest
-        is handed on as it is.
+    - `layout`: Of an update in counts per tick. All its velocities become those of the unit, bounds rounded outward;
+      the rest is handed on as it is.
     """
 
     def __init__(self, output: velocity_output.VelocityOutput, layout: data.StructLayout) -> None:

@@ -11,10 +11,7 @@ class Synchronizer(FFSynchronizer):
     which Vivado places them side by side, and makes no shift register of them. The first is called `stage0`, the second
     `stage1`: constraints refer to these names.
 
-    Parameters
-    ----------
-    pin : Signal, in
-        One, or several that are independent.
+    - `pin`: One, or several that are independent.
     """
 
     def __init__(self, pin: Signal, level: Signal) -> None:

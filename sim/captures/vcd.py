@@ -38,10 +38,8 @@ def read_vcd(
     declared; else its number, from 0, among those of one bit. When not given: the variables whose names without scopes
     are a and b, if there is one of each, else the first two. The other arguments are as of `read_sr`.
 
-    Raises
-    ------
-    CaptureError
-        If the file is missing, no VCD, or cut short; for an unknown variable; if a line never is 0 or 1.
+    It raises CaptureError if the file is missing, no VCD, or cut short; for an unknown variable; if a line never is 0
+    or 1.
     """
     path = Path(path)
     if samplerate_hz is not None:

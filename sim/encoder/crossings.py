@@ -57,16 +57,14 @@ def find_crossings(shaft: Shaft, disc: Disc) -> tuple[FloatArray, IntArray]:
     in it; each is then located between two neighbouring floats. A passage is the first instant at which
     `disc.quarter` of the shaft's angle has changed.
 
+    It raises ValueError if the shaft is so long in motion at so high a frequency that there are more than `MAX_CELLS`
+    cells.
+
     Returns
     -------
     time : float64 array, seconds, more than 0, not decreasing
     quarter : int64 array
         Quarter that begins with the passage: the edge itself forwards, the one below it backwards.
-
-    Raises
-    ------
-    ValueError
-        If the shaft is so long in motion at so high a frequency that there are more than `MAX_CELLS` cells.
     """
     length = np.diff(shaft.breakpoints, append=shaft.breakpoints[-1])  # the end is a cell of no length
     with np.errstate(over="ignore"):

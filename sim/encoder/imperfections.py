@@ -177,15 +177,11 @@ def gated_index(
 def pulsed(time: FloatArray, step: NDArray[np.int64], duration: float, *, directed: bool) -> tuple[FloatArray, Levels]:
     """Return times and levels of pulses, each of which lasts for half the time to the next one.
 
-    Parameters
-    ----------
-    time : float64 array, shape (n + 1,), seconds
-        The start, and the times of the steps.
-    step : int64 array, shape (n,), −1 or +1
-    duration : float, seconds
-    directed : bool
-        Pulses are on line A, and B is high for those forward, from the end of the pulse before; else they are on A for
-        those forward and on B for those backward.
+    - `time`, shape (n + 1,), seconds: The start, and the times of the steps.
+    - `step`, shape (n,), −1 or +1
+    - `duration`, seconds
+    - `directed`: Pulses are on line A, and B is high for those forward, from the end of the pulse before; else they are
+      on A for those forward and on B for those backward.
     """
     begin, end = time[1:], (time[1:] + np.append(time[2:], duration)) / 2
     if directed:

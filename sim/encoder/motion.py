@@ -92,10 +92,7 @@ class Motion:
     In segment j, with u = t - breakpoints[j], the speed is
     start_speed[j] + constant_acceleration[j] u + sine_speed[j] sin(2 pi sine_frequency[j] u).
 
-    Raises
-    ------
-    ValueError
-        If a segment is too short to be distinguished from a moment, or a number is 1e30 or more.
+    It raises ValueError if a segment is too short to be distinguished from a moment, or a number is 1e30 or more.
     """
 
     # shape (n + 1,), seconds, strictly increasing, first entry 0: where segments begin, and where the last one ends;
@@ -242,21 +239,15 @@ class Vibration:
 def parse_motion(text: str) -> Motion:
     """Read a motion.
 
-    Parameters
-    ----------
-    text : str
-        Segments joined by `+`: constant:SPEED:TIME, ramp:FROM:TO:TIME, sine:AMPLITUDE:FREQUENCY:TIME,
-        trapezoid:SPEED:ACCEL_TIME:HOLD_TIME, s-curve:FROM:TO:TIME (the acceleration is a raised cosine), or with its
-        greatest jerk, as 500rad/s3, in place of the time; stop:TIME; and torque:FROM:TORQUE:INERTIA:FRICTION:TIME, a
-        load with an inertia in kg m² and a friction in Nm s. N*(...) repeats segments. Or csv:FILE or csv:FILE:COLUMN
-        alone: a text with times and a column of speeds or angles, whose unit is in its name. Between two rows what is
-        in the column is interpolated linearly; the first time becomes 0.
-        Speeds are 0, or in rad/s, rev/s or rpm, times in s, ms, us or ns, frequencies in Hz (default), kHz, MHz or GHz.
+    - `text`: Segments joined by `+`: constant:SPEED:TIME, ramp:FROM:TO:TIME, sine:AMPLITUDE:FREQUENCY:TIME,
+      trapezoid:SPEED:ACCEL_TIME:HOLD_TIME, s-curve:FROM:TO:TIME (the acceleration is a raised cosine), or with its
+      greatest jerk, as 500rad/s3, in place of the time; stop:TIME; and torque:FROM:TORQUE:INERTIA:FRICTION:TIME, a load
+      with an inertia in kg m² and a friction in Nm s. N*(...) repeats segments. Or csv:FILE or csv:FILE:COLUMN alone: a
+      text with times and a column of speeds or angles, whose unit is in its name. Between two rows what is in the
+      column is interpolated linearly; the first time becomes 0. Speeds are 0, or in rad/s, rev/s or rpm, times in s,
+      ms, us or ns, frequencies in Hz (default), kHz, MHz or GHz.
 
-    Raises
-    ------
-    ValueError
-        If the text or the file is not of this form.
+    It raises ValueError if the text or the file is not of this form.
     """
     kind, _, file = text.strip().partition(":")
     if kind == "csv":

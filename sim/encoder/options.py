@@ -56,29 +56,19 @@ class EncoderOptions:
     off) must add up to less than 90 electrical degrees: then no state vanishes. They are of the disc, hence part of the
     truth. Each imperfection has a stream of random numbers of its own. The help of an option says what it is; beyond:
 
-    Parameters
-    ----------
-    jitter : float
-        Neighbours are edges, start and end of the recording. Shifts are clipped at 0.49 gaps: edges keep their order.
-    phase_error_deg : float, electrical degrees
-        Of the pulses' centres, forwards.
-    duty_error_deg : float, electrical degrees
-        The pauses are narrower by as much.
-    bounce : Bounce or None
-        The line returns at random moments. Half the way is to the next edge of either line. Edges that come together do
-        not bounce.
-    lost : float
-        A pulse that begins before the recording or ends after it is not missed.
-    illegal : float
-        An edge is not late if the one before it is, or if the next one is of the same line, as after a reversal.
-    index_width : int
-        At 1 the index is high only while the lines are in its state. A wider one is about that state: 2 quarters go on
-        forward, 4 begin one before it.
+    - `jitter`: Neighbours are edges, start and end of the recording. Shifts are clipped at 0.49 gaps: edges keep their
+      order.
+    - `phase_error_deg`, electrical degrees: Of the pulses' centres, forwards.
+    - `duty_error_deg`, electrical degrees: The pauses are narrower by as much.
+    - `bounce`: The line returns at random moments. Half the way is to the next edge of either line. Edges that come
+      together do not bounce.
+    - `lost`: A pulse that begins before the recording or ends after it is not missed.
+    - `illegal`: An edge is not late if the one before it is, or if the next one is of the same line, as after a
+      reversal.
+    - `index_width`: At 1 the index is high only while the lines are in its state. A wider one is about that state: 2
+      quarters go on forward, 4 begin one before it.
 
-    Raises
-    ------
-    ValueError
-        If a parameter is out of range.
+    It raises ValueError if a parameter is out of range.
     """
 
     _group = "Encoder faults"

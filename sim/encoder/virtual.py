@@ -86,35 +86,23 @@ class VirtualEncoder(EncoderOptions):
     Forward is A before B: the quarters k mod 4 = 0, 1, 2, 3 show (A, B) = 00, 10, 11, 01. Edge k, between the quarters
     k - 1 and k, lies at (k + offset[k mod 4 pulses_per_rev]) pitches of 2 pi / (4 pulses_per_rev) rad.
 
-    Parameters
-    ----------
-    pulses_per_rev : int
-        Lines of the disc: pulses of A per revolution.
-    start_angle_rad : float, rad
-        Added to the angle of the motion. At 0, a motion from angle 0 begins exactly on edge 0, which has been passed.
-    index : bool
-        Whether there is an index line Z: high once a turn, in the first period from shaft angle 0, and gated as usual:
-        only while A and B are as in `index_state`.
-    index_state : int
-        Place of the index in its period: in quadrature 0, where A and B are low, to 3; usually 2, where cores take it.
-    sensor : str
-        What it is instead of an incremental encoder with lines A and B, see `tachometry.spec.core.sensors`. Of pulses
-        there is line A alone. Halls change six times in each of `pulses_per_rev` periods. Of steps and of pulses up and
-        down there are as many in a turn; each lasts for half the time to the next one, and the direction changes as it
-        ends. Of these a pitch is a step, and neither they nor halls have faults of quadrature.
-    reverse : bool
-        It is mounted the other way round, so its lines are those of a shaft that turns backward.
-    invert : str or None
-        Lines that are low where others are high, with commas between.
-    missing_teeth : str or None
-        Of pulses, see `Encoder`: the last teeth of a turn are not there.
-    complemented : tuple of str
-        Lines whose complements are there as well, named `a_n` for `a`.
+    - `pulses_per_rev`: Lines of the disc: pulses of A per revolution.
+    - `start_angle_rad`, rad: Added to the angle of the motion. At 0, a motion from angle 0 begins exactly on edge 0,
+      which has been passed.
+    - `index`: Whether there is an index line Z: high once a turn, in the first period from shaft angle 0, and gated as
+      usual: only while A and B are as in `index_state`.
+    - `index_state`: Place of the index in its period: in quadrature 0, where A and B are low, to 3; usually 2, where
+      cores take it.
+    - `sensor`: What it is instead of an incremental encoder with lines A and B, see `tachometry.spec.core.sensors`. Of
+      pulses there is line A alone. Halls change six times in each of `pulses_per_rev` periods. Of steps and of pulses
+      up and down there are as many in a turn; each lasts for half the time to the next one, and the direction changes
+      as it ends. Of these a pitch is a step, and neither they nor halls have faults of quadrature.
+    - `reverse`: It is mounted the other way round, so its lines are those of a shaft that turns backward.
+    - `invert`: Lines that are low where others are high, with commas between.
+    - `missing_teeth`: Of pulses, see `Encoder`: the last teeth of a turn are not there.
+    - `complemented`: Lines whose complements are there as well, named `a_n` for `a`.
 
-    Raises
-    ------
-    ValueError
-        If a parameter is out of range.
+    It raises ValueError if a parameter is out of range.
     """
 
     pulses_per_rev: int
@@ -268,14 +256,9 @@ class VirtualEncoder(EncoderOptions):
 class Encoding:
     """Holds the recording that an encoder made of a motion, and the truth about it.
 
-    Parameters
-    ----------
-    recording : Recording
-        The lines, in seconds.
-    n_illegal : int
-        Number of instants at which both lines change.
-    n_lost : int
-        Number of edges that are missing, two for each pulse.
+    - `recording`: The lines, in seconds.
+    - `n_illegal`: Number of instants at which both lines change.
+    - `n_lost`: Number of edges that are missing, two for each pulse.
     """
 
     encoder: VirtualEncoder

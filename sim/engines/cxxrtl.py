@@ -206,14 +206,9 @@ class Cxxrtl(CompiledEngine):
 class State:
     """Lists what a text of CXXRTL keeps from clock to clock.
 
-    Attributes
-    ----------
-    flip_flops : dict of str to int
-        Bits by name.
-    memories : dict of str to (int, int)
-        Bits of a word, and words.
-    written : list of str
-        Memories that can be written.
+    - `flip_flops`: Bits by name.
+    - `memories`: Bits of a word, and words.
+    - `written`: Memories that can be written.
     """
 
     def __init__(self, text: str) -> None:

@@ -33,19 +33,11 @@ class Engine(Protocol):
     ) -> Run:
         """Simulate `trace.n_clocks` clocks after reset.
 
-        Parameters
-        ----------
-        vcd : path or None
-            Where to write a waveform, and a GTKWave save file beside it with the suffix `.gtkw`.
-        window : (int, int) or None
-            First clock of the waveform, and the one after the last; None for all.
-        progress : callable or None
-            Called now and then with the number of clocks done.
+        - `vcd`: Where to write a waveform, and a GTKWave save file beside it with the suffix `.gtkw`.
+        - `window`: First clock of the waveform, and the one after the last; None for all.
+        - `progress`: Called now and then with the number of clocks done.
 
-        Raises
-        ------
-        Interrupted
-            At Ctrl-C, with what was simulated so far.
+        It raises Interrupted at Ctrl-C, with what was simulated so far.
         """
         ...
 

@@ -26,14 +26,9 @@ _CLOCKS_PER_CALL = 10_000
 async def drive(ctx: Any, trace: Trace, pins: Mapping[str, Signal], period: float) -> None:
     """Let a trace play on signals, in a testbench of Amaranth's simulator that begins at time 0.
 
-    Parameters
-    ----------
-    ctx : simulator context
-    trace : Trace
-    pins : mapping of str to Signal
-        By the names of the lines: `a`, `b`, and `z` and `tick_in` if there are.
-    period : float, seconds
-        Of the simulated clock, whose edges lie in the middle of each period, as `Simulator.add_clock` has them.
+    - `pins`: By the names of the lines: `a`, `b`, and `z` and `tick_in` if there are.
+    - `period`, seconds: Of the simulated clock, whose edges lie in the middle of each period, as `Simulator.add_clock`
+      has them.
     """
     now, before = 0, [-1] * len(pins)
     levels = (trace.lines[name].tolist() for name in pins)

@@ -23,12 +23,8 @@ class Waveform:
     Signals are those of the clock that begins at the time stamp; `clk` itself comes with `add_curves`, as it would be
     nearly all of a long file. Use as a context manager.
 
-    Parameters
-    ----------
-    clock_hz : int
-        Frequency of the clock in Hz.
-    widths : dict of str to (int, bool)
-        Bits of each signal and whether it is signed, in the order in which they are shown.
+    - `clock_hz`: Frequency of the clock in Hz.
+    - `widths`: Bits of each signal and whether it is signed, in the order in which they are shown.
     """
 
     def __init__(self, path: Path, clock_hz: int, widths: dict[str, tuple[int, bool]]) -> None:
@@ -86,14 +82,8 @@ class Waveform:
 def add_curves(path: Path, clock_hz: int, window: tuple[int, int], curves: Mapping[str, Curve]) -> None:
     """Add real signals to a waveform and its save file, which show them as curves; and `clk`, if it is not too long.
 
-    Parameters
-    ----------
-    path : Path
-        Of a file that a `Waveform` has written.
-    window : int, int
-        First clock, and the one behind the last.
-    curves : mapping of str to (float64 array, float64 array)
-        By name.
+    - `path`: Of a file that a `Waveform` has written.
+    - `window`: First clock, and the one behind the last.
     """
     begin, end = (clock * 10**12 // clock_hz for clock in window)
     added: list[Iterator[Change]] = []

@@ -50,12 +50,9 @@ def _held(value: int, most: int) -> int:
 class Generator:
     """Keeps the state of a generator between two control ticks.
 
-    Attributes
-    ----------
-    place, speed, change : int
-        In 2^−F counts, counts per control tick, and counts per control tick squared; the place does not wrap.
-    toward : int
-        The way to the middle of the sine.
+    - `place`, `speed`, `change`: In 2^−F counts, counts per control tick, and counts per control tick squared; the
+      place does not wrap.
+    - `toward`: The way to the middle of the sine.
     """
 
     def __init__(self, form: GeneratorForm) -> None:

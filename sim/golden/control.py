@@ -24,14 +24,9 @@ _COMMANDS = ("command_position", "command_velocity", "command_acceleration")
 class Control:
     """Keeps the state of a loop between two control ticks.
 
-    Attributes
-    ----------
-    y, w, z : int
-        In 2^−f of an LSB of the velocity; w = z − y.
-    current : int
-        Of the last control tick, in its LSB.
-    saturated : bool
-        Whether it was held within the limit.
+    - `y`, `w`, `z`: In 2^−f of an LSB of the velocity; w = z − y.
+    - `current`: Of the last control tick, in its LSB.
+    - `saturated`: Whether it was held within the limit.
     """
 
     def __init__(self, form: ControlForm) -> None:
@@ -119,18 +114,11 @@ def control(
 ) -> Table:
     """Return what the loop shows with `current_valid`, of a shaft whose motion does not follow from its currents.
 
-    Parameters
-    ----------
-    clock : int64 array, shape (n,)
-        Clocks of the control ticks.
-    position : int64 array, shape (n,)
-        What the tachometer shows in them.
-    updates : Table
-        Of the tachometer, with `velocity`.
-    commands : sequence of Command
-        One for each control tick.
-    gains : sequence of Gains or None
-        One for each control tick, where they are inputs.
+    - `clock`, shape (n,): Clocks of the control ticks.
+    - `position`, shape (n,): What the tachometer shows in them.
+    - `updates`: Of the tachometer, with `velocity`.
+    - `commands`: One for each control tick.
+    - `gains`: One for each control tick, where they are inputs.
     """
     loop = Control(spec.form)
     rows: list[tuple[int, bool, int, int]] = []

@@ -103,14 +103,9 @@ class _Line:
 class GoldenEmulator:
     """Computes the emulator from a restart on.
 
-    Parameters
-    ----------
-    lines_per_rev : int or None
-        Periods in a revolution, for the index line; None: there is none.
-    index_place : int
-        Quarter of its period in which the index is high, 0 to 3.
-    complemented : tuple of str
-        Lines whose complements are there as well.
+    - `lines_per_rev`: Periods in a revolution, for the index line; None: there is none.
+    - `index_place`: Quarter of its period in which the index is high, 0 to 3.
+    - `complemented`: Lines whose complements are there as well.
     """
 
     def __init__(

@@ -22,12 +22,8 @@ _PHASE = np.array([[0, 3], [1, 2]], dtype=np.uint8)
 def decode(a: NDArray[np.uint8], b: NDArray[np.uint8], decoding: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Step and illegal transition of each change of a list of levels.
 
-    Parameters
-    ----------
-    a, b : uint8 arrays, shape (n,)
-        Levels, each row different from the one before.
-    decoding : int
-        1, 2 or 4.
+    - `a`, `b`, shape (n,): Levels, each row different from the one before.
+    - `decoding`: 1, 2 or 4.
 
     Returns
     -------
@@ -49,12 +45,8 @@ def looked_up(
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Step of each row of a list of levels of any sensor, 0 for the first, and whether it is wrong.
 
-    Parameters
-    ----------
-    levels : sequence of uint8 arrays, shape (n,)
-        Of each line of the sensor, each row different from the one before.
-    brief : bool
-        The first row lasts for a clock only, in which the decoder does not yet look.
+    - `levels`, shape (n,): Of each line of the sensor, each row different from the one before.
+    - `brief`: The first row lasts for a clock only, in which the decoder does not yet look.
 
     Returns
     -------
@@ -94,10 +86,7 @@ def filter_line(
     """Return glitch filter: a level counts only when it holds for so many clocks; before the first one that does, none
     counts.
 
-    Parameters
-    ----------
-    clock, level : arrays, shape (n,)
-        Change list of one line.
+    - `clock`, `level`, shape (n,): Change list of one line.
 
     Returns
     -------
@@ -302,13 +291,9 @@ def count(
 ) -> tuple[Table, Table]:
     """Return pulse numbers and positions of all ticks, and positions at the index.
 
-    Parameters
-    ----------
-    last : int64 array
-        Last clock of each window.
-    beyond : bool array or None
-        Windows that may be longer than nominal: whether the method raises `overflow`. A sum that has left
-        ±max_pulse_count is saturated, whatever comes after.
+    - `last`: Last clock of each window.
+    - `beyond`: Windows that may be longer than nominal: whether the method raises `overflow`. A sum that has left
+      ±max_pulse_count is saturated, whatever comes after.
     """
     window = places(last, steps.clock, "left")
     sums = np.subtract(*(np.bincount(window[steps.step == sign], minlength=len(last) + 1)[:-1] for sign in (1, -1)))

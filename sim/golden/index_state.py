@@ -13,10 +13,7 @@ from tachometry.spec.core.sensors import packed_levels
 def in_state(spec: TachometerSpec, levels: Sequence[NDArray[np.uint8]]) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
     """Return the index as it is in the state in which it is taken, and where it meets that state a second time.
 
-    Parameters
-    ----------
-    levels : sequence of uint8 arrays, shape (n,)
-        Of the lines as they are on the pins, and of Z as it should be read, at each change.
+    - `levels`, shape (n,): Of the lines as they are on the pins, and of Z as it should be read, at each change.
 
     Returns
     -------
@@ -53,13 +50,9 @@ def passed_by(
 
     Times of Z with no step between them, in a clock in which Z is low as in the one before, are one.
 
-    Parameters
-    ----------
-    stepped, step : int64 arrays, shape (m,)
-        Clocks of the steps, and the steps, −1 or +1.
-    clock : int64 array, shape (n,)
-    z, taken : uint8 arrays, shape (n,)
-        From each clock on Z, and Z in its state.
+    - `stepped`, `step`, shape (m,): Clocks of the steps, and the steps, −1 or +1.
+    - `clock`, shape (n,)
+    - `z`, `taken`, shape (n,): From each clock on Z, and Z in its state.
     """
     change = np.diff(z.astype(np.int8))
     comes, goes = clock[1:][change > 0], clock[1:][change < 0]

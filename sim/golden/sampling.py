@@ -26,10 +26,7 @@ def external_windows(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return windows that end with a rise, none shorter than `min_cycles` and none longer than `max_cycles`.
 
-    Parameters
-    ----------
-    rises : int64 array
-        Clocks in which a rise is seen.
+    - `rises`: Clocks in which a rise is seen.
 
     Returns
     -------

@@ -12,11 +12,7 @@ _JUMPS = 6  # `chain` follows 2^6 places at once
 def places(ordered: Ints, values: Ints, side: str) -> Ints:
     """Return what `np.searchsorted` gives; for evenly spaced places, as ticks of the core's own clock are, by division.
 
-    Parameters
-    ----------
-    ordered, values : int64 arrays
-    side : str
-        `left` for how many of `ordered` are less than each value, `right` for how many are not greater.
+    - `side`: `left` for how many of `ordered` are less than each value, `right` for how many are not greater.
     """
     n = len(ordered)
     step = int(ordered[1] - ordered[0]) if n > 1 else 0

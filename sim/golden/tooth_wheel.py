@@ -28,13 +28,8 @@ class Teeth:
 def filled(wheel: ToothWheel, teeth: Ints, n_clocks: int) -> Teeth:
     """Return all teeth up to a clock, from the clocks of those that are there.
 
-    Parameters
-    ----------
-    wheel : ToothWheel
-    teeth : int64 array
-        Clocks, at least 2 apart.
-    n_clocks : int
-        Those of teeth that are put in are below.
+    - `teeth`: Clocks, at least 2 apart.
+    - `n_clocks`: Those of teeth that are put in are below.
     """
     put_in: list[int] = []
     index: list[int] = []

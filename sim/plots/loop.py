@@ -39,12 +39,8 @@ def save_log(path: Path, setting: Setting, log: Log) -> None:
 def save_loops(path: Path, loops: Sequence[tuple[str, Mapping[str, str], Mapping[str, Any]]], across: str) -> None:
     """Draw what came of loops into a `.png` or `.pdf`; equal ones give equal files.
 
-    Parameters
-    ----------
-    loops : sequence of (str, mapping, mapping)
-        Method, place on the axes, and row of each.
-    across : str
-        The axis from left to right; for all others, and for methods, there is a curve for each value.
+    - `loops`: Method, place on the axes, and row of each.
+    - `across`: The axis from left to right; for all others, and for methods, there is a curve for each value.
     """
     save_figure(path, lambda: _draw_loops(loops, across))
 

@@ -36,20 +36,12 @@ def save_heat_maps(
 
     A field is the median over all points there. A method without one of the axes has the same value all along it.
 
-    Parameters
-    ----------
-    methods : sequence of str, length n
-        Of each point.
-    at : sequence of mapping, length n
-        Where each is: values of the axes that its method has.
-    figures : sequence of float or None, length n
-        What is shown of each.
-    axes : mapping of str to sequence of str
-        One axis or two, with their values: across, and upwards.
-    what : str
-        What is shown, with its unit.
-    log : bool
-        Colours go by the logarithm.
+    - `methods`, length n: Of each point.
+    - `at`, length n: Where each is: values of the axes that its method has.
+    - `figures`, length n: What is shown of each.
+    - `axes`: One axis or two, with their values: across, and upwards.
+    - `what`: What is shown, with its unit.
+    - `log`: Colours go by the logarithm.
     """
     names = list(dict.fromkeys(methods))
     fields = {}

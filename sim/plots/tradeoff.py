@@ -15,14 +15,9 @@ _MARKS = "os^Dv<>pPX"
 def save_tradeoff(path: Path, spec: TachometerSpec, costs: Mapping[str, Sequence[Cost]], speed: float) -> None:
     """Draw error over delay into a file whose kind its suffix tells: `.png` or `.pdf`; equal ones give equal files.
 
-    Parameters
-    ----------
-    spec : TachometerSpec
-        Whose configuration is the title, and whose unit speeds have.
-    costs : mapping of str to sequence of Cost
-        By method: all settings that were tried. Those that are on its `front` are shown.
-    speed : float, rad/s
-        RMS speed of the motion at which errors were measured, and greatest of the one for delays.
+    - `spec`: Whose configuration is the title, and whose unit speeds have.
+    - `costs`: By method: all settings that were tried. Those that are on its `front` are shown.
+    - `speed`, rad/s: RMS speed of the motion at which errors were measured, and greatest of the one for delays.
     """
     save_figure(path, lambda: _draw(spec, costs, speed))
 

@@ -85,22 +85,14 @@ def _same_length(*columns: NDArray[np.generic]) -> bool:
 class Recording(_Lines):
     """Holds the levels of the encoder lines over continuous time.
 
-    Parameters
-    ----------
-    time : float64 array, shape (n,), seconds, not decreasing, first entry 0
-        Instant from which the levels of the same row hold.
-    a, b : uint8 arrays, shape (n,), 0 or 1
-        Levels of the lines from `time` on. Row 0 is the level at rest before the first edge.
-    duration : float, seconds
-        Length of the recording; not before the last change.
-    z, tick_in : uint8 arrays, shape (n,), 0 or 1, or None
-        Levels of the index line and of the external tick; None if it is absent.
-    c : uint8 array, shape (n,), 0 or 1, or None
-        Levels of a third line, as of halls. A sensor of one line has 0 in `b`.
-    source : Source or None
-        Of a capture, what it says of itself.
-    more : mapping of str to uint8 array, shape (n,)
-        Further lines by name, such as `a_n`, the complement of A.
+    - `time`, shape (n,), seconds, not decreasing, first entry 0: Instant from which the levels of the same row hold.
+    - `a`, `b`, shape (n,), 0 or 1: Levels of the lines from `time` on. Row 0 is the level at rest before the first
+      edge.
+    - `duration`, seconds: Length of the recording; not before the last change.
+    - `z`, `tick_in`, shape (n,), 0 or 1: Levels of the index line and of the external tick; None if it is absent.
+    - `c`, shape (n,), 0 or 1: Levels of a third line, as of halls. A sensor of one line has 0 in `b`.
+    - `source`: Of a capture, what it says of itself.
+    - `more`, shape (n,): Further lines by name, such as `a_n`, the complement of A.
     """
 
     time: NDArray[np.float64]
@@ -135,10 +127,7 @@ class Recording(_Lines):
 
         A change within rounding of an edge, such as a decimal time on the clock's grid, is seen at that edge.
 
-        Raises
-        ------
-        ValueError
-            If there are too many clocks to be told apart.
+        It raises ValueError if there are too many clocks to be told apart.
         """
         clock = self._clock(clock_hz)
         n_clocks = int(np.floor(self.duration * clock_hz))
@@ -182,20 +171,14 @@ class Recording(_Lines):
 class PinTrace(_Lines):
     """Holds the levels that the first synchroniser flip-flop samples, on the core's clock.
 
-    Parameters
-    ----------
-    clock : int64 array, shape (n,), strictly increasing, first entry 0
-        Clock edge from which the levels of the same row are sampled (clock edge 0 is the first after reset).
-    a, b : uint8 arrays, shape (n,), 0 or 1
-    n_clocks : int
-        Number of clocks to run.
-    z, tick_in : uint8 arrays, shape (n,), 0 or 1, or None
-        Index line and external tick; None if it is absent.
-    c : uint8 array, shape (n,), 0 or 1, or None
-        A third line.
-    more : mapping of str to integer array, shape (n,)
-        Further inputs by name, such as `preset`. `probe` and `probe_arm` have a bit for each probe, the first lowest;
-        A setting, such as `probe_edges`, is what a program has written.
+    - `clock`, shape (n,), strictly increasing, first entry 0: Clock edge from which the levels of the same row are
+      sampled (clock edge 0 is the first after reset).
+    - `a`, `b`, shape (n,), 0 or 1
+    - `n_clocks`: Number of clocks to run.
+    - `z`, `tick_in`, shape (n,), 0 or 1: Index line and external tick; None if it is absent.
+    - `c`, shape (n,), 0 or 1: A third line.
+    - `more`, shape (n,): Further inputs by name, such as `preset`. `probe` and `probe_arm` have a bit for each probe,
+      the first lowest; a setting, such as `probe_edges`, is what a program has written.
     """
 
     clock: NDArray[np.int64]
@@ -218,10 +201,7 @@ class PinTrace(_Lines):
         """Return what the pins of a core see of a recording: with nominal external ticks if the core takes them and
         there are none, and with probes that are always armed and a stream that is always ready.
 
-        Raises
-        ------
-        ValueError
-            If there are too many clocks to be told apart, or more than `MAX_TICKS` ticks.
+        It raises ValueError if there are too many clocks to be told apart, or more than `MAX_TICKS` ticks.
         """
         check_ticks(recording.duration, spec)
         return recording.place(spec.timing.clock_hz).completed(spec)

@@ -101,10 +101,8 @@ _NONE = Table(np.empty(0, dtype=np.int64), {"index_position": np.empty(0, dtype=
 def observed(spec: AnySpec, n_clocks: int, rows: Ints) -> Run:
     """Return the run that was seen at the output ports.
 
-    Parameters
-    ----------
-    rows : int64 array, shape (n, 1 + number of outputs)
-        The clock, and all outputs in the order of the ports, in every clock in which a strobe is high.
+    - `rows`, shape (n, 1 + number of outputs): The clock, and all outputs in the order of the ports, in every clock in
+      which a strobe is high.
     """
     columns = {
         port.name: rows[:, k].astype(np.bool_ if port.width == 1 and not port.signed else np.int64)
@@ -131,17 +129,14 @@ class Mismatch:
 def compare(expected: Run, actual: Run) -> tuple[int, list[Mismatch]]:
     """Hold two runs against each other, every row and every bit.
 
+    It raises ValueError if they are not runs of the same ports.
+
     Returns
     -------
     count : int
         Rows that differ, summed over all signals; a row that only one run has is one.
     first : list of Mismatch
         The first of them in each signal that differs.
-
-    Raises
-    ------
-    ValueError
-        If they are not runs of the same ports.
     """
     shapes = [{strobe: list(table.columns) for strobe, table in run.tables.items()} for run in (expected, actual)]
     if shapes[0] != shapes[1]:

@@ -20,12 +20,9 @@ from tachometry.spec.language.port import TICK, UPDATE
 class HeldVelocity:
     """Holds the velocity that the core shows, tick by tick, from the first update on.
 
-    Parameters
-    ----------
-    time : float64 array, shape (n,), seconds
-        Of each tick the clock in which an update that it causes is valid. A core that ends its ticks itself is read
-        after each nominal tick.
-    velocity_rad_s : float64 array, shape (n,), rad/s
+    - `time`, shape (n,), seconds: Of each tick the clock in which an update that it causes is valid. A core that ends
+      its ticks itself is read after each nominal tick.
+    - `velocity_rad_s`, shape (n,), rad/s
     """
 
     time: NDArray[np.float64]
@@ -36,10 +33,7 @@ class HeldVelocity:
 class VelocityError:
     """Holds statistics of held velocity less true speed, in rad/s, over all ticks from the first update on.
 
-    Parameters
-    ----------
-    rms, mean, max : float, rad/s
-        `max` is the largest magnitude.
+    - `rms`, `mean`, `max`, rad/s: `max` is the largest magnitude.
     """
 
     rms: float

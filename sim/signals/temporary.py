@@ -147,12 +147,8 @@ def run_tool(
     it. It has at most `memory` bytes, by default those of the computer, where Linux keeps it to them, and these
     environment variables in addition to those of this process.
 
-    Raises
-    ------
-    OSError
-        If it cannot be run.
-    subprocess.TimeoutExpired
-        If it takes more than `seconds` of the processor, or four hours; without Linux, if it takes `seconds`.
+    It raises OSError if it cannot be run; subprocess.TimeoutExpired if it takes more than `seconds` of the processor,
+    or four hours; without Linux, if it takes `seconds`.
     """
     ours = {} if folder is None else dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(folder))
     started: list[subprocess.Popen[str]] = []

@@ -36,19 +36,11 @@ def lockstep(
 ) -> Lockstep:
     """Run a trace on the golden model and on an engine, and compare every bit of every row.
 
-    Parameters
-    ----------
-    expected : Run or None
-        What the golden model makes of the trace, if that is known already.
-    vcd, window, progress
-        See `Engine.run`.
-    fewest : int or None
-        Ctrl-C after this many clocks gives what has been done by then; None: it always ends the run.
+    - `expected`: What the golden model makes of the trace, if that is known already.
+    - `vcd`, `window`, `progress`: See `Engine.run`.
+    - `fewest`: Ctrl-C after this many clocks gives what has been done by then; None: it always ends the run.
 
-    Raises
-    ------
-    Interrupted
-        At Ctrl-C before that.
+    It raises Interrupted at Ctrl-C before that.
     """
     if expected is None:
         expected = golden.run(spec, trace)

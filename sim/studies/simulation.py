@@ -97,21 +97,12 @@ def simulate(
 ) -> Simulation:
     """Run hardware and golden model on a recording for each axis.
 
-    Parameters
-    ----------
-    source : str
-        What messages call that which the recordings come from.
-    truths : sequence of Encoding or None
-        What the shaft of each axis truly did.
-    window : callable
-        Gives the clocks that the waveform `vcd` shows.
-    pulses : callable or None
-        Gives clocks in which other inputs than those of the encoder rise, by their names.
+    - `source`: What messages call that which the recordings come from.
+    - `truths`: What the shaft of each axis truly did.
+    - `window`: Gives the clocks that the waveform `vcd` shows.
+    - `pulses`: Gives clocks in which other inputs than those of the encoder rise, by their names.
 
-    Raises
-    ------
-    ValueError
-        If the recordings do not last a tick, or have too many.
+    It raises ValueError if the recordings do not last a tick, or have too many.
     """
     trace: Trace
     trace = AxesTrace.placed(recordings, spec) if spec.kind == "axes" else PinTrace.of(recordings[0], spec)

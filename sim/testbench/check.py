@@ -95,25 +95,14 @@ def check(
 ) -> Checked:
     """Make the core of a manifest again, and compare its files and its behaviour with what lies beside the manifest.
 
-    Parameters
-    ----------
-    path : Path
-        The manifest.
-    simulation : bool
-        Whether the Verilog plays a motion that the golden model plays, too.
-    netlists : sequence of Path
-        Verilog to be simulated in place of NAME.v, a netlist with the models of its cells, for example.
-    waves : Path or None
-        Folder for the waveform of a core that differs; it is made then.
-    say : callable
-        Told what is being done.
+    - `path`: The manifest.
+    - `simulation`: Whether the Verilog plays a motion that the golden model plays, too.
+    - `netlists`: Verilog to be simulated in place of NAME.v, a netlist with the models of its cells, for example.
+    - `waves`: Folder for the waveform of a core that differs; it is made then.
+    - `say`: Told what is being done.
 
-    Raises
-    ------
-    ValueError
-        If the file is no manifest; if this version makes no such core.
-    OSError
-        If there is no cocotb or no simulator, or it fails.
+    It raises ValueError if the file is no manifest; if this version makes no such core; OSError if there is no cocotb
+    or no simulator, or it fails.
     """
     say("comparing its files")
     spec = of_manifest(path)

@@ -35,19 +35,11 @@ _MOST_BENCH_TICKS = 2_000_000  # of which each is a row of text
 def cocotb_bench(core: AnySpec, name: str, recordings: Sequence[Recording] | None = None) -> dict[str, str]:
     """Return a bench for cocotb as texts by file name: `test_NAME.py` and `NAME_vectors.json`.
 
-    Parameters
-    ----------
-    core : TachometerSpec, AxesSpec or LoopSpec
-        The inputs of a loop are given numbers of all sizes.
-    name : str
-        Of the module; `NAME.v` and its manifest `NAME.json` must lie beside the bench.
-    recordings : sequence of Recording or None
-        What to put on the pins, of each axis; None: `usual_motion`.
+    - `core`: The inputs of a loop are given numbers of all sizes.
+    - `name`: Of the module; `NAME.v` and its manifest `NAME.json` must lie beside the bench.
+    - `recordings`: What to put on the pins, of each axis; None: `usual_motion`.
 
-    Raises
-    ------
-    ValueError
-        If it does not last for a tick, or for too many.
+    It raises ValueError if it does not last for a tick, or for too many.
     """
     spec = core.tachometer
     traces = []

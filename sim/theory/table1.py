@@ -30,11 +30,9 @@ class Row:
 def table1_rows(pulses: Iterable[int], dt: int, duration: int) -> list[Row]:
     """Return every event of Table 1, its start first; the lines are those of the paper, in its order.
 
-    Parameters
-    ----------
-    pulses : iterable of int, ts, increasing and greater than 0
-    dt : int, ts
-    duration : int, ts
+    - `pulses`, ts, increasing and greater than 0
+    - `dt`, ts
+    - `duration`, ts
     """
     rows = [Row(0, False, False, 0, 0, 0, 1)]
     coming = iter(pulses)

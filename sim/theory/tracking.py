@@ -24,10 +24,7 @@ _STEPS = 16  # values of X in an octave for which errors are computed
 def velocity_errors(x: float) -> tuple[float, float]:
     """Return what errors of the places of events make of the velocity that is shown.
 
-    Parameters
-    ----------
-    x : float
-        X of a memory that has grown, at most 1/4.
+    - `x`: X of a memory that has grown, at most 1/4.
 
     Returns
     -------
@@ -67,12 +64,10 @@ def errors(
 ) -> tuple[Floats, Floats]:
     """Return the errors of the velocity, in rad/s, when offsets are learned and the memory has grown.
 
-    Parameters
-    ----------
-    speed : float64 array, shape (n,), rad/s, greater than 0
-    edge_error : float64 array or float, counts
-        Standard deviation of the independent errors of edges; for the second result the greatest error of any.
-    tick_seconds, max_memory : float, seconds
+    - `speed`, shape (n,), rad/s, greater than 0
+    - `edge_error`, counts: Standard deviation of the independent errors of edges; for the second result the greatest
+      error of any.
+    - `tick_seconds`, `max_memory`, seconds
 
     Returns
     -------

@@ -8,12 +8,8 @@ MOST_JSON = 1 << 22  # bytes of a manifest
 def read_text(path: Path, most: int) -> str:
     """Return the text of a file of at most so many bytes.
 
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    ValueError
-        If it has more, or is not UTF-8 text (then a `UnicodeDecodeError`).
+    It raises OSError if it cannot be read; ValueError if it has more, or is not UTF-8 text (then a
+    `UnicodeDecodeError`).
     """
     with path.open("rb") as file:
         content = file.read(most + 1)

@@ -19,16 +19,10 @@ REQUIRED: Any = MISSING  # default of an option that must be given
 class ParameterError(ValueError):
     """A parameter is not what it must be; the message begins with the parameter, "max_ticks must be …".
 
-    Parameters
-    ----------
-    parameter : str
-        Name of the field, or of the option that was read; the command line shows its option in its place.
-    rest : str
-        The message behind the name.
-    brief : str
-        Why, in a few words behind the name of a method that another one is taken for; empty: the message.
-    refused : object or None
-        The spec, if this is all that is wrong with it; what is made of it may say better what is allowed.
+    - `parameter`: Name of the field, or of the option that was read; the command line shows its option in its place.
+    - `rest`: The message behind the name.
+    - `brief`: Why, in a few words behind the name of a method that another one is taken for; empty: the message.
+    - `refused`: The spec, if this is all that is wrong with it; what is made of it may say better what is allowed.
     """
 
     def __init__(self, parameter: str, rest: str, brief: str = "", refused: Any = None) -> None:
@@ -159,16 +153,11 @@ class Option:
 def option(default: Any, help: str, *, text: str | None = None, also: tuple[Option, ...] = (), **about: Any) -> Any:
     """Return a field that is an option.
 
-    Parameters
-    ----------
-    default : object
-        Default of the field; with a text, None for that of the text, or `REQUIRED` where only `read_options` has one.
-    text : str or None
-        The default as a text, read as it would be if it were given.
-    also : tuple of Option
-        Other options for the same field.
-    **about
-        See `Option`. Without `parse`, the kind of the default tells how the text is read.
+    - `default`: Default of the field; with a text, None for that of the text, or `REQUIRED` where only `read_options`
+      has one.
+    - `text`: The default as a text, read as it would be if it were given.
+    - `also`: Other options for the same field.
+    - `**about`: See `Option`. Without `parse`, the kind of the default tells how the text is read.
     """
     if isinstance(default, bool) or "part" in about:
         about.update(flag=True, parse=parse_flag)
@@ -230,20 +219,11 @@ def read_options(
 ) -> dict[str, Any]:
     """Return values of the fields of a class, from the texts that are given for its options.
 
-    Parameters
-    ----------
-    spec : type
-    texts : mapping of str to str
-        By the names of the options.
-    timing : mapping of str to object
-        What is known of the fields of `Timing`, for texts that say nothing without.
-    usual : mapping of str to str
-        Defaults in place of those of the options, by their names.
+    - `texts`: By the names of the options.
+    - `timing`: What is known of the fields of `Timing`, for texts that say nothing without.
+    - `usual`: Defaults in place of those of the options, by their names.
 
-    Raises
-    ------
-    ParameterError
-        If a text cannot be read, two options for one field are given, or one is missing.
+    It raises ParameterError if a text cannot be read, two options for one field are given, or one is missing.
     """
     given: dict[str, Option] = {}
     for about in options_of(spec):

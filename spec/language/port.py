@@ -19,18 +19,11 @@ STREAM = "m_axis"  # names of ports of a stream begin with it
 class Port:
     """Describes a scalar port of the exported core.
 
-    Parameters
-    ----------
-    direction : str
-        `input` or `output`.
-    width : int
-        Bits.
-    held_by : str
-        Of an output, the strobe in whose clocks it is read; a strobe is read with itself.
-    unit : str
-        What one LSB is.
-    help : str
-        What the port means, in a sentence or two.
+    - `direction`: `input` or `output`.
+    - `width`: Bits.
+    - `held_by`: Of an output, the strobe in whose clocks it is read; a strobe is read with itself.
+    - `unit`: What one LSB is.
+    - `help`: What the port means, in a sentence or two.
     """
 
     name: str

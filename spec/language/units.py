@@ -66,21 +66,12 @@ TORQUE = _decimal(Nm=0, mNm=-3)
 def read_quantity(what: str, text: str, units: Units, default: str = "", also: str = "") -> tuple[Fraction, str]:
     """Return the decimal number in a text, exactly, and its unit.
 
-    Parameters
-    ----------
-    what : str
-        What the message calls the quantity.
-    units : mapping of str to Unit
-        Those that it may have.
-    default : str
-        Unit of a number without one.
-    also : str
-        What else may stand there, which the caller reads, for the message.
+    - `what`: What the message calls the quantity.
+    - `units`: Those that it may have.
+    - `default`: Unit of a number without one.
+    - `also`: What else may stand there, which the caller reads, for the message.
 
-    Raises
-    ------
-    ParameterError
-        If the text is not of this form, or the number absurdly large or small.
+    It raises ParameterError if the text is not of this form, or the number absurdly large or small.
     """
     number = text.strip()
     match = _QUANTITY.fullmatch(number) if len(number) <= _LONGEST else None

@@ -104,19 +104,11 @@ class AxesSpec(WithTachometer):
     In a round each axis is looked at once, in its slot of one clock. So an axis is, to the bit, a core of its own whose
     clock is a round: see `axis`.
 
-    Parameters
-    ----------
-    tachometer : STachometer or TrackTachometer
-        What each axis would be as a core of its own; its clock and tick are those of this core.
-    axes : int
-        N, 1 to 64.
-    parallel : bool
-        Every output has a port for each axis, which holds it.
+    - `tachometer`: What each axis would be as a core of its own; its clock and tick are those of this core.
+    - `axes`: N, 1 to 64.
+    - `parallel`: Every output has a port for each axis, which holds it.
 
-    Raises
-    ------
-    ParameterError
-        If there cannot be such a core.
+    It raises ParameterError if there cannot be such a core.
     """
 
     tachometer: STachometer | TrackTachometer

@@ -62,12 +62,8 @@ def records(
 ) -> tuple[Ints, NDArray[np.void]]:
     """Return what is sent.
 
-    Parameters
-    ----------
-    steps : Steps
-        Those of the trace.
-    tables : mapping of str to Table
-        `sim.golden.tables` of them.
+    - `steps`: Those of the trace.
+    - `tables`: `sim.golden.tables` of them.
 
     Returns
     -------

@@ -26,12 +26,8 @@ def adaptive_windows(spec: RairanTachometer, start: Ints, next_turn: Ints) -> tu
     """Return nodes at which windows open, those at which they end, and k of each; a step per window, as k is a
     recursion.
 
-    Parameters
-    ----------
-    start : int64 array, shape (n,)
-        Clocks of the nodes: of the reset, of the counts, and of the end.
-    next_turn : int64 array, shape (n,)
-        The first node from each on that is a count against the direction, or the end.
+    - `start`, shape (n,): Clocks of the nodes: of the reset, of the counts, and of the end.
+    - `next_turn`, shape (n,): The first node from each on that is a count against the direction, or the end.
     """
     clock, turn, rule = start.tolist(), next_turn.tolist(), spec.form.adaptive_dt
     end, node, shift, falling = len(clock) - 1, 0, 0, False

@@ -19,9 +19,7 @@ def alterations(m_e: NDArray[np.int64]) -> NDArray[np.bool_]:
     While the number changes in every tick, only a tick that equals b does not alter, which leaves b as it is. So b is
     the pulse number of the last tick that equals its predecessor, and nothing has to be followed tick by tick.
 
-    Parameters
-    ----------
-    m_e : int64 array, shape (n,)
+    - `m_e`, shape (n,)
 
     Returns
     -------
@@ -41,9 +39,7 @@ def windows(
     A window closes at an alteration, which opens the next, or when it has grown to `max_ticks`: then it keeps its newer
     half, ⌊max_ticks/2⌋ ticks. The first opens at tick −1.
 
-    Parameters
-    ----------
-    alteration : bool array, shape (n,)
+    - `alteration`, shape (n,)
 
     Returns
     -------

@@ -143,11 +143,8 @@ def low_pass(value: ArrayLike, period_s: float, filter_s: float) -> FloatArray:
 def finite_difference(steps: Steps, period_s: float, filter_s: float = 5e-3) -> Estimate:
     """Return counts of each period over the period, then a low-pass filter.
 
-    Parameters
-    ----------
-    period_s : float, seconds
-    filter_s : float, seconds
-        Time constant of the filter; 0 for none. SimpleFOC's default is 5 ms.
+    - `period_s`, seconds
+    - `filter_s`, seconds: Time constant of the filter; 0 for none. SimpleFOC's default is 5 ms.
     """
     readings = read(steps, period_s)
     raw = readings.difference * steps.count_rad / period_s
@@ -161,14 +158,9 @@ def timestamp_method(steps: Steps, period_s: float, timeout_s: float = 0.5, cloc
     and at the start, the first reading with a new count gives only a time to measure from. One count back, after a
     measurement forward or the other way round, is taken for a shaft that rests on an edge: speed 0.
 
-    Parameters
-    ----------
-    period_s : float, seconds
-        LinuxCNC's servo period is usually 1 ms.
-    timeout_s : float, seconds
-        `vel-timeout`, 0.5 s by default.
-    clock_s : float, seconds
-        Unit of the timestamps: about 0.5 us by default, 0.1 us with `hires-timestamp`.
+    - `period_s`, seconds: LinuxCNC's servo period is usually 1 ms.
+    - `timeout_s`, seconds: `vel-timeout`, 0.5 s by default.
+    - `clock_s`, seconds: Unit of the timestamps: about 0.5 us by default, 0.1 us with `hires-timestamp`.
     """
     readings = read(steps, period_s)
     now = clocks(readings.time, clock_s, period_s)
@@ -202,13 +194,9 @@ def mixed_method(steps: Steps, period_s: float, timeout_s: float = 0.1, clock_s:
     half a period is left out, and the speed is 0 once Th is more than `timeout_s`. SimpleFOC controls with what
     `low_pass` makes of this, with a time constant of 5 ms by default.
 
-    Parameters
-    ----------
-    period_s : float, seconds
-    timeout_s : float, seconds
-        0.1 s in SimpleFOC.
-    clock_s : float, seconds
-        Unit of the times of counts: 1 us in SimpleFOC.
+    - `period_s`, seconds
+    - `timeout_s`, seconds: 0.1 s in SimpleFOC.
+    - `clock_s`, seconds: Unit of the times of counts: 1 us in SimpleFOC.
     """
     readings = read(steps, period_s)
     now = clocks(readings.time, clock_s, period_s)
@@ -229,21 +217,13 @@ def tracking_loop(
     At constant acceleration it shows the speed of 2 / bandwidth - period / 2 ago. moteus also limits the speed to an
     eighth of a revolution per period, which is left out.
 
-    Parameters
-    ----------
-    period_s : float, seconds
-        125 us in ODrive, 33 us in moteus.
-    bandwidth_rad_s : float, rad/s
-        Natural frequency: ODrive's `bandwidth`, 1000 by default, and 2 pi / `MOTEUS_3DB_RATIO` times moteus's
-        `pll_filter_hz`, 400 by default.
-    whole_counts : bool
-        As ODrive: the error is the count less the whole counts of the loop's position, and a speed below half of what
-        an error of one count adds in a period is set to 0. Otherwise as moteus: the error has its fraction.
+    - `period_s`, seconds: 125 us in ODrive, 33 us in moteus.
+    - `bandwidth_rad_s`, rad/s: Natural frequency: ODrive's `bandwidth`, 1000 by default, and 2 pi / `MOTEUS_3DB_RATIO`
+      times moteus's `pll_filter_hz`, 400 by default.
+    - `whole_counts`: As ODrive: the error is the count less the whole counts of the loop's position, and a speed below
+      half of what an error of one count adds in a period is set to 0. Otherwise as moteus: the error has its fraction.
 
-    Raises
-    ------
-    ValueError
-        If kp times the period is 1 or more: ODrive refuses such a loop as unstable.
+    It raises ValueError if kp times the period is 1 or more: ODrive refuses such a loop as unstable.
     """
     kp, ki = 2 * bandwidth_rad_s, bandwidth_rad_s**2
     if not 0 < kp * period_s < 1:
@@ -269,18 +249,12 @@ def delay_seconds(time: FloatArray, velocity: FloatArray, true_speed: FloatArray
 
     Between samples by a parabola. The first and last `max_delay_s` of the measurement are left out.
 
-    Parameters
-    ----------
-    time : float64 array, shape (n,), seconds, evenly spaced, more than 2 `max_delay_s` long
-    velocity, true_speed : float64 arrays, shape (n,), the same unit
-        At these times; the true speed must not look alike twice within `max_delay_s`.
-    max_delay_s : float, seconds
-        Largest delay that is looked for, either way.
+    - `time`, shape (n,), seconds, evenly spaced, more than 2 `max_delay_s` long
+    - `velocity`, `true_speed`, shape (n,), the same unit: At these times; the true speed must not look alike twice
+      within `max_delay_s`.
+    - `max_delay_s`, seconds: Largest delay that is looked for, either way.
 
-    Raises
-    ------
-    ValueError
-        If the times are not so, or no shift within `max_delay_s` is closer than those beside it.
+    It raises ValueError if the times are not so, or no shift within `max_delay_s` is closer than those beside it.
     """
     even = len(time) > 1 and np.allclose(np.diff(time), time[1] - time[0], rtol=1e-6, atol=0)
     period = (time[-1] - time[0]) / (len(time) - 1) if even else math.inf

@@ -28,14 +28,9 @@ _MUCH, _LITTLE = 0.25, 0.01
 class Curve:
     """Holds the velocities that a method shows.
 
-    Parameters
-    ----------
-    estimate : baselines.Estimate
-        Velocity in rad/s, held from each time (s) on.
-    measurement_time : float64 array, shape (n,), seconds
-        Of each update; empty where the method has none.
-    reads : float64 array, shape (n,), seconds
-        See `read_times`.
+    - `estimate`: Velocity in rad/s, held from each time (s) on.
+    - `measurement_time`, shape (n,), seconds: Of each update; empty where the method has none.
+    - `reads`, shape (n,), seconds: See `read_times`.
     """
 
     name: str
@@ -65,15 +60,11 @@ class Judge:
 class Score:
     """A curve against the truth; None is what cannot be determined.
 
-    Parameters
-    ----------
-    mean_time, worst_time : float or None, seconds
-        Measurement time.
-    rms, max : float or None, rad/s
-        Error of the held velocity.
-    delay : float or None, seconds
-        Shift of the true speed that comes closest. None where it says nothing: the true speed is constant, or the curve
-        would be early, or hardly any of the error goes with the shift, or an offset might be its cause as well.
+    - `mean_time`, `worst_time`, seconds: Measurement time.
+    - `rms`, `max`, rad/s: Error of the held velocity.
+    - `delay`, seconds: Shift of the true speed that comes closest. None where it says nothing: the true speed is
+      constant, or the curve would be early, or hardly any of the error goes with the shift, or an offset might be its
+      cause as well.
     """
 
     name: str

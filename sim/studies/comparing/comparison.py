@@ -56,22 +56,13 @@ class Source:
 class Comparison(Shown):
     """Holds what has come of all methods.
 
-    Parameters
-    ----------
-    spec : TachometerSpec
-        Whose clock, tick and unit hold for all, and with which float models are read.
-    specs : mapping of str to TachometerSpec or None
-        Of the methods that are compared, by their names with their settings.
-    instants : list of float64 array, shape (n,), seconds
-        See `Judge`.
-    recording : Recording
-        The edges.
-    n_tried : dict of str to int
-        Number of settings of which one is the best, by the name of this one.
-    costs : dict of str to list of Cost
-        Of all settings, by the method; empty if they were not asked for.
-    rms_speed : float, rad/s
-        Of the motion, with which delays were measured.
+    - `spec`: Whose clock, tick and unit hold for all, and with which float models are read.
+    - `specs`: Of the methods that are compared, by their names with their settings.
+    - `instants`, shape (n,), seconds: See `Judge`.
+    - `recording`: The edges.
+    - `n_tried`: Number of settings of which one is the best, by the name of this one.
+    - `costs`: Of all settings, by the method; empty if they were not asked for.
+    - `rms_speed`, rad/s: Of the motion, with which delays were measured.
     """
 
     spec: TachometerSpec
@@ -121,28 +112,16 @@ def comparison(
 ) -> Comparison:
     """Run methods on the same edges, and compare them with the truth.
 
-    Parameters
-    ----------
-    spec : TachometerSpec
-        Whose encoder, clock and tick hold for all, and with which float models are read.
-    specs : mapping of str to TachometerSpec or None
-    make : callable
-        Makes a core of a method and its own options.
-    source : Source
-        With the true speed, where there is to be `tune` or `tradeoff`.
-    earliest, latest : float, seconds
-        Errors before and after are left out; None: only those before all methods have a value.
-    tune : bool
-        Each baseline, and M/T, takes part with the best of its settings.
-    tradeoff : bool
-        Measure what all settings cost.
-    read_delay : float, seconds
-        All values are read this much later.
+    - `spec`: Whose encoder, clock and tick hold for all, and with which float models are read.
+    - `make`: Makes a core of a method and its own options.
+    - `source`: With the true speed, where there is to be `tune` or `tradeoff`.
+    - `earliest`, `latest`, seconds: Errors before and after are left out; None: only those before all methods have a
+      value.
+    - `tune`: Each baseline, and M/T, takes part with the best of its settings.
+    - `tradeoff`: Measure what all settings cost.
+    - `read_delay`, seconds: All values are read this much later.
 
-    Raises
-    ------
-    ValueError
-        If a method cannot be on these edges, or they end too early.
+    It raises ValueError if a method cannot be on these edges, or they end too early.
     """
     for name in (name for name, one in specs.items() if one is None):
         baseline_model(name)  # what is wrong is reported at once

@@ -32,14 +32,10 @@ def edge_kalman(
     of 0.1 s are those of `least_squares`. It raises ValueError if a parameter is out of range, and OSError if there is
     no C++ compiler.
 
-    Parameters
-    ----------
-    process_noise, agile : float; rad/s^1.5 with order 2 (constant velocity), rad/s^2.5 with order 3 (acceleration)
-        Root of the density of the white noise that changes the last state; `agile` is that of a second model.
-    dwell_s : float, seconds
-        Mean time until the shaft changes from one model to the other.
-    edge_noise : float, counts
-        Standard deviation of the place of an edge.
+    - `process_noise`, `agile`, rad/s^1.5 with order 2 (constant velocity), rad/s^2.5 with order 3 (acceleration): Root
+      of the density of the white noise that changes the last state; `agile` is that of a second model.
+    - `dwell_s`, seconds: Mean time until the shaft changes from one model to the other.
+    - `edge_noise`, counts: Standard deviation of the place of an edge.
     """
     noises = (process_noise,) if agile is None else (process_noise, agile)
     names = ["process noise"] * len(noises) + ["edge noise", "dwell"]

@@ -68,22 +68,14 @@ def least_squares(
     less than their number. Two things are added, without which the polynomial runs on after a stop: a silence bounds
     the speed to `bound` counts in that time, and after `timeout_s` the speed is 0 and the next edge begins anew.
 
-    Parameters
-    ----------
-    period_s : float, seconds, or None
-        Control period; None: each read of a loop is a reading.
-    edges : int, more than `order`, at most 10,000
-        Number of edges that the polynomial is fitted to.
-    order : int, from 1 to 5
-        Of the polynomial: 1 for a straight line, which lags by half of its length, 2 with acceleration.
-    timeout_s : float, seconds
-    bound : float, counts
-        Distance that the shaft may go without an edge: the slots of a bad disc are uneven.
+    - `period_s`, seconds: Control period; None: each read of a loop is a reading.
+    - `edges`, more than `order`, at most 10,000: Number of edges that the polynomial is fitted to.
+    - `order`, from 1 to 5: Of the polynomial: 1 for a straight line, which lags by half of its length, 2 with
+      acceleration.
+    - `timeout_s`, seconds
+    - `bound`, counts: Distance that the shaft may go without an edge: the slots of a bad disc are uneven.
 
-    Raises
-    ------
-    ValueError
-        If a parameter is out of range.
+    It raises ValueError if a parameter is out of range.
     """
     if not 1 <= order <= _MOST_ORDER:
         raise ValueError(f"order of the polynomial must be from 1 to {_MOST_ORDER}, not {order}")
@@ -161,20 +153,13 @@ def adaptive_window(
     that reading passes all others in the window within the noise bound. The slope of the line is that between the ends
     of the window (end-fit), or that of the least squares (best-fit).
 
-    Parameters
-    ----------
-    period_s : float, seconds
-    noise_bound : float, counts, at least 0
-        The paper's d: greatest distance of a reading from the line. Counting alone needs 1.
-    longest : int, periods, from 1 to 10,000
-        No window is longer.
-    best_fit : bool
-        The slope of the least squares in place of that between the ends.
+    - `period_s`, seconds
+    - `noise_bound`, counts, at least 0: The paper's d: greatest distance of a reading from the line. Counting alone
+      needs 1.
+    - `longest`, periods, from 1 to 10,000: No window is longer.
+    - `best_fit`: The slope of the least squares in place of that between the ends.
 
-    Raises
-    ------
-    ValueError
-        If a parameter is out of range.
+    It raises ValueError if a parameter is out of range.
     """
     if not noise_bound >= 0:
         raise ValueError(f"noise bound must be at least 0 counts, not {noise_bound}")
@@ -222,18 +207,11 @@ def kalman_gains(index: float, order: int) -> tuple[float, float, float]:
     and Electronic Systems 20(2), 1984; the equation of order 3 is that of Gray and Murray, same journal 29(3), 1993,
     with u = 1 - s, which does not lose digits where the index is small.
 
-    Parameters
-    ----------
-    index : float, from 1e-15 to 1e6
-        Tracking index: standard deviation of the acceleration's change in a period (order 3), or of the acceleration
-        (order 2), times the period squared, over that of the measured position.
-    order : int, 2 or 3
-        Without or with acceleration; its gain is 0 with order 2.
+    - `index`, from 1e-15 to 1e6: Tracking index: standard deviation of the acceleration's change in a period (order 3),
+      or of the acceleration (order 2), times the period squared, over that of the measured position.
+    - `order`, 2 or 3: Without or with acceleration; its gain is 0 with order 2.
 
-    Raises
-    ------
-    ValueError
-        If a parameter is out of range.
+    It raises ValueError if a parameter is out of range.
     """
     if order not in (2, 3):
         raise ValueError(f"order of the filter must be 2 or 3, not {order}")
@@ -256,19 +234,12 @@ def kalman(steps: Steps, period_s: float, process_noise: float = 300.0, order: i
     bandwidth of about sqrt(a sqrt(12) / count in rad), rad/s. With order 3 it changes at random from each to the next,
     by its derivative j times the period; the bandwidth is about the cube root of (j sqrt(12) / count in rad).
 
-    Parameters
-    ----------
-    period_s : float, seconds
-    process_noise : float, more than 0, rad/s^2 with order 2, rad/s^3 with order 3
-        Standard deviation of the acceleration, or of its derivative; the tracking index that follows from it must be
-        as for `kalman_gains`.
-    order : int, 2 or 3
-        States: position and speed, and acceleration with order 3.
+    - `period_s`, seconds
+    - `process_noise`, more than 0, rad/s^2 with order 2, rad/s^3 with order 3: Standard deviation of the acceleration,
+      or of its derivative; the tracking index that follows from it must be as for `kalman_gains`.
+    - `order`, 2 or 3: States: position and speed, and acceleration with order 3.
 
-    Raises
-    ------
-    ValueError
-        If a parameter is out of range.
+    It raises ValueError if a parameter is out of range.
     """
     readings = read(steps, period_s)
     index = process_noise * period_s ** min(order, 3) / (steps.count_rad * QUANTISATION)

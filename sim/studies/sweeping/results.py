@@ -30,14 +30,9 @@ class Results:
     A row is a line of the journal beside the file as soon as it is there. Now and then, and at the end, the file is
     written anew, beside and renamed, and the journal with it is done. Whatever ends the process, no row is lost.
 
-    Parameters
-    ----------
-    path : Path or None
-        The file; None: nothing is kept.
-    points : sequence of str
-        Digests of the points of this sweep, in whose order rows are written, before those of other sweeps.
-    values : iterable of str
-        Columns beyond `COLUMNS`, numbers.
+    - `path`: The file; None: nothing is kept.
+    - `points`: Digests of the points of this sweep, in whose order rows are written, before those of other sweeps.
+    - `values`: Columns beyond `COLUMNS`, numbers.
     """
 
     def __init__(self, path: Path | None, points: Sequence[str], values: Iterable[str] = ()) -> None:
