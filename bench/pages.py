@@ -61,14 +61,9 @@ def measure(
 ) -> None:
     """Measure blocks of a page, print each and write it: the command of a script.
 
-    Parameters
-    ----------
-    blocks : mapping of str to callable
-        By the name of the block: returns its text.
-    usual : sequence of str
-        Blocks that are measured if none is named; none: all.
-    **numbers : int or None
-        Defaults of options that the blocks take: whole numbers of at least 1.
+    - `blocks`: By the name of the block: returns its text.
+    - `usual`: Blocks that are measured if none is named; none: all.
+    - `**numbers`: Defaults of options that the blocks take: whole numbers of at least 1.
     """
     parser = argparse.ArgumentParser(description=(sys.modules["__main__"].__doc__ or "").splitlines()[0])
     parser.add_argument("--only", nargs="+", choices=blocks, default=usual or [*blocks], help="some of the tables")

@@ -100,12 +100,8 @@ def measured(
 ) -> Table:
     """Return errors of all settings of the columns: by situation and by name.
 
-    Parameters
-    ----------
-    n_seeds : int
-        Number of seeds, from `FIRST_SEED` on, where something is random.
-    jobs : int
-        Number of processes.
+    - `n_seeds`: Number of seeds, from `FIRST_SEED` on, where something is random.
+    - `jobs`: Number of processes.
     """
     names = [name for column in columns for name in tried(column)]
     tasks = [

@@ -14,15 +14,9 @@ _PLAIN = {"ppr": "500", "clock": "1000000Hz"}
 class Case:
     """A core, and what its motion must keep from.
 
-    Parameters
-    ----------
-    name, settings
-    clocks : int
-        Length of the motion; a rest of three times the maximum time follows.
-    least, turns, within
-        See `stimulus.motion`.
-    seed : str
-        Of its random numbers; the name if it is empty.
+    - `clocks`: Length of the motion; a rest of three times the maximum time follows.
+    - `least`, `turns`, `within`: See `stimulus.motion`.
+    - `seed`: Of its random numbers; the name if it is empty.
     """
 
     name: str

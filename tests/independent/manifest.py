@@ -117,11 +117,7 @@ def signed(limit: Fraction | int) -> int:
 class Expected:
     """Entries of a manifest, by their path with dots.
 
-    Parameters
-    ----------
-    settings : Settings
-    manifest : Manifest
-        Its latencies are taken from it: they are measured on the Verilog.
+    - `manifest`: Its latencies are taken from it: they are measured on the Verilog.
     """
 
     def __init__(self, settings: Settings, manifest: Manifest) -> None:

@@ -52,19 +52,10 @@ def motion(
 ) -> list[tuple[int, int]]:
     """Return edges up to a clock: steady stretches at all speeds, jitter, bursts, reversals, dithering and short rests.
 
-    Parameters
-    ----------
-    rng : random.Random
-    tick : int
-    until : int
-    least : int
-        Fewest clocks from one edge to the next.
-    turns : bool
-        Whether the direction changes.
-    within : int
-        Edges only come in so many clocks of a tick, from clock 100 on, one in each tick at most; 0: anywhere.
-    rests : int
-        Most ticks without an edge.
+    - `least`: Fewest clocks from one edge to the next.
+    - `turns`: Whether the direction changes.
+    - `within`: Edges only come in so many clocks of a tick, from clock 100 on, one in each tick at most; 0: anywhere.
+    - `rests`: Most ticks without an edge.
     """
     found: list[tuple[int, int]] = []
     at, sign = 24, 1

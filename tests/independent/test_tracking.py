@@ -35,11 +35,7 @@ def ramp(at: int, begin: Fraction, end: Fraction, clocks: int) -> list[tuple[int
 class Motion:
     """A slow speed, up to a fast one, this forward and back, and a rest: played on a core, and what it shows.
 
-    Parameters
-    ----------
-    settings : Settings
-    slow, fast : int
-        Clocks from an edge to the next.
+    - `slow`, `fast`: Clocks from an edge to the next.
     """
 
     def __init__(self, settings: Settings, slow: int, fast: int) -> None:

@@ -15,16 +15,11 @@ Play = list[tuple[int, Level]]  # how many clocks each level is held, from the f
 class Front:
     """Holds the steps that the front end makes of the lines, by clocks of the core.
 
-    Parameters
-    ----------
-    steps : dict of int to int
-        Counts by the clock in whose window they belong.
-    errors, index, missed, rises : list of int
-        Clocks of illegal transitions, of the index, of what tells that it was missed, of rises of the external tick.
-    glitches : list of int
-        Clocks in which a line went back before it was believed.
-    changes : list of (int, str)
-        Clocks in which lines change, and which: `a`, `b` or `ab`.
+    - `steps`: Counts by the clock in whose window they belong.
+    - `errors`, `index`, `missed`, `rises`: Clocks of illegal transitions, of the index, of what tells that it was
+      missed, of rises of the external tick.
+    - `glitches`: Clocks in which a line went back before it was believed.
+    - `changes`: Clocks in which lines change, and which: `a`, `b` or `ab`.
     """
 
     n_clocks: int

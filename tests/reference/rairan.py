@@ -24,14 +24,9 @@ def estimate(kind: str, n_ep: int, n_dt: int) -> Fraction:
 class Lines:
     """Holds the entries of Table 1 after a ts.
 
-    Parameters
-    ----------
-    c_ep, c_dt, n_ep1, n_dt1 : int
-        Cep, Cdt, Nep1, Ndt1.
-    assigned : bool
-        Nep1 or Ndt1 was.
-    ends : bool
-        dt ended.
+    - `c_ep`, `c_dt`, `n_ep1`, `n_dt1`: Cep, Cdt, Nep1, Ndt1.
+    - `assigned`: Nep1 or Ndt1 was.
+    - `ends`: dt ended.
     """
 
     c_ep: int

@@ -18,11 +18,8 @@ def clip(number: float, limit: float) -> float:
 class Tracker:
     """The state, which sits at an event: the counts of a tick at their mean time.
 
-    Parameters
-    ----------
-    most_memory, forget, max_time, lead : float
-        Longest memory; silence after which the state is forgotten, and after which 0 is shown; how long after a tick
-        its velocity is shown.
+    - `most_memory`, `forget`, `max_time`, `lead`: Longest memory; silence after which the state is forgotten, and after
+      which 0 is shown; how long after a tick its velocity is shown.
     """
 
     most_memory: float

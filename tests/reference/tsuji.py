@@ -13,19 +13,10 @@ Bound = Fraction | None  # None: there is none
 class Update:
     """A measurement before it is rounded.
 
-    Parameters
-    ----------
-    cause : int
-        Clock of the count, or last clock of the period, that it comes from.
-    speed : Fraction
-        In counts per tick.
-    interval : int
-    forced : bool
-    lower, upper : Fraction or None
-    known : bool
-        Whether the bounds are valid.
-    others : dict of str to int
-        Outputs that only this method has.
+    - `cause`: Clock of the count, or last clock of the period, that it comes from.
+    - `speed`: In counts per tick.
+    - `known`: Whether the bounds are valid.
+    - `others`: Outputs that only this method has.
     """
 
     cause: int

@@ -45,20 +45,10 @@ def compiled(method: str = "m") -> BoardSimulation:
 class ToldBoard:
     """A board whose registers keep what is written, and whose telemetry shows what `shown` says.
 
-    Parameters
-    ----------
-    registers : DemoMap
-
-    Members
-    -------
-    silent : bool
-        Nothing is answered, and nothing sent.
-    noise : bytes
-        Is sent in place of anything else.
-    n_clocks : int
-        That have passed since the restart.
-    shown : dict
-        Words of captured registers by their names; others are 0.
+    - `silent`: Nothing is answered, and nothing sent.
+    - `noise`: Is sent in place of anything else.
+    - `n_clocks`: That have passed since the restart.
+    - `shown`: Words of captured registers by their names; others are 0.
     """
 
     def __init__(self, registers: DemoMap) -> None:
@@ -108,12 +98,7 @@ class ToldBoard:
 
 
 class ToldPort(AbstractContextManager["ToldPort"]):
-    """The serial port of a board that tests tell what to do, and a clock of which time passes with each read.
-
-    Parameters
-    ----------
-    board : ToldBoard
-    """
+    """The serial port of a board that tests tell what to do, and a clock of which time passes with each read."""
 
     def __init__(self, board: ToldBoard) -> None:
         self._board, self._waiting, self._now = board, b"", 0.0
@@ -140,11 +125,7 @@ class ToldPort(AbstractContextManager["ToldPort"]):
 class DemoPort:
     """A board that runs some clocks in each read, without a pseudo-terminal.
 
-    Parameters
-    ----------
-    spec : TachometerSpec or LoopSpec
-    n_clocks : int
-        Of a read.
+    - `n_clocks`: Of a read.
     """
 
     def __init__(self, spec: TachometerSpec | LoopSpec, n_clocks: int = 4000) -> None:

@@ -43,12 +43,7 @@ _CELLS = {
 class FakeTools:
     """Programs in a folder, which are the only ones that are found.
 
-    Parameters
-    ----------
-    folder : Path
-    monkeypatch : pytest.MonkeyPatch
-    names : str
-        Of the programs, with spaces between.
+    - `names`: Of the programs, with spaces between.
     """
 
     def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, names: str) -> None:

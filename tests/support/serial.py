@@ -41,15 +41,9 @@ def spi_write(address: int, data: int) -> bytes:
 class Host(ABC):
     """Holds the levels of lines, and the accesses that are made over them.
 
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    start : int
-        First clock of the first frame, at the earliest.
-    words : int
-        Width of the address of the native port.
-    idle : mapping of str to int
-        Levels of the lines at first.
+    - `start`: First clock of the first frame, at the earliest.
+    - `words`: Width of the address of the native port.
+    - `idle`: Levels of the lines at first.
     """
 
     def __init__(self, rng: np.random.Generator, start: int, words: int, idle: Mapping[str, int]) -> None:

@@ -38,12 +38,7 @@ class Seen(Sequence[dict[str, int]]):
 
     A clock is simulated when it is asked for: a test that fails at one simulates none behind it.
 
-    Parameters
-    ----------
-    layout : data.StructLayout
-        Of the word.
-    n_clocks : int
-    bits : iterator of int
+    - `layout`: Of the word.
     """
 
     def __init__(self, layout: data.StructLayout, n_clocks: int, bits: Iterator[int]) -> None:

@@ -23,12 +23,8 @@ class OverflowOfWord(Exception):
 class Interpreter:
     """Executes the program of a spec tick by tick; the arithmetic of the unit is that of the golden model.
 
-    Attributes
-    ----------
-    words : dict
-        Words by name.
-    met : Counter
-        How often each instruction was executed.
+    - `words`: Words by name.
+    - `met`: How often each instruction was executed.
     """
 
     def __init__(self, program: Program) -> None:

@@ -22,14 +22,9 @@ FRAME_CLOCKS = 12_000
 class Sent:
     """Holds the frames that were sent, and those that arrive.
 
-    Parameters
-    ----------
-    words : array of int
-        Of the frames that arrive as they were sent, in order.
-    lost : int
-        Frames between the first and the last of them that do not.
-    data : bytes
-        What arrives.
+    - `words`: Of the frames that arrive as they were sent, in order.
+    - `lost`: Frames between the first and the last of them that do not.
+    - `data`: What arrives.
     """
 
     words: NDArray[np.uint32]

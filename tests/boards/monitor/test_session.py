@@ -19,12 +19,7 @@ TIMEOUT = 0.02
 
 
 class Cable:
-    """Ports to a board that can be unplugged.
-
-    Parameters
-    ----------
-    board : ToldBoard
-    """
+    """Ports to a board that can be unplugged."""
 
     def __init__(self, board: ToldBoard) -> None:
         self.board, self.plugged, self.opened, self.closed = board, True, 0, 0

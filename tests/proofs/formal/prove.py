@@ -51,34 +51,19 @@ sat {how} -maxsteps {steps} -prove-asserts -set-assumes -set-init-def -set-def-i
 class Proof:
     """Assertions of a checker, around the core of a spec.
 
-    Parameters
-    ----------
-    name : str
-    spec : TachometerSpec
-    checker : str
-        Module, and file in this folder.
-    parameters : dict
-        Of the checker.
-    probes : dict
-        Wires of the checker by what they show: paths of signals in the core.
-    depth : int
-        Clocks of the induction.
-    only : str
-        Assertions that are proven, all if empty; patterns of Yosys, as in the next two.
-    without : str
-        Those of them that are left out.
-    given : str
-        Those that are assumed: another proof has them from any state on. So the induction begins in any state of which
-        they hold, not that of a reset.
-    max_table : int or None
-        Stands in for `MAX_TABLE`, so that small cores carry their reciprocal as large ones do.
-    recovers : int
-        If not 0, and instead of the induction: from any state, not that of a reset, the assertions hold for `depth`
-        clocks after so many.
-    bus : str
-        The bus for the registers of the core, or `none`.
-    box : callable or None
-        Makes a box that stands in for the core.
+    - `checker`: Module, and file in this folder.
+    - `parameters`: Of the checker.
+    - `probes`: Wires of the checker by what they show: paths of signals in the core.
+    - `depth`: Clocks of the induction.
+    - `only`: Assertions that are proven, all if empty; patterns of Yosys, as in the next two.
+    - `without`: Those of them that are left out.
+    - `given`: Those that are assumed: another proof has them from any state on. So the induction begins in any state of
+      which they hold, not that of a reset.
+    - `max_table`: Stands in for `MAX_TABLE`, so that small cores carry their reciprocal as large ones do.
+    - `recovers`: If not 0, and instead of the induction: from any state, not that of a reset, the assertions hold for
+      `depth` clocks after so many.
+    - `bus`: The bus for the registers of the core, or `none`.
+    - `box`: Makes a box that stands in for the core.
     """
 
     name: str

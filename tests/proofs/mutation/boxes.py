@@ -49,14 +49,8 @@ _SERIAL = {"spi_sck", "spi_mosi", "spi_cs_n", "uart_rx"}
 class Box(Case):
     """A core on a bus, or the demo.
 
-    Parameters
-    ----------
-    bus : str
-    demo : bool
-    lines : callable of a generator, a map and a number of clocks
-        Levels of the lines of the bus.
-    sources : str
-        Where the lines of the HDL are that are mutated.
+    - `lines`: Levels of the lines of the bus.
+    - `sources`: Where the lines of the HDL are that are mutated.
     """
 
     bus: str = "native"

@@ -21,13 +21,8 @@ from tachometry.spec.core.index import Index
 class Pins:
     """Ports of what is mutated.
 
-    Parameters
-    ----------
-    inputs : tuple of Port
-        The reset first; the clock is not among them.
-    outputs : tuple of Port
-    strobes : tuple of str
-        Outputs with which there is a row; none: in every clock.
+    - `inputs`: The reset first; the clock is not among them.
+    - `strobes`: Outputs with which there is a row; none: in every clock.
     """
 
     inputs: tuple[Port, ...]
@@ -66,13 +61,8 @@ class Pins:
 class Case:
     """A core and how often it is mutated.
 
-    Parameters
-    ----------
-    name : str
-    spec : TachometerSpec
-    mutants : int
-    max_table : int
-        Stands in for `MAX_TABLE` of the S method, so that small cores carry their reciprocal as large ones do.
+    - `max_table`: Stands in for `MAX_TABLE` of the S method, so that small cores carry their reciprocal as large ones
+      do.
     """
 
     name: str

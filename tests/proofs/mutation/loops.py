@@ -30,13 +30,7 @@ _COMMANDS = ("command_position", "command_velocity", "command_acceleration", "en
 
 @dataclass(frozen=True)
 class Commanded:
-    """Pins, and a command for each control tick.
-
-    Parameters
-    ----------
-    pins : PinTrace
-    commands : sequence of Command
-    """
+    """Pins, and a command for each control tick."""
 
     pins: PinTrace
     commands: Sequence[Command]

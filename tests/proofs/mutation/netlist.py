@@ -58,10 +58,7 @@ class Mutant:
 def yosys(script: str, folder: Path) -> str:
     """Run a script in a folder, which is all that Yosys sees; what it says.
 
-    Raises
-    ------
-    OSError
-        If it fails.
+    It raises OSError if it fails.
     """
     (folder / "script.ys").write_text(script)
     run = subprocess.run([YOSYS, "-Q", "-T", "script.ys"], cwd=folder, capture_output=True, text=True)

@@ -37,10 +37,7 @@ class Score:
 def judge(case: Case, pool: Executor, played: Stimulus | None = None) -> Score:
     """Play a stimulus on all mutants of a core, that of `CLOCKS` clocks if none is given.
 
-    Raises
-    ------
-    AssertionError
-        If the core without a mutant differs from the golden model.
+    It raises AssertionError if the core without a mutant differs from the golden model.
     """
     played = played or case.play(CLOCKS)
     with tempfile.TemporaryDirectory() as folder, patch("tachometry.spec.methods.s.MAX_TABLE", case.max_table):

@@ -75,10 +75,8 @@ def run(
 ) -> NDArray[np.int64]:
     """Play `pins` on a compiled group.
 
-    Parameters
-    ----------
-    killed : int64 array, shape (n_mutants,)
-        Takes the clock in which an output differed from that of the core; −1 at first, and if none ever does.
+    - `killed`, shape (n_mutants,): Takes the clock in which an output differed from that of the core; −1 at first, and
+      if none ever does.
 
     Returns
     -------

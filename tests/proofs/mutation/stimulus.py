@@ -41,14 +41,9 @@ class Part(Protocol):
 class Stimulus:
     """Levels of the inputs, and what they were made of.
 
-    Parameters
-    ----------
-    pins : uint64 array, shape (clocks, words)
-        Bit 0 is `rst`, above it the other inputs in the order of the ports.
-    traces : sequence of Part
-        One after each reset.
-    starts : list of int
-        Clock in which each of them begins: the first one, or the first one after a reset.
+    - `pins`, uint64 array, shape (clocks, words): Bit 0 is `rst`, above it the other inputs in the order of the ports.
+    - `traces`: One after each reset.
+    - `starts`: Clock in which each of them begins: the first one, or the first one after a reset.
     """
 
     pins: NDArray[np.uint64]

@@ -63,12 +63,7 @@ def motion(spec: TachometerSpec, n_cycles: int, seed: int) -> PinTrace:
     """Return speeds of up to 2.5 counts per tick either way, a new one every few ticks; stops longer than the maximum
     time.
 
-    Parameters
-    ----------
-    spec : TachometerSpec
-    n_cycles : int
-        Stops; from one to the next it is about three times the maximum time.
-    seed : int
+    - `n_cycles`: Stops; from one to the next it is about three times the maximum time.
     """
     rng = np.random.default_rng(seed)
     cycles, longest = spec.timing.tick_cycles, spec.timing.max_ticks
@@ -118,14 +113,8 @@ def dense(spec: TachometerSpec, run: Run) -> dict[str, NDArray[np.int64]]:
 class Campaign:
     """Holds the outcome of the upsets of a core.
 
-    Parameters
-    ----------
-    name : str
-    spec : AnySpec
-    bits : Bits
-    bit, clocks, allowed : int64 arrays, shape (n,)
-        The bit that was flipped, clocks until the outputs were right again (0: it was never seen), and clocks after
-        which they must be.
+    - `bit`, `clocks`, `allowed`, shape (n,): The bit that was flipped, clocks until the outputs were right again (0: it
+      was never seen), and clocks after which they must be.
     """
 
     name: str
@@ -222,16 +211,10 @@ def play(
 ) -> Campaign:
     """Flip bits as in `upsets`.
 
-    Parameters
-    ----------
-    allowed : int64 array, shape (n_clocks,)
-        Clocks after which the outputs must be right, by the clock of the upset.
-    wrong : callable
-        Of the clock of an upset, and what was shown from it on, in which clocks it is wrong.
-    only : str
-        Bits of this register alone, by the end of its name.
-    first : int
-        Clock of the earliest upset.
+    - `allowed`, shape (n_clocks,): Clocks after which the outputs must be right, by the clock of the upset.
+    - `wrong`: Of the clock of an upset, and what was shown from it on, in which clocks it is wrong.
+    - `only`: Bits of this register alone, by the end of its name.
+    - `first`: Clock of the earliest upset.
     """
     rng = np.random.default_rng(seed)
     places = [place for place, register in enumerate(core.bits.names) if register.endswith(only)]

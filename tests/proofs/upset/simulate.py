@@ -34,10 +34,7 @@ _ROWS = 1 << 21
 class Bits:
     """Lists the bits that can be upset.
 
-    Parameters
-    ----------
-    flip_flops, memories : list of (str, int)
-        Names and bits, of a memory all that it holds; in the order of their numbers.
+    - `flip_flops`, `memories`: Names and bits, of a memory all that it holds; in the order of their numbers.
     """
 
     flip_flops: list[tuple[str, int]]
@@ -60,11 +57,7 @@ class Bits:
 class Upsettable:
     """A compiled core.
 
-    Parameters
-    ----------
-    spec : AnySpec
-    trace : Trace
-        The pins.
+    - `trace`: The pins.
     """
 
     def __init__(self, spec: AnySpec, trace: Trace) -> None:
@@ -92,12 +85,8 @@ class Upsettable:
     ) -> Iterator[tuple[int, NDArray[np.int64], NDArray[np.int64]]]:
         """Yield of each upset its number, the clocks since it in which outputs changed, and the outputs.
 
-        Parameters
-        ----------
-        clock, bit : int64 arrays, shape (n,)
-            Before which clock edge which bit is flipped.
-        length : int
-            Clocks that are played.
+        - `clock`, `bit`, shape (n,): Before which clock edge which bit is flipped.
+        - `length`: Clocks that are played.
         """
         columns = 2 + len(self._design.outputs)
         rows = np.empty((max(_ROWS // columns, 2 * length), columns), dtype=np.int64)

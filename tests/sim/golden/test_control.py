@@ -91,12 +91,9 @@ class Fixed:
 class Course:
     """A run: what the shaft did.
 
-    Parameters
-    ----------
-    error, current : float64 array, shape (n,), rad/s and A
-        Speed less the commanded one, and commanded current, at each control tick.
-    seconds : float
-        Of a control tick.
+    - `error`, `current`, shape (n,), rad/s and A: Speed less the commanded one, and commanded current, at each control
+      tick.
+    - `seconds`: Of a control tick.
     """
 
     error: NDArray[np.float64]

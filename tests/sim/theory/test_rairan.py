@@ -21,11 +21,9 @@ DT = 2520  # ts, divisible by 1 to 10
 class Measured:
     """Table 1 in step with pulses of constant speed; all of shape (n,).
 
-    Parameters
-    ----------
-    speed : float64 array, ω/ω_lim
-    n_ep1, n_dt1 : int64 arrays, Nep1 and Ndt1
-    update_time : int64 array, time between updates of Ndt1 in ts
+    - `speed`, ω/ω_lim
+    - `n_ep1`, `n_dt1`, Nep1 and Ndt1
+    - `update_time`, time between updates of Ndt1 in ts
     """
 
     speed: Floats
@@ -186,10 +184,8 @@ WINDOWS = 4  # to get in step, and then to be looked at
 class Steady:
     """Computes Table 1 once it is in step with the pulses.
 
-    Parameters
-    ----------
-    outputs : all (Nep1, Ndt1) that it returns
-    update_times : all times between updates of Ndt1, in ts
+    - `outputs`, all (Nep1, Ndt1) that it returns
+    - `update_times`, all times between updates of Ndt1, in ts
     """
 
     outputs: set[tuple[int, int]]
