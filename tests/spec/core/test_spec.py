@@ -4,7 +4,6 @@ from fractions import Fraction
 import pytest
 
 from tachometry.spec import Encoder, Speed, STachometer, Timing, of_texts
-from tachometry.spec.formats.reciprocal import Reciprocal
 from tachometry.spec.language.units import parse_frequency
 
 TIMING = Timing(48_000_000, 960, 500)
@@ -35,7 +34,6 @@ ERRORS = [
     (lambda: Encoder(1 << 24, 2), "pulses_per_rev must be from 1 to 8388608 with x2 decoding, not 16777216"),
     (lambda: Encoder((1 << 24) + 1, 1), "pulses_per_rev must be from 1 to 16777216 with x1 decoding, not 16777217"),
     (lambda: Encoder(500, 3), "decoding must be 1, 2 or 4, or x1, x2 or x4, not 3"),
-    (lambda: Timing(0, 2, 2), "clock must be from 1 Hz to 100 GHz, not 0 Hz"),
     (
         lambda: Timing.parse("1MHz", "20us", "1us"),
         "max_time must be a whole number of ticks, not 1us (0.05); nearest: 2 ticks (40us)",
@@ -44,9 +42,6 @@ ERRORS = [
         lambda: Timing.parse("1MHz", "20us", "45us"),
         "max_time must be a whole number of ticks, not 45us (2.25); nearest: 2 ticks (40us) and 3 ticks (60us)",
     ),
-    (lambda: Timing(1, 0, 2), "tick_cycles must be from 1 to 1048576, 1048576s, not 0"),
-    (lambda: Timing(1, 2, 1), "max_ticks must be from 2 to 1048576, 2097152s, not 1"),
-    (lambda: Timing(1, 2, 1048577), "max_ticks must be from 2 to 1048576, 2097152s, not 1048577"),
     (
         lambda: Timing.parse("48 m", "20us", "10ms"),
         "clock must be a number with one of the units Hz, kHz, MHz, GHz, not '48 m'",
@@ -78,16 +73,6 @@ ERRORS = [
     ),
     (lambda: Speed.parse("0rpm"), "max_speed must be greater than 0, not 0rpm"),
     (lambda: Speed(Fraction(1), "m/s"), "unit of a speed must be one of rad/s, rev/s, rpm, not 'm/s'"),
-    (lambda: STachometer(encoder=Encoder(500), timing=TIMING, frac_bits=3), "frac_bits must be from 4 to 24, not 3"),
-    (lambda: STachometer(encoder=Encoder(500), timing=TIMING, frac_bits=25), "frac_bits must be from 4 to 24, not 25"),
-    (
-        lambda: STachometer(encoder=Encoder(500), timing=TIMING, position_width=7),
-        "position_width must be from 8 to 48, not 7",
-    ),
-    (
-        lambda: STachometer(encoder=Encoder(500), timing=TIMING, filter_clocks=480_001),
-        "filter_clocks must be from 0 to 480000 clocks, 10ms, not 480001",
-    ),
     (lambda: parse_frequency("clock", -5), "clock must be a positive whole number of Hz, not -5"),
 ]
 
@@ -139,14 +124,3 @@ def test_max_count_is_that_of_the_longest_external_tick(speed: str | None, longe
 @pytest.mark.parametrize("text", ["12.5rad/s", "1.98943678864869rev/s", "119.366207318922rpm"])
 def test_speed_in_rad_per_s(text: str) -> None:
     assert Speed.parse(text).rad_per_s == pytest.approx(12.5, rel=1e-14)
-
-
-def test_memory_is_the_table() -> None:
-    assert STachometer(encoder=Encoder(500), timing=TIMING).words.memory is None  # the reciprocal is divided
-    spec = STachometer(encoder=Encoder(500), timing=TIMING, reciprocal_source="table")
-    assert spec.words.memory is not None
-    kind, entries, width = spec.words.memory
-    assert kind == "table"
-    assert isinstance(spec.form.reciprocal, Reciprocal)
-    assert entries == len(spec.form.reciprocal.table)
-    assert width == max(spec.form.reciprocal.table).bit_length()
