@@ -1,9 +1,12 @@
 """A sweep takes axes and options from texts and files."""
 
 import re
+import shlex
 from pathlib import Path
 
+import click
 import pytest
+from support import docs
 
 from tachometry.cli.commands.sweep import sweep
 from tachometry.cli.options.loop_study import loop_options
@@ -131,3 +134,26 @@ def test_the_command_line_replaces_what_is_in_the_file() -> None:
 def test_flags_are_yes_or_no() -> None:
     with pytest.raises(ValueError, match=r"^--index must be yes or no, not 'maybe'$"):
         arguments({"index": "maybe"}, OPTIONS)
+
+
+# docs/guides/sweep.md shows the file that is there, and a command that means the same.
+
+
+DOCS = docs.DOCS / "guides"
+PAGE = (DOCS / "sweep.md").read_text()
+
+
+def test_the_file_is_shown_as_it_is() -> None:
+    assert f"```toml\n{(DOCS / 'sweep.toml').read_text()}```" in PAGE
+
+
+def test_the_options_beside_it_mean_the_same() -> None:
+    options = by_name(sweep) | point_options()
+    command = re.search(r"^    tachometry sweep (--ppr(?:.*\\\n)*.*)$", PAGE, re.MULTILINE)
+    assert command is not None
+    words = shlex.split(command[1].replace("\\\n", ""))
+    raw, _, _ = sweep.make_parser(click.Context(sweep)).parse_args(words)
+    file = of_file(DOCS / "sweep.toml", options)
+    for output in ("results", "plot"):
+        del file.fixed[output]
+    assert of_command_line(raw, options) == file

@@ -10,6 +10,8 @@ import pytest
 from amaranth import ClockDomain, Instance, Module, Mux, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
+from support import docs
+from support.command import run
 from support.compiled import lint
 
 from tachometry.hdl.export.modules import write
@@ -141,3 +143,22 @@ def asynchronous(m: Module, box: Box) -> None:
 def test_an_unknown_cell_is_an_error_that_names_it(build: Callable[[Module, Box], None], named: str) -> None:
     with pytest.raises(Unwritten, match=rf"^--writer must be yosys for {re.escape(named)}: "):
         write(Box(build), "box")
+
+
+# The guide to the exported Verilog quotes the file that its command writes.
+
+
+PAGE = docs.page("guides/reading-the-verilog.md")
+
+
+def test_the_guide_quotes_the_file(tmp_path: Path) -> None:
+    command = re.search(r"^tachometry (generate .*) -o build$", PAGE, re.MULTILINE)
+    assert command is not None
+    assert run(*command[1].split(), "-o", tmp_path) == 0
+    text = (tmp_path / "tachometer.v").read_text()
+    quoted = re.findall(r"^```verilog\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+    assert len(quoted) > 8
+    assert [one for one in quoted if one not in text] == []
+    # Names in the sentences are those of the file, too.
+    named = {name for name in re.findall(r"`([a-z_]\w*)`", re.sub(r"```.*?```", "", PAGE, flags=re.DOTALL))}
+    assert {name for name in named if not re.search(rf"\b{name}\b", text)} == set()

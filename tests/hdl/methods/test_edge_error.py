@@ -48,7 +48,3 @@ def check(spec: TachometerSpec, seed: int) -> Any:
 def test_gates_have_the_bounds_of_the_golden_model(method: str, options: dict[str, str]) -> None:
     updates = check(spec_of(method, options, "1" if options.get("frac-bits") else "0.375"), 1)
     assert np.count_nonzero(updates["bounds_valid"]) > 3
-
-
-def test_it_is_rounded_up_to_eighths() -> None:
-    assert [spec_of("s", {}, text).bound.edge_error * 8 for text in ("0.01", "0.125", "12.6%", "1")] == [1, 1, 2, 8]
