@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from tachometry.sim.studies.sweeping.sweep import Point, Row
 
 _PATIENCE = 10.0  # seconds until a scheduler has answered
-_AT_ONCE = 1000  # points that are sent to the scheduler together
+_AT_ONCE = 1000  # tasks that are sent to the scheduler together
+_MOST = 50  # points of a task: Dask takes five times as long for a task as a short point does
+_TASKS = 100  # of a sweep, at least: workers end together, and little is lost with one
 # Dask has its workers give all memory back at once, which takes longer than a point itself: they keep so many bytes.
 _LOCAL: dict[str, Any] = {
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 1 << 28,
@@ -132,34 +134,49 @@ def rows(client: Client, points: Mapping[str, Point | LoopPoint], study: str = "
     """
     from distributed import KilledWorker, as_completed
 
-    def run(code: str, packed: bytes) -> Row:  # travels as it is: a scheduler and workers need not know it
+    def run(packed: list[tuple[str, bytes]]) -> list[Row | Exception]:
+        # It travels as it is: a scheduler and workers need not know it.
         from importlib import import_module
 
-        found: Row = import_module(f"tachometry.sim.studies.{study}").run_packed(code, packed)
+        run_packed = import_module(f"tachometry.sim.studies.{study}").run_packed
+        found: list[Row | Exception] = []
+        for code, point in packed:
+            try:
+                found.append(run_packed(code, point))
+            except (ValueError, OSError) as error:
+                found.append(error)
         return found
 
-    packed = [pickle.dumps(point) for point in points.values()]
-    codes = [point.code for point in points.values()]
+    packed = {digest: (point.code, pickle.dumps(point)) for digest, point in points.items()}
+    size = min(max(len(points) // _TASKS, 1), _MOST)
+    digests = [*points]
+    tasks = {digests[first]: digests[first : first + size] for first in range(0, len(digests), size)}
     # Keys of one kind: what the scheduler does for a task grows with the number of kinds.
-    keys = [("point", digest) for digest in points]
-    futures = client.map(run, codes, packed, key=keys, batch_size=_AT_ONCE, pure=False)
-    # Nothing else may hold futures: a worker keeps the row of one that is held, and where it dies, runs it again.
+    keys = [("point", first) for first in tasks]
+    groups = [[packed[digest] for digest in group] for group in tasks.values()]
+    futures = client.map(run, groups, key=keys, batch_size=_AT_ONCE, pure=False)
+    # Nothing else may hold futures: a worker keeps the rows of one that is held, and where it dies, runs it again.
     arrived = as_completed(futures, with_results=True, raise_errors=False)
     del futures
     failed: list[Exception] = []
     for future, found in arrived:
         if future.status == "finished":
-            yield found
+            yield from (row for row in found if not isinstance(row, Exception))
+            failed += [error for error in found if isinstance(error, Exception)]
             continue
         error = found[1] if future.status == "error" else found
         if future.status == "cancelled":
             raise OSError(f"the scheduler has gone: {error}")
         if isinstance(error, ImportError):
             raise OSError(f"workers must have the same version of tachometry as this machine: {error}")
+        lost = 1
         if isinstance(error, KilledWorker):
-            point = points[error.task[1]]
-            error = OSError(f"every worker died at the point of {point.method} on {point.text}: {error}")
-        failed.append(error)
+            group = tasks[error.task[1]]
+            lost = len(group)
+            which = f"one of {len(group)} points, the first that" if len(group) > 1 else "the point"
+            point = points[group[0]]
+            error = OSError(f"every worker died at {which} of {point.method} on {point.text}: {error}")
+        failed += [error] * lost
     if failed:
         first = failed[0]
         if not isinstance(first, ValueError | OSError):
