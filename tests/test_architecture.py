@@ -309,7 +309,7 @@ CEILING: dict[str, tuple[int, Callable[[], Counter[str]]]] = {
     "lines of Python of the product": (49390, lambda: lines(*PRODUCT)),
     "lines of Python of the tests": (42132, lambda: lines("tests")),
     "lines of Python of the benchmarks": (3150, lambda: lines("bench")),
-    "functions over 40 lines": (40, lambda: every(is_long, *PRODUCT)),
+    "functions over 40 lines": (38, lambda: every(is_long, *PRODUCT)),
     "functions with more than 6 parameters": (29, lambda: every(has_many_parameters, *PRODUCT)),
     "getattr and hasattr in hdl": (34, lambda: every(lambda node: calls(node, "getattr", "hasattr"), "hdl")),
     "places that tell kinds of core apart": (22, lambda: every(tells_kinds_apart, *PRODUCT)),

@@ -57,35 +57,30 @@ class RegisterCore(wiring.Component):
         follow(m, self, whole, (port.name for port in spec.ports.streamed))
         follow(m, bank, whole, (port.name for port in spec.ports.outputs if port.name in names))
         follow(m, bank, whole, spec.ports.strobes)
-        m.d.comb += [
-            bank.capture.eq(self.capture),
-            *(
-                box.clear.eq(bank.clear)
-                for box in (core.conditioner, *core.extras.values())
-                if "clear" in box.signature.members
-            ),
-            position.tick.eq(core.tick),
-            position.position.eq(core.position),
-            bank.position.eq(position.latest),
-        ]
+        drive(m, position, {"tick": core.tick, "position": core.position})
+        drive(m, bank, {"capture": self.capture, "position": position.latest})
         self._place(m)
-        for extra in core.extras.values():
-            settings = written & extra.signature.members.keys() - core.signature.members.keys()
-            follow(m, extra, bank, sorted(settings))
+        for box in (core.conditioner, *core.extras.values()):
+            settings = {"clear", *written} & box.signature.members.keys() - core.signature.members.keys()
+            follow(m, box, bank, sorted(settings))
         if self.loop is not None:
             self._keep(m, self.loop)
         if self._map.irq:
-            box = Interrupts(self._map)
-            connect(m, box, bank, whole)
-            ticks = getattr(whole, spec.facts.rests_with)
-            m.d.comb += [box.ticks.eq(ticks), box.standstill.eq(whole.standstill), self.irq.eq(box.irq)]
-            for extra in spec.extras:
-                for name, event in extra.events(spec).items():
-                    gates = core if event.wires[0] in core.signature.members else core.extras[extra.name]
-                    drive(m, box, {name: Cat(by_name(gates, event.wires).values()).any()})
+            self._interrupt(m, whole)
         if open_sum is not None:
-            m.d.comb += [position.next.eq(core.position_counter.next), position.open_sum.eq(open_sum)]
+            drive(m, position, {"next": core.position_counter.next, "open_sum": open_sum})
         return m
+
+    def _interrupt(self, m: Module, whole: Tachometer | LoopCore) -> None:
+        """Raise the interrupt by events of the core and of its extras."""
+        core, spec, box = self.tachometer, self._map.spec, Interrupts(self._map)
+        connect(m, box, self.bank, whole)
+        drive(m, box, {"ticks": getattr(whole, spec.facts.rests_with), "standstill": whole.standstill})
+        m.d.comb += self.irq.eq(box.irq)
+        for extra in spec.extras:
+            for name, event in extra.events(spec).items():
+                gates = core if event.wires[0] in core.signature.members else core.extras[extra.name]
+                drive(m, box, {name: Cat(by_name(gates, event.wires).values()).any()})
 
     def _place(self, m: Module) -> None:
         """Let a program set the position, arm the index, and move the place within a modulus."""

@@ -48,37 +48,33 @@ class Tachometer(wiring.Component):
     def __init__(self, spec: TachometerSpec) -> None:
         self._spec = spec
         super().__init__(members(spec.ports))
-        front = spec.front_end
+        front, latency = spec.front_end, spec.latency.tick
         self.conditioner = InputConditioner(spec.filter_clocks, (*front.lines, *front.sensed), front.complemented)
         self.decoder = decoder_of(spec.encoder, front.wheel)
         self.pulse_counter = PulseCounter(
             max(spec.tick.longest, spec.widths.max_pulse_count),
             spec.widths.max_pulse_count,
             stretched=spec.facts.own_ticks,
-            staged=spec.latency.tick - spec.latency.registers_steps > 2,
+            staged=latency - spec.latency.registers_steps > 2,
         )
-        self.position_counter = PositionCounter(spec.position_width, spec.latency.tick, spec.preset)
-        self.controls = {name: PinRise(spec.latency.tick) for name in front.controls}
-        self.modulo_counter = None if front.modulus is None else ModuloCounter(front.modulus, spec.latency.tick)
-        self.index_capture: IndexCapture | None = None
-        if spec.index:
-            self.index_capture = IndexCapture(spec.position_width, spec.latency.tick, once=front.index_once)
+        self.position_counter = PositionCounter(spec.position_width, latency, spec.preset)
+        self.controls = {name: PinRise(latency) for name in front.controls}
+        self.modulo_counter = None if front.modulus is None else ModuloCounter(front.modulus, latency)
+        self.index_capture = IndexCapture(spec.position_width, latency, once=front.index_once) if spec.index else None
         self.index_state: IndexState | None = None
-        if front.index_state is not None:
-            after = spec.encoder.kind.after(front.index_state)
-            self.index_state = IndexState(front.index_state, after, spec.latency.tick)
+        if (state := front.index_state) is not None:
+            self.index_state = IndexState(state, spec.encoder.kind.after(state), latency)
         self.datapath = DATAPATHS[spec.method](spec)
         self.sampling_clock: TickSource
         if isinstance(self.datapath, OwnTicks):
             self.sampling_clock = self.datapath
         elif spec.external_tick:
-            self.sampling_clock = ExternalTick(spec.times.min_tick_cycles, spec.tick.longest, spec.latency.tick)
+            self.sampling_clock = ExternalTick(spec.times.min_tick_cycles, spec.tick.longest, latency)
         else:
             self.sampling_clock = SamplingClock(spec.timing.tick_cycles)
         layout = update_layout(spec)
-        self.low_pass = (
-            None if spec.lowpass is None else LowPass(spec.velocity.low_pass, layout, clears=spec.facts.last_at_rest)
-        )
+        clears = spec.facts.last_at_rest
+        self.low_pass = None if spec.lowpass is None else LowPass(spec.velocity.low_pass, layout, clears=clears)
         self.silence: Standstill | None = None
         if not isinstance(self.datapath, OwnStandstill) and spec.facts.rests_with == TICK:
             self.silence = Standstill(spec.timing.max_ticks, spec.widths.count, max_shift=spec.times.max_tick_shift)
@@ -87,7 +83,6 @@ class Tachometer(wiring.Component):
         if spec.velocity.output is not None:
             box = SerialVelocityOutput if spec.latency.output_serial else PipelinedVelocityOutput
             self.velocity_output = box(spec.velocity.output, layout)
-
         self.extras = {extra.name: gates_of(extra, spec) for extra in spec.extras}
 
     @property
