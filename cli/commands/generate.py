@@ -80,7 +80,7 @@ class Asked:
         if self.testbench is None and self.record is not None:
             raise ValueError("--motion must be given together with --testbench")
         if self.testbench is not None and self.spec is not self.spec.tachometer and self.bus != "none":
-            whole = "--axes" if self.spec.kind == "axes" else "--loop"
+            whole = "--axes" if self.spec.axes else "--loop"
             raise ValueError(f"--testbench must not be given together with {whole} and --bus: it drives no bus")
 
     @property
@@ -116,7 +116,7 @@ def _read(*, bus: str | None, target: str, **given: Any) -> dict[str, Any]:
     names = {field.name for field in fields(Asked)}
     asked = {name: given.pop(name) for name in names & given.keys()}
     on, spec = bus_for(target, bus), asked.pop("spec")
-    if spec.kind == "axes" and (on != "none" or target == "rio"):
+    if spec.axes and (on != "none" or target == "rio"):
         spec = replace(spec, parallel=True)  # registers and pins are of what is held for each axis
     return dict(asked=Asked(spec=spec, bus=on, target=target, **asked), **given)
 
@@ -227,6 +227,6 @@ def _bench(spec: AnySpec, name: str, record: Callable[..., Encoding] | None) -> 
 
 
 def _rows(spec: AnySpec, bus: Bus | None) -> list[tuple[str, str]]:
-    if spec.kind == "axes":
+    if spec.axes is not None:
         return axes_rows(spec)
     return loop_rows(spec, bus) if spec.kind == "loop" else core_rows(spec, bus)

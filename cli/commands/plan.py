@@ -15,7 +15,7 @@ from tachometry.cli.options.option import GroupedCommand, option, output
 from tachometry.cli.reports.plan import print_plan, print_plans
 from tachometry.sim.studies.estimate import Estimate
 from tachometry.sim.studies.plan import Plans, default_range
-from tachometry.spec import AxesSpec, CoreSpec, Speed, TachometerSpec
+from tachometry.spec import CoreSpec, Speed, TachometerSpec
 from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.language.units import SpeedUnit
 from tachometry.spec.registers.buses import bus_of, ports_on
@@ -71,12 +71,12 @@ def plan(
     Equal options give equal files.
     """
     outputs = Outputs({"--plot": plot, "--csv": csv})
-    core = spec.axis if isinstance(spec, AxesSpec) else spec
+    core = spec if spec.axes is None else spec.axis
     if spec is not core and methods is not None:
         raise ValueError("--methods must be left out with --axes: a plan of axes is of one method")
     on = bus_of(bus or "none", baud)
     if on is not None:
-        spec = replace(spec, parallel=True) if isinstance(spec, AxesSpec) else spec
+        spec = spec if spec.axes is None else replace(spec, parallel=True)
         ports_on(spec, on)  # refuses registers that the bus does not reach
     low, high, unit = _range(core, speeds)
     named = Methods({}) if methods is None else named_methods(methods, make)

@@ -10,7 +10,7 @@ from tachometry.cli.reports.core import advice, configuration, measured, registe
 from tachometry.cli.reports.terminal import print_rows, print_table, stdout_console
 from tachometry.sim.studies.estimate import Estimate
 from tachometry.sim.studies.plan import Plan, Plans
-from tachometry.spec import AxesSpec, CoreSpec
+from tachometry.spec import CoreSpec
 from tachometry.spec.language.units import SpeedUnit, short_time
 from tachometry.spec.registers.buses import Bus
 
@@ -19,7 +19,7 @@ def print_plan(core: CoreSpec, plans: Plans, unit: str, bus: Bus | None, size: E
     """Print the configuration of a core, what it or an axis of it measures and its plan, speeds in `unit`."""
     expected, spec = plans.table, plans.spec
     more = [*([] if bus is None else [registers_row(core, bus)]), *size_rows(size)]
-    if isinstance(core, AxesSpec):
+    if core.axes is not None:
         print_rows([*axes_rows(core), *more])
     else:
         print_rows([*configuration(spec), *measured(spec, plans), *advice(plans), *more])

@@ -48,7 +48,7 @@ def print_simulation(simulation: Simulation, kept: Sequence[Path] = ()) -> int:
 
 def _summary(spec: CoreSpec, axes: Sequence[Axis], mismatches: _Row) -> tuple[list[_Row], list[str]]:
     """Return rows of the table of a core, and warnings."""
-    if spec.kind == "one":
+    if spec.axes is None:
         (axis,) = axes
         return [*capture_rows(axis), _updates(axis.run), mismatches, *_rows(axis)], _warnings(axis)
     warnings = [_merged_looks(spec, number, axis.n_merged) for number, axis in enumerate(axes) if axis.n_merged]

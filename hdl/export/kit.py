@@ -37,7 +37,7 @@ def kit(spec: AnySpec, name: str, bus: Bus | None = None) -> dict[str, str]:
         bits="" if spec.axes is None else "*",
         tick_cycles=spec.timing.tick_cycles,
         idle={**(bus.idle if bus else {}), **_first_levels(spec)},
-        **(_axes_bench(spec) if spec.kind == "axes" else _bench(spec.tachometer)),
+        **(_bench(spec.tachometer) if spec.axes is None else _axes_bench(spec)),
     )
 
 

@@ -80,7 +80,7 @@ def write_trace(path: Path, spec: CoreSpec, run: Run) -> None:
 
 
 def _columns(spec: CoreSpec, run: Run) -> dict[str, NDArray[Any]]:
-    if spec.kind == "one":
+    if spec.axes is None:
         return _of_updates(spec, run, spec.latency.tick_to_velocity)
     each = [_of_updates(spec.tachometer, of_axis(spec, run, axis), 0) for axis in range(spec.axes)]
     axis = np.repeat(np.arange(spec.axes), [len(found["clock"]) for found in each])

@@ -105,7 +105,7 @@ def simulate(
     It raises ValueError if the recordings do not last a tick, or have too many.
     """
     trace: Trace
-    trace = AxesTrace.placed(recordings, spec) if spec.kind == "axes" else PinTrace.of(recordings[0], spec)
+    trace = PinTrace.of(recordings[0], spec) if spec.axes is None else AxesTrace.placed(recordings, spec)
     if pulses is not None and isinstance(trace, PinTrace):
         for name, rises in pulses(spec.tachometer).items():
             if len(rises) and not 0 < rises[0] <= rises[-1] < trace.n_clocks:  # in clock 0 it would be high, not rise
@@ -144,7 +144,7 @@ def _curves(axes: Sequence[Axis]) -> dict[str, Curve]:
 
 def _axis(core: CoreSpec, run: Run, number: int, recording: Recording, truth: Encoding | None) -> Axis:
     """Return the results of an axis."""
-    if core.kind == "axes":
+    if core.axes is not None:
         return _axis_of_many(core, run, number, recording, truth)
     spec = core
     counts_in = error = None

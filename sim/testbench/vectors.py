@@ -85,7 +85,7 @@ def _unarmed(core: AnySpec, trace: PinTrace) -> dict[str, NDArray[np.uint8]]:
 
 def _put(core: AnySpec, traces: Sequence[PinTrace]) -> tuple[list[str], list[NDArray[Any]], Run]:
     """Return names of the inputs, the clocks of changes with their values, and what the core must show."""
-    if core.kind == "axes":
+    if core.axes is not None:
         pins = AxesTrace.of(traces)
         return [*pins.lines], [pins.clock, *pins.lines.values()], golden.run(core, pins)
     (trace,) = traces
@@ -97,7 +97,7 @@ def _put(core: AnySpec, traces: Sequence[PinTrace]) -> tuple[list[str], list[NDA
 
 
 def _usual(core: AnySpec) -> list[Recording]:
-    if core.kind != "axes":
+    if core.axes is None:
         return [usual_motion(core.tachometer)]
     return [usual_motion(core.axis, seed=axis + 1, most=_MOVING // core.slots) for axis in range(core.axes)]
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from tachometry.hdl.export.render import render_files
-from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
+from tachometry.spec import CoreSpec, TachometerSpec
 from tachometry.spec.core.extras.extra import refuse
 from tachometry.spec.core.front_end import OF_CONTROLS
 from tachometry.spec.core.ports import bound_ports
@@ -67,7 +67,7 @@ def rio(spec: CoreSpec, name: str, bus: Bus | None, made: Mapping[str, str]) -> 
 def check(spec: CoreSpec) -> None:
     """Raise ParameterError for a core with more than RIO has, or without what its pins need."""
     alone = spec.tachometer
-    if isinstance(spec, AxesSpec) and not spec.parallel:
+    if spec.axes is not None and not spec.parallel:
         raise ParameterError("parallel", "must be given together with --axes for RIO: HAL has pins for each axis")
     for name in alone.front_end.controls:
         raise ParameterError(OF_CONTROLS[name], "must not be given for RIO, which has no pin for it")
