@@ -9,6 +9,8 @@ PIP    := $(BIN)/pip install -q --disable-pip-version-check
 
 export AMARANTH_USE_YOSYS := builtin
 export MPLBACKEND := Agg
+# Else each process of a test compiles the package anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help venv demo figures compare icarus ghdl dtc chromium test test-all lowest pytest verify formal formal-quick mutate upset bench studies size bitstreams docs readme api page site dist lint clean
