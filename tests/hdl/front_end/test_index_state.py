@@ -185,18 +185,3 @@ def test_of_many_axes_each_finds_its_own() -> None:
     found = lockstep(spec, stress_of(spec, 2, 12), PySim())
     assert found.n_mismatches == 0, found.first
     assert len(found.expected.tables["index_valid"]) > 2
-
-
-@pytest.mark.parametrize(
-    ("texts", "message"),
-    [
-        ({"index_at": "A=2"}, "must be edge, or levels such as A=1,B=1, not 'A=2'"),
-        ({"index_at": "A=1"}, "must be edge, A=0,B=0 or A=0,B=1 or A=1,B=0 or A=1,B=1 for quadrature, not A=1"),
-        ({"index_at": "A=1,B=1,C=1", "sensor": "hall"}, "for hall, not A=1,B=1,C=1"),
-        ({"index_at": "A=1,B=1", "sensor": "step-dir"}, "must be edge for step-dir, whose levels are no place"),
-        ({"index_at": "A=1,B=1", "index": "no"}, "must be given together with --index"),
-    ],
-)
-def test_what_cannot_be(texts: dict[str, str], message: str) -> None:
-    with pytest.raises(ValueError, match=f"^index_at .*{message}$"):
-        spec_of(**texts)

@@ -132,19 +132,7 @@ def test_a_tooth_too_many_or_too_few_is_told_at_the_gap(change: str) -> None:
     assert found.index[-1] == 4800
 
 
-def test_it_tells_what_cannot_be() -> None:
-    for more, message in (
-        ({"missing-teeth": "60+2"}, "^missing_teeth must be the teeth of a full wheel less those missing, as 60-2, "),
-        ({"missing-teeth": "6-4"}, "^missing_teeth must be the teeth of a full wheel less those missing"),
-        ({"missing-teeth": "36-1"}, "^missing_teeth must be of --ppr, 60 teeth, not of 36$"),
-        ({"decoding": "2"}, "^decoding must be 1 with --missing-teeth, one count for a tooth, not 2$"),
-        ({"sensor": "quadrature"}, "^missing_teeth must be given with --sensor pulses, not quadrature$"),
-        ({"bounds": "yes"}, "^bounds must not be given with --missing-teeth: "),
-        ({"index": "yes", "index-at": "A=1"}, "^index_at must be left out with --missing-teeth"),
-        ({"index": "yes", "invert": "z"}, "^invert must not have z "),
-    ):
-        with pytest.raises(ValueError, match=message):
-            of_texts("t", {**BASE, "ppr": "60", "missing-teeth": "60-2"} | more)
+def test_ports_name_the_gap() -> None:
     spec = spec_of("60-2", index="yes")
     assert of_options(spec.options) == spec
     texts = {port.name: port.help for port in spec.ports}

@@ -120,28 +120,6 @@ def test_a_reversal_meets_an_edge_twice() -> None:
         assert found[:, 1].tolist() == [round(Fraction(way * TICK, 55) * 256) for way in ways]
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (
-            {"whole_cycles": True, "timer": "tick"},
-            "whole_cycles must not be given with times in ticks, which are coarser than the errors that cancel",
-        ),
-        (
-            {"whole_cycles": True, "paper_exact": True},
-            "whole_cycles must not be given with paper_exact, which has no such windows",
-        ),
-        ({"min_time": 0}, "min_time must be from 1 to 400 clocks, the maximum time, not 0"),
-        ({"min_time": 401}, "min_time must be from 1 to 400 clocks, the maximum time, not 401"),
-        ({"min_time": 30, "timer": "tick"}, "min_time must be a multiple of 20 clocks with times in ticks, not 30"),
-        ({"timer": "x"}, "timer must be clock or tick, not 'x'"),
-    ],
-)
-def test_bad_options(options: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=f"^{message}$"):
-        spec_of("mt", **options)
-
-
 def test_ticks_may_be_shorter_than_a_division() -> None:
     """A velocity that decays looks at its own sign, not at that of the one before it."""
     for late in (0, 7, 13):

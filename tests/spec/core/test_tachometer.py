@@ -69,23 +69,11 @@ def test_ends_of_timing() -> None:
 def test_the_edge_error_is_rounded_up_to_eighths() -> None:
     given = [Fraction(0), Fraction(1, 1000), Fraction(1, 8), Fraction(126, 1000), Fraction(99, 100), Fraction(1)]
     assert [8 * spec_of(bounds=True, edge_error=error).bound.edge_error for error in given] == [0, 1, 1, 2, 8, 8]
-    for wrong in (Fraction(-1, 100), Fraction(101, 100)):
-        with pytest.raises(ValueError, match=f"^edge_error must be from 0 to 1, not {float(wrong)}$"):
-            spec_of(bounds=True, edge_error=wrong)
-    with pytest.raises(ValueError, match=r"^edge_error must be given together with --bounds$"):
-        spec_of(edge_error=Fraction(1, 8))
 
 
 def test_ends_of_external_ticks() -> None:
     assert spec_of(2, external_tick=True, max_tick_cycles=2).tick.longest == 2
     assert spec_of(20, external_tick=True, max_tick_cycles=MAX_TICK_CYCLES).tick.longest == 1 << 20
-    for tick, longest, message in (
-        (1, 2, "tick_cycles must be at least 2 with an external tick, not 1"),
-        (20, 19, "max_tick_cycles must be from 20, one tick, to 1048576, not 19"),
-        (20, (1 << 20) + 1, "max_tick_cycles must be from 20, one tick, to 1048576, not 1048577"),
-    ):
-        with pytest.raises(ValueError, match=f"^{message}$"):
-            spec_of(tick, external_tick=True, max_tick_cycles=longest)
 
 
 def test_the_fastest_filter_is_2_pi_times_the_clock() -> None:

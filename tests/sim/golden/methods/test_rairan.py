@@ -1,7 +1,6 @@
 """The golden model of Rairán's method: against Table 1 to the letter, and against its description, clock by clock."""
 
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 import pytest
@@ -166,56 +165,10 @@ def script(*at: tuple[int, int], n: int = 4000) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("parameters", "message"),
-    [
-        ({"max_ticks": 2048}, "max_ticks must be from 2 to 2047 with method rairan, not 2048: try --max-time 81.88ms"),
-        ({"dt": 4096}, "max_speed must be at most 2048 counts per tick with estimate n3, not 4096"),
-        (
-            {"dt": 4096, "estimate": "n1", "bounds": True},
-            "max_speed must be at most 2048 counts per tick with bounds, not 4096",
-        ),
-        (
-            {"paper_exact": True, "bounds": True},
-            "bounds must not be given with paper_exact, whose estimate leaves them",
-        ),
-        ({"adaptive": Fraction(1, 3)}, "adaptive must be more than 0 and less than 1/3, not 0.333333333"),
-        ({"adaptive": Fraction(0)}, "adaptive must be more than 0 and less than 1/3, not 0"),
-        (
-            {"adaptive": Fraction(1, 10), "paper_exact": True},
-            "adaptive must not be given with paper_exact, whose dt is constant",
-        ),
-        ({"adaptive": Fraction(1, 10), "max_ticks": 3}, "max_ticks must be at least 4 with adaptive, not 3"),
-        (
-            {"adaptive": Fraction(1, 10), "dt": 1025},
-            "max_speed must be at most 1024 counts per tick with adaptive, not 1025",
-        ),
-        (
-            {"adaptive": Fraction(1, 1000), "dt": 4},
-            "adaptive must be at least 0.03226 with this speed and time, not 0.001",
-        ),
-        ({"estimate": "n4"}, "estimate must be one of n1, n2, n3, not 'n4'"),
-        (
-            {"external_tick": True, "max_tick_cycles": 100},
-            "method must not be rairan with an external tick: it makes its own ticks",
-        ),
-    ],
-)
-def test_bad_parameters(parameters: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=f"^{message}$"):
-        make_spec(**({"dt": 40} | parameters))
-
-
-@pytest.mark.parametrize(
     ("text", "target"), [("0.1%", "1/1000"), ("0.001", "1/1000"), (" 5 %", "1/20"), ("1/8", "1/8")]
 )
 def test_targets(text: str, target: str) -> None:
     assert parse_target("adaptive", text) == Fraction(target)
-
-
-@pytest.mark.parametrize("text", ["", "%", "1ms", "a%", "1/0"])
-def test_bad_targets(text: str) -> None:
-    with pytest.raises(ValueError, match=r"^adaptive must be a fraction such as 0\.1% or 0\.001, not '"):
-        parse_target("adaptive", text)
 
 
 @pytest.mark.parametrize("target", [Fraction(1, 10), Fraction(1, 50), Fraction(1, 200)])
