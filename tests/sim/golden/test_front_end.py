@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from reference.front import CYCLE
 
 from tachometry.sim.engines.pysim import PySim
-from tachometry.sim.golden.front_end import Steps, count, decode, decoded, filter_line, first_beyond
+from tachometry.sim.golden.front_end import Steps, count, decode, decoded, first_beyond
 from tachometry.sim.golden.sampling import external_windows, windows
 from tachometry.sim.golden.standstill import with_standstill
 from tachometry.sim.signals.recording import PinTrace
@@ -69,12 +69,6 @@ def test_a_glitch_is_counted_when_the_line_has_gone_back() -> None:
     assert ticks["filtered_edges"].tolist() == [0, 0, 2, 2, 2, 2, 2]
     ticks, _ = count(spec, found, np.array([22, 23]))
     assert ticks["filtered_edges"].tolist() == [0, 2]  # with the strobes in clocks 24 and 25
-
-
-def test_swallowed_edges_stay_at_the_last_even_number() -> None:
-    steps = steps_of([], [], swallowed=np.arange(33_000))
-    ticks, _ = count(spec_of(filter="3"), steps, np.array([0, 32_763, 32_764, 32_765, 32_770, 33_000]))
-    assert ticks["filtered_edges"].tolist() == [6, 65_532, 65_534, 65_534, 65_534, 65_534]
 
 
 @pytest.mark.parametrize("width", [8, 11])
@@ -137,15 +131,6 @@ def test_decoding(decoding: int, steps: str) -> None:
     found, illegal = decode(*both, decoding)
     assert illegal.tolist() == [True, True, False, True]
     assert found.tolist() == [0, 0, -1 if decoding == 4 else 0, 0]
-
-
-def test_the_filter_passes_what_holds_long_enough() -> None:
-    """With three clocks: levels of two are gone, those of three pass, dated when they were first sampled."""
-    clock = np.array([0, 4, 7, 9, 20, 22, 24, 40, 41, 42])
-    level = np.arange(10).astype(np.uint8) % 2  # rises in 4, falls in 7, …
-    at, passed, returned = filter_line(clock, level, 3)
-    assert list(zip(at.tolist(), passed.tolist(), strict=True)) == [(0, 0), (4, 1), (24, 0), (42, 1)]
-    assert returned.tolist() == [9, 22, 41]
 
 
 def left_first(clock: list[int], step: list[int], last: list[int], limit: int) -> list[int]:
