@@ -62,11 +62,10 @@ CAPTURED = [register.name for register in demo_map() if register.captured]
 
 
 def check_wrong_bits() -> None:
-    """In any frame, of any register but the time."""
-    for frame in (1, 2, 3):
-        for word, name in enumerate(CAPTURED):
-            if name != "TIME":
-                assert not changed("a bad encoder", frame, word, frame % 3).passed, (frame, name)
+    """Of any register but the time, in one frame or another."""
+    for word, name in enumerate(CAPTURED):
+        if name != "TIME":
+            assert not changed("a bad encoder", 1 + word % 3, word, word % 3).passed, name
 
 
 def check_errors() -> None:
