@@ -13,21 +13,12 @@ from tachometry.spec import TachometerSpec
 class Lab:
     """Runs cores for a figure.
 
-    Parameters
-    ----------
-    hdl : bool
-        Whether the hardware is simulated where a figure asks for it; else its golden model alone.
-    whole : bool
-        Whether control loops are run with six seeds and all gains; else with one seed and a few gains.
+    - `hdl`: Whether the hardware is simulated where a figure asks for it; else its golden model alone.
+    - `whole`: Whether control loops are run with six seeds and all gains; else with one seed and a few gains.
 
-    Attributes
-    ----------
-    mismatches : int
-        Values in which hardware and golden model differed.
-    first : list of str
-        The first of them in each signal.
-    seeds : range
-        Of runs of control loops.
+    - `mismatches`: Values in which hardware and golden model differed.
+    - `first`: The first of them in each signal.
+    - `seeds`: Of runs of control loops.
     """
 
     def __init__(self, hdl: bool = True, whole: bool = True) -> None:

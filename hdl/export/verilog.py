@@ -69,14 +69,9 @@ def verilog_of(
 ) -> str:
     """Return the text of a module.
 
-    Parameters
-    ----------
-    described : mapping
-        Its manifest, which gives its name and the lines above it.
-    ports : iterable of Port
-        The order and the comments of its ports.
-    writer : str
-        One of `WRITERS`.
+    - `described`: Its manifest, which gives its name and the lines above it.
+    - `ports`: The order and the comments of its ports.
+    - `writer`: One of `WRITERS`.
     """
     name = described["module"]
     text = yosys_text(top, name) if writer == "yosys" else write(top, name, ports).text

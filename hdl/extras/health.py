@@ -32,20 +32,12 @@ class Gates(wiring.Component):
     Counts that are wrong between two indices are seen in the clock after `index_valid`. Edges and errors are counted
     for a second, then anew. A turn in which the position is preset is not checked.
 
-    Parameters
-    ----------
-    second : int
-        Clocks.
-    edges : int
-        Edges of a line without one of the other that are a fault of the other.
-    errors : int
-        The greatest number of illegal transitions that is no fault.
-    turn : Turn or None
-        None: there is no index, or no number of counts between two.
-    complements : mapping of str to int
-        Lines that come with their complements, and for how many clocks a line may equal it.
-    misses : bool
-        The index is taken in a state, which it may miss.
+    - `second`: Clocks.
+    - `edges`: Edges of a line without one of the other that are a fault of the other.
+    - `errors`: The greatest number of illegal transitions that is no fault.
+    - `turn`: None: there is no index, or no number of counts between two.
+    - `complements`: Lines that come with their complements, and for how many clocks a line may equal it.
+    - `misses`: The index is taken in a state, which it may miss.
     """
 
     def __init__(

@@ -39,25 +39,15 @@ class Gates(wiring.Component):
 
     Latency: a step that is in `position` in clock c begins a pulse in clock c + 1.
 
-    Parameters
-    ----------
-    clocks : int
-        Of a pulse.
-    width : int
-        Bits of a position.
-    aims : bool
-        The position may be set. Only with both directions, and without a list.
-    latency : int
-        Clocks from a step to the position that has it.
+    - `clocks`: Of a pulse.
+    - `width`: Bits of a position.
+    - `aims`: The position may be set. Only with both directions, and without a list.
+    - `latency`: Clocks from a step to the position that has it.
 
-    Members
-    -------
-    step : In(signed(2))
-        The step that is in `position` for the first time `latency` clocks later.
-    moves : In(1)
-        The position of the next clock is set. Only with `aims`.
-    position_compare_append : In(1)
-        Append `position_compare_next` to the list; it is awaited two clocks later at the earliest.
+    - `step`: The step that is in `position` for the first time `latency` clocks later.
+    - `moves`: The position of the next clock is set. Only with `aims`.
+    - `position_compare_append`: Append `position_compare_next` to the list; it is awaited two clocks later at the
+      earliest.
     """
 
     def __init__(self, compare: Compare, clocks: int, width: int, *, aims: bool = False, latency: int = 0) -> None:
@@ -174,20 +164,12 @@ class FineGates(Gates):
     A place that goes back because of an update makes no second pulse; one that leaps over several positions makes all
     their pulses. The place is that of the shaft at the pins in the first clock of the pulse.
 
-    Parameters
-    ----------
-    width : int
-        Bits of the position in counts.
-    native_width : int
-        Bits of `velocity`.
+    - `width`: Bits of the position in counts.
+    - `native_width`: Bits of `velocity`.
 
-    Members
-    -------
-    native_valid, native_velocity, native_position_fine : In
-        An update of the method, which stays until the next.
-    tick : In(1)
-    moves : In(1)
-        The position of the next clock does not follow from counts: places that it leaps over have no pulses.
+    - `native_valid`, `native_velocity`, `native_position_fine`: An update of the method, which stays until the
+      next.
+    - `moves`: The position of the next clock does not follow from counts: places that it leaps over have no pulses.
     """
 
     def __init__(self, compare: Compare, clocks: int, width: int, carrying: Carrying, native_width: int) -> None:

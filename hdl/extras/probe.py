@@ -29,15 +29,9 @@ class Gates(wiring.Component):
     With it are the sum of all steps through clock c and the clocks since the latest of them, and, with a fine position,
     the one that was shown then and its age. `probe_arm` arms from the next clock on; all are armed after reset.
 
-    Parameters
-    ----------
-    edges : tuple of int
-        The edges that each probe latches after reset, in bits `RISING` and `FALLING`.
-    position_width, time_width : int
-        Bits of the position, and of the time, which stays at its end.
-    latency : int
-        Clocks from a step to the position that has it, at least 2.
-    fine : FinePosition or None
+    - `edges`: The edges that each probe latches after reset, in bits `RISING` and `FALLING`.
+    - `position_width`, `time_width`: Bits of the position, and of the time, which stays at its end.
+    - `latency`: Clocks from a step to the position that has it, at least 2.
     """
 
     def __init__(

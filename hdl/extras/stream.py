@@ -22,16 +22,10 @@ class Gates(wiring.Component):
 
     An event while a record waits is dropped and counted. A value is that of its port in the clock of the event.
 
-    Parameters
-    ----------
-    parts : sequence of Part
-        Parts of a record, `time` and `flags` first.
-    flags : sequence of str
-        Ports that are the bits of `flags` behind the lowest, which says that records were dropped before.
-    packet : int
-        Records from one `m_axis_tlast` to the next.
-    event : str
-        The strobe with which a record comes, or `step`, which is `latency` clocks ahead of the values.
+    - `parts`: Parts of a record, `time` and `flags` first.
+    - `flags`: Ports that are the bits of `flags` behind the lowest, which says that records were dropped before.
+    - `packet`: Records from one `m_axis_tlast` to the next.
+    - `event`: The strobe with which a record comes, or `step`, which is `latency` clocks ahead of the values.
     """
 
     def __init__(self, parts: Sequence[Part], flags: Sequence[str], packet: int, event: str, latency: int = 0) -> None:

@@ -21,10 +21,7 @@ REGISTER_FILES = {
 def register_files(registers: RegisterMap, name: str) -> dict[str, str]:
     """Return texts by file name, those of `REGISTER_FILES`.
 
-    Parameters
-    ----------
-    name : str
-        Of the Verilog module; functions and types in C begin with it, macros with its capitals.
+    - `name`: Of the Verilog module; functions and types in C begin with it, macros with its capitals.
     """
     return render_files(
         REGISTER_FILES,
