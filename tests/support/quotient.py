@@ -134,6 +134,6 @@ def every_quotient(
     )
     answers = folder / "answers"
     dut = FlatQuotient(spec, serial=serial, towards=towards)
-    subprocess.run([build(dut, main, folder), answers], check=True)
+    subprocess.run([build(dut, main), answers], check=True)
     m, n = np.meshgrid(np.arange(1, max_m + 1, every), np.array(numerators), indexing="ij")
     return -(n.ravel() >> shift), n.ravel(), m.ravel(), np.fromfile(answers, dtype=np.int64)
