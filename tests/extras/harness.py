@@ -24,7 +24,7 @@ from support.verilog import run_in_icarus
 from tachometry.hdl.core.register_core import RegisterCore
 from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress
-from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.sim.golden.registers import Access, GoldenBank
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.sim.signals.run import Run, compare
@@ -104,7 +104,7 @@ class Case:
 
 @cache
 def _run(case: Case) -> Run:
-    result = lockstep(case.spec, case.trace(), PySim())
+    result = lockstep(case.spec, case.trace(), Cxxrtl())
     assert result.n_mismatches == 0, result.first
     return result.actual
 
