@@ -218,8 +218,6 @@ def test_an_error_that_names_a_temporary_file_is_of_its_output(tmp_path: Path) -
 
 
 # Every file that a command writes may be the one that does not fit on the disk.
-
-
 CORE = "--ppr 9 --clock 1MHz --tick 100us --max-time 1ms"
 MOTION = "--motion constant:3000rpm:1ms"
 LOOP = f"loop {CORE} --motion constant:3000rpm:80ms --from 40ms --seeds 1"

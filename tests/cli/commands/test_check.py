@@ -269,8 +269,6 @@ def test_the_names_of_the_files_of_a_target_are_those_that_it_makes(monkeypatch:
 
 
 # `tachometry check` on every configuration, and on changes at random in every kind of file that is generated.
-
-
 CHANGES = 200
 # Without a method, so the manifest says why it was taken.
 FOLDERS = CORES | {"auto": "--ppr 500 --clock 10MHz --max-speed 400rad/s --bus wishbone"}

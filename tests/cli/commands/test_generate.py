@@ -135,8 +135,6 @@ def test_ctrl_c(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch:
 
 
 # `tachometry generate --loop`.
-
-
 CORE = "--ppr 25 --clock 1MHz --tick 250us --max-time 2ms --max-speed 500rad/s --loop".split()
 PAGE = docs.page("guides/integration.md")
 

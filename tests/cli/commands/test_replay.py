@@ -189,8 +189,6 @@ def test_the_capture_is_an_argument(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 # Edges that come faster than the clock, or the capture, can tell; and times and speeds that a core cannot have.
-
-
 SLOW = "--ppr 500 --clock 20kHz --tick 1ms --engine pysim".split()
 
 

@@ -85,8 +85,6 @@ def test_more_requests_than_are_answered_at_once(monkeypatch: pytest.MonkeyPatch
 
 
 # `tachometry explore` as a process: it is there, serves, and goes.
-
-
 ADDRESS = r"http://127\.0\.0\.1:\d+/[\w-]{32}/"
 
 

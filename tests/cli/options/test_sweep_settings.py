@@ -137,8 +137,6 @@ def test_flags_are_yes_or_no() -> None:
 
 
 # docs/guides/sweep.md shows the file that is there, and a command that means the same.
-
-
 DOCS = docs.DOCS / "guides"
 PAGE = (DOCS / "sweep.md").read_text()
 

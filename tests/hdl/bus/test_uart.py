@@ -80,8 +80,6 @@ def test_damaged_requests_have_no_effect(kind: str) -> None:
 
 
 # The SPI bridge alone: every access, at its clock, and every bit that it sends.
-
-
 FRAMES = 12
 
 
@@ -128,8 +126,6 @@ def test_unselected() -> None:
 
 
 # Frames of telemetry, bit by bit, against what the registers answered.
-
-
 REGISTERS = DemoMap(of_texts("s", {"ppr": "500", "clock": "12MHz", "tick": "20us"}))
 TELEMETRY_WORDS = [number for number, register in enumerate(REGISTERS) if register.captured]
 SEEDS = range(3)

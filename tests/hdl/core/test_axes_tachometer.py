@@ -102,8 +102,6 @@ def test_all_ticks_come_in_step() -> None:
 
 
 # Many axes with the tracking method against the golden model of one axis.
-
-
 def spec_of(axes: int, tick: int, max_ticks: int = 8, *, parallel: bool = False, **options: Any) -> AxesSpec:
     timing = Timing(48_000_000, tick, max_ticks)
     alone = TrackTachometer(encoder=Encoder(500), timing=timing, max_speed=Speed.parse("3000rad/s"), **options)

@@ -146,8 +146,6 @@ def test_an_unknown_cell_is_an_error_that_names_it(build: Callable[[Module, Box]
 
 
 # The guide to the exported Verilog quotes the file that its command writes.
-
-
 PAGE = docs.page("guides/reading-the-verilog.md")
 
 

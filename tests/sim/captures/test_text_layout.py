@@ -36,8 +36,6 @@ def test_comments_are_kept_for_what_is_in_them() -> None:
 
 
 # The unit of a column of times is in its name, or is given.
-
-
 @pytest.mark.parametrize(("name", "base", "unit", "likely"), HEADS["names"])
 def test_a_name_is_parted(name: str, base: str, unit: str, likely: int | None) -> None:
     assert parted(name) == (base, unit)
