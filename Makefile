@@ -5,6 +5,7 @@ PINNED ?=
 VENV   := .venv
 BIN    := $(VENV)/bin
 LAYERS := spec hdl sim boards cli
+TABLES := docs/measured/tables
 PIP    := $(BIN)/pip install -q --disable-pip-version-check
 
 export AMARANTH_USE_YOSYS := builtin
@@ -90,24 +91,29 @@ lowest: $(VENV)/.test icarus ## a smoke run with the lowest versions that pyproj
 	BIN=build/lowest/bin OUT=build/lowest/demo MOTION=ramp:0:100rad/s:50ms sh docs/demo.sh
 	build/lowest/bin/pytest -q -n auto -m "not nightly" -W default::DeprecationWarning -W default::PendingDeprecationWarning $(SMOKE)
 
-formal: $(VENV)/.formal ## properties of the exported core, proven by induction, written to docs/measured/formal.md
-	PYTHONPATH=tests $(BIN)/python -m proofs.formal -o docs/measured/formal.md
+formal: $(VENV)/.formal ## properties of the exported core, proven by induction, written to docs/measured
+	PYTHONPATH=tests $(BIN)/python -m proofs.formal -o $(TABLES)/proofs.csv
+	$(BIN)/python bench/evidence.py
 
 formal-quick: $(VENV)/.formal ## the same of a small core for every checker, and without mutants
 	PYTHONPATH=tests $(BIN)/python -m proofs.formal quick
 
-upset: $(VENV)/.test ## flip-flops upset at random, and how long that is seen, written to docs/measured/upset.md
-	PYTHONPATH=tests $(BIN)/python -m proofs.upset -o docs/measured/upset.md
+upset: $(VENV)/.test ## flip-flops upset at random, and how long that is seen, written to docs/measured
+	PYTHONPATH=tests $(BIN)/python -m proofs.upset -o $(TABLES)/upsets.csv
+	$(BIN)/python bench/evidence.py
 
-mutate: $(VENV)/.test icarus ## how many wrong cores the tests notice, written to docs/measured/mutation.md
-	PYTHONPATH=tests $(BIN)/python -m proofs.mutation -o docs/measured/mutation.md
+mutate: $(VENV)/.test icarus ## how many wrong cores the tests notice, written to docs/measured
+	PYTHONPATH=tests $(BIN)/python -m proofs.mutation -o $(TABLES)/mutation.csv
+	$(BIN)/python bench/evidence.py
 
-bench: $(VENV)/.test ## speed of the golden models, of the engines and of the tests, errors of sweeps, written to docs/measured/bench.md and sweep.md
+bench: $(VENV)/.test ## speed of the golden models, of the engines and of the tests, errors of sweeps, written to docs/measured
 	$(BIN)/python bench/engines.py
+	$(BIN)/python bench/evidence.py
 	$(BIN)/python bench/sweep.py
 
-verify: $(VENV)/.test ## every method on every engine against the golden models, a billion clocks, written to docs/measured/verify.md
+verify: $(VENV)/.test ## every method on every engine against the golden models, a billion clocks, written to docs/measured
 	$(BIN)/python bench/verify.py
+	$(BIN)/python bench/evidence.py
 
 compare: $(LINKED) ## all methods and what others use in several situations, written to docs/measured/compare.md
 	$(BIN)/python bench/compare.py
@@ -116,14 +122,16 @@ studies: $(VENV)/.test ## control loops, tracking, encoders, changes of flip-flo
 	$(BIN)/python bench/encoder.py
 	$(BIN)/python bench/health.py
 	$(BIN)/python bench/toggles.py
+	$(BIN)/python bench/evidence.py
 	$(BIN)/python bench/tracking.py
 	$(BIN)/python bench/control.py
 
 size: $(VENV)/.size ## cells, Fmax and latency on ECP5 and iCE40, written to docs/measured/size.md
 	$(BIN)/python bench/size.py
 
-bitstreams: $(VENV)/.boards icarus ## bitstreams of three boards in build, their figures in docs/measured/boards.md, and all checks of bitstreams
+bitstreams: $(VENV)/.boards icarus ## bitstreams of three boards in build, their figures in docs/measured, and all checks of bitstreams
 	$(BIN)/python bench/boards.py
+	$(BIN)/python bench/evidence.py
 	$(BIN)/pytest -q -n auto tests/boards/fpga/bitstreams.py
 
 docs: $(VENV)/.test chromium ## pages of options, ports and registers, in docs/reference, and the pictures of the guides

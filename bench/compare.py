@@ -1,6 +1,6 @@
 """All methods and what others use, in several situations: writes docs/measured/compare.md.
 
-First a table of all situations, with rivals tuned for each; then a table and a command for each of some.
+Its tables are CSV beside it: all situations, with rivals tuned for each, and single commands.
 """
 
 import argparse
@@ -13,11 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import situations
-from pages import MEASURED, count, data, filled, markdown, stamp, write
+from pages import MEASURED, Rows, count, data, filled, markdown, read_table, stamp, write, write_table
 
 from tachometry.cli.main import main as tachometry
 
-PAGE, FIGURE = MEASURED / "compare.md", MEASURED / "compare.png"
+PAGE, FIGURE, TABLES = MEASURED / "compare.md", MEASURED / "compare.png", MEASURED / "tables"
+HEADS = ("method", "updates/s", "longest T_m (ms)", "RMS error (rad/s)", "greatest (rad/s)", "delay (ms)")
 _DATA = data("compare")
 
 
@@ -32,10 +33,11 @@ class Situation:
 
     @property
     def command(self) -> str:
-        """The command whose table it is."""
+        """The command that prints its table."""
         return f"tachometry compare {self.core} {self.options}"
 
 
+COSTS = f"tachometry compare {_DATA['core']} {_DATA['costs']} --tradeoff docs/measured/{FIGURE.name}"
 SITUATIONS = tuple(Situation(**each) for each in _DATA["situation"])
 
 
@@ -52,35 +54,42 @@ def rows(command: str) -> list[dict[str, str]]:
             return list(csv.DictReader(table))
 
 
-def table(found: list[dict[str, str]]) -> str:
-    """Return the same in Markdown."""
+def table(found: list[dict[str, str]]) -> list[list[str]]:
+    """Return the same, rounded."""
 
     def cell(row: dict[str, str], name: str, scale: float = 1) -> str:
         return f"{scale * float(row[name]):.3g}" if row[name] else ""
 
-    heads = ("method", "updates/s", "longest T_m (ms)", "RMS error (rad/s)", "greatest (rad/s)", "delay (ms)")
     numbers = (("updates_per_second", 1), ("worst_time", 1e3), ("rms_rad_s", 1), ("max_rad_s", 1), ("delay", 1e3))
-    return markdown(heads, [(row["name"], *(cell(row, name, scale) for name, scale in numbers)) for row in found])
+    return [[row["name"], *(cell(row, name, scale) for name, scale in numbers)] for row in found]
 
 
-def section(situation: Situation) -> str:
-    """Return a situation's part of the page."""
-    options = situation.options.replace(" --motion", " \\\n        --motion")
-    shown = f"    tachometry compare {situation.core} \\\n        {options}"
-    return f"## {situation.title}\n\n{situation.text}\n\n{shown}\n\n{table(rows(situation.command))}"
+def single() -> Rows:
+    """Return the tables of all commands in one."""
+    made = [[one.title, *row] for one in SITUATIONS for row in table(rows(one.command))]
+    return [["situation", *HEADS], *made]
 
 
-def costs() -> str:
-    """Return the command of the figure, which is drawn."""
-    command = f"tachometry compare {_DATA['core']} {_DATA['costs']} --tradeoff docs/measured/{FIGURE.name}"
-    rows(command.replace(f"docs/measured/{FIGURE.name}", shlex.quote(str(FIGURE))))
-    return re.sub(" (?=--(methods|jitter|tradeoff))", " \\\\\n        ", command)
+def errors_of(name: str) -> dict[str, list[float]]:
+    """Return the mean errors of a table, by situation."""
+    rows = read_table(TABLES / f"{name}.csv")
+    return {row.pop("situation"): [float(cell.split()[0]) for cell in row.values()] for row in rows}
 
 
-def page(n_seeds: int, jobs: int) -> str:
-    """Return the page docs/measured/compare.md."""
-    single, models = "\n".join(map(section, SITUATIONS)), situations.model_table()
-    return filled("compare.md", costs=costs(), models=models, situations=single, **situations.parts(n_seeds, jobs))
+def page() -> str:
+    """Return the page docs/measured/compare.md from the tables."""
+    table = errors_of("one-setting")
+    heads = [*read_table(TABLES / "one-setting.csv")[0]][1:]
+    shown = [at for at, head in enumerate(heads) if head in _DATA["shown"] or head.split(":")[0] in _DATA["shown"]]
+    body = [[name, *(f"{row[at]:.2g}" for at in shown)] for name, row in table.items()]
+    return filled(
+        "compare.md",
+        verdict=situations.verdict(errors_of("compare")),
+        one_setting=markdown(["situation", *(f"`{heads[at]}`" for at in shown)], body),
+        models=situations.model_table(),
+        costs=re.sub(" (?=--(methods|jitter|tradeoff))", " \\\\\n        ", COSTS),
+        situations=SITUATIONS,
+    )
 
 
 if __name__ == "__main__":
@@ -88,6 +97,9 @@ if __name__ == "__main__":
     parser.add_argument("--seeds", type=count, default=10, metavar="N", help="seeds of what is random (%(default)s)")
     parser.add_argument("--jobs", type=count, default=os.cpu_count(), metavar="N", help="processes (%(default)s)")
     options = parser.parse_args()
-    write(PAGE, page(options.seeds, options.jobs))
-    stamp(PAGE)
+    rows(COSTS.replace(f"docs/measured/{FIGURE.name}", shlex.quote(str(FIGURE))))
     stamp(FIGURE)
+    for name, made in (situations.tables(options.seeds, options.jobs) | {"single": single()}).items():
+        write_table(TABLES / f"{name}.csv", made)
+    write(PAGE, page())
+    stamp(PAGE)

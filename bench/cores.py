@@ -35,7 +35,6 @@ class Configuration:
     targets: tuple[str, ...] = tuple(TARGETS)
     bus: str = "none"
     demo: bool = False  # with emulator and telemetry
-    without_max_speed: str = ""
     missed: str = ""
     after: str = ""  # source of a script that changes the netlist, see `Target`
 

@@ -1,4 +1,4 @@
-"""Measures golden models and engines on the same edges in one run, for docs/measured/bench.md.
+"""Measures golden models and engines on the same edges in one run, for docs/measured/evidence.md.
 
 A golden model is vectorised over a whole recording; Amaranth's simulator works clock by clock, and runs the first part
 of it only. Times of engines are processor time, so that what else runs on the machine matters little; still only the
@@ -15,7 +15,7 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 
-from pages import MEASURED, ROOT, markdown, measure
+from pages import MEASURED, ROOT, Rows, measure
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import Vibration, parse_motion
@@ -32,7 +32,7 @@ BEGIN = 48_000_000  # where engines begin: at about 75 rad/s
 SLOW, FAST = 30_000, 12_000_000  # clocks of pysim, and of the other engines
 REPEATS = 2
 
-GOLDEN_COLUMNS = ["core", "golden model", "ticks/s", "clocks/s", "pysim, clocks/s", "ratio"]
+GOLDEN_COLUMNS = ["core", "golden model", "ticks/s", "clocks/s", "pysim, clocks/s", "ratio", "machine"]
 ENGINES = ("verilator", "cxxrtl-every-clock", "cxxrtl")
 SPEED_COLUMNS = ["core", "pysim", *ENGINES, "÷ pysim", *(f"÷ {name}" for name in ENGINES[:-1])]
 WHOLE_COLUMNS = ["core", "every clock", "idle clocks skipped", "ratio", "golden model", "updates", "mismatches"]
@@ -128,13 +128,13 @@ def processor_time(*words: str) -> float:
     return sum(os.times()[2:4]) - before
 
 
-def tests() -> str:
+def tests() -> Rows:
     """Return how long the tests take, and how much longer than one of them."""
     one, every = processor_time(FIXED_TEST), processor_time("-n", "auto", "--dist", "worksteal")
-    return markdown(["tests", "processor time", "÷ one test"], [["all", f"{every:.0f} s", f"{every / one:.0f}"]])
+    return [["tests", "processor time", "÷ one test"], ["all", f"{every:.0f} s", f"{every / one:.0f}"]]
 
 
-def golden_table() -> str:
+def golden_table() -> Rows:
     """Return every method, and the S method with options that cost the golden model time."""
     found = CORES | {
         "s, in rad/s": replace(CORES["s"], unit="rad/s", frac_bits=10),
@@ -142,16 +142,15 @@ def golden_table() -> str:
         "s, low-pass": replace(CORES["s"], lowpass=Fraction(200)),
     }
     machine = f"Python {platform.python_version()} on {platform.machine()}, {os.cpu_count()} cores"
-    rows = [golden_row(name, spec, trace()) for name, spec in found.items()]
-    return f"{markdown(GOLDEN_COLUMNS, rows)}\nMeasured with {machine}.\n"
+    return [GOLDEN_COLUMNS, *([*golden_row(name, spec, trace()), machine] for name, spec in found.items())]
 
 
-BLOCKS = {
+BLOCKS: dict[str, Callable[[], Rows]] = {
     "golden": golden_table,
-    "engines": lambda: markdown(SPEED_COLUMNS, [speeds(name, spec, trace()) for name, spec in CORES.items()]),
-    "whole": lambda: markdown(WHOLE_COLUMNS, [whole(name, spec, trace()) for name, spec in CORES.items()]),
+    "engines": lambda: [SPEED_COLUMNS, *(speeds(name, spec, trace()) for name, spec in CORES.items())],
+    "whole": lambda: [WHOLE_COLUMNS, *(whole(name, spec, trace()) for name, spec in CORES.items())],
     "tests": tests,
 }
 
 if __name__ == "__main__":
-    measure(MEASURED / "bench.md", BLOCKS)
+    measure(MEASURED / "evidence.md", BLOCKS)

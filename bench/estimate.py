@@ -69,7 +69,7 @@ def random_cores(number: int) -> Iterator[tuple[AnySpec, Bus | None, str]]:
 
 def known(family: str) -> list[tuple[Mapped, Mapping[str, float]]]:
     """Return the cores of docs/measured/size.md in tables, with their figures, but for cores changed since."""
-    every, target = kept(SIZES.read_text(encoding="utf-8"), versions()), FAMILIES[family].target
+    every, target = kept(SIZES, versions()), FAMILIES[family].target
     rows = {name: row for (name, device), row in every.items() if TARGETS[device] is target}
     found = [(mapped(spec, bus, family), figures) for spec, bus, _, figures in drawn(family, "fitted")]
     for one in CONFIGURATIONS:

@@ -42,7 +42,7 @@ def netlist(top: wiring.Component) -> list[str]:
 
 @cache
 def measured_core(name: str) -> tuple[list[str], str]:
-    """Return the netlist of a row of size.md, and the code that changes it."""
+    """Return the netlist of a row of size.csv, and the code that changes it."""
     (one,) = (one for one in CONFIGURATIONS if one.name == name)
     return netlist(one.component), ast.unparse(ast.parse(one.after))
 
@@ -84,8 +84,7 @@ MADE_OF: dict[str, Callable[[str], object]] = {
     "docs/guides/sweep.png": lambda _: block(MEASURED / "sweep.md", "errors"),
     "docs/guides/wheel.png": lambda _: estimates(),
     "docs/guides/wheel_methods.png": lambda _: estimates(),
-    "docs/measured/boards.md": lambda _: [measured_core("demo"), measured_core("track")],
-    "docs/measured/compare.md": lambda _: estimates(),
+    "docs/measured/tables/boards.csv": lambda _: [measured_core("demo"), measured_core("track")],
     "docs/measured/compare.png": lambda _: estimates(),
     "docs/measured/control.md": lambda _: tracking(),  # tests/cli/commands/test_loop_docs.py has the loops about S
     "docs/measured/control.png": lambda _: block(MEASURED / "control.md", "gains"),
@@ -94,7 +93,8 @@ MADE_OF: dict[str, Callable[[str], object]] = {
         for file in MEASURED.glob("figures/*.png")
     },
     "docs/measured/health.md": lambda _: [f"{told(one, SEED):.7f}" for one in EXAMPLES],
-    "docs/measured/size.md": measured_core,
-    "docs/measured/toggles.md": lambda _: [measured_core(name) for name in ("reference", "table")],
-    "docs/measured/track.md": lambda _: tracking(),
+    "docs/measured/tables/size.csv": measured_core,
+    "docs/measured/tables/toggles.csv": lambda _: [measured_core(name) for name in ("reference", "table")],
+    **{f"docs/measured/tables/{name}.csv": lambda _: estimates() for name in ("compare", "one-setting", "settings")},
+    **{f"docs/measured/tables/{name}.csv": lambda _: tracking() for name in ("alarms", "tracking")},
 }

@@ -1,6 +1,7 @@
 """Pages of the docs that the benchmarks write: their tables, their data, and the hashes of what they show."""
 
 import argparse
+import csv
 import json
 import re
 import subprocess
@@ -19,6 +20,7 @@ from tachometry.sim.signals.files import replacing
 ROOT = Path(__file__).resolve().parent.parent
 MEASURED = ROOT / "docs" / "measured"
 STAMPS = MEASURED / "made_of.json"
+Rows = Sequence[Sequence[str]]  # the first one is the heads
 _MEASURED_AT = re.compile(r"\nLast measured at commit .*\n\Z")
 
 
@@ -54,16 +56,14 @@ def count(text: str) -> int:
 
 def measure(
     page: Path,
-    blocks: Mapping[str, Callable[..., str]],
+    blocks: Mapping[str, Callable[..., str | Rows]],
     words: Sequence[str] | None = None,
     usual: Sequence[str] = (),
     **numbers: int | None,
 ) -> None:
-    """Measure blocks of a page, print each and write it: the command of a script.
+    """Measure blocks of a page (text), or tables beside it (rows), print and write them: the command of a script.
 
-    - `blocks`: By the name of the block: returns its text.
-    - `usual`: Blocks that are measured if none is named; none: all.
-    - `**numbers`: Defaults of options that the blocks take: whole numbers of at least 1.
+    `usual` are measured if none is named, or all; `numbers` are defaults of options that the blocks take.
     """
     parser = argparse.ArgumentParser(description=(sys.modules["__main__"].__doc__ or "").splitlines()[0])
     parser.add_argument("--only", nargs="+", choices=blocks, default=usual or [*blocks], help="some of the tables")
@@ -72,9 +72,12 @@ def measure(
         parser.add_argument(f"--{name}", type=count, default=default, metavar="N", help="(%(default)s)")
     given = parser.parse_args(words)
     for name in given.only:
-        text = blocks[name](**{number: getattr(given, number) for number in numbers})
-        print(text, flush=True)
-        write_block(given.output, name, text)
+        made = blocks[name](**{number: getattr(given, number) for number in numbers})
+        print(made if isinstance(made, str) else markdown(made[0], made[1:]), flush=True)
+        if isinstance(made, str):
+            write_block(given.output, name, made)
+        else:
+            write_table(given.output.parent / "tables" / f"{name}.csv", made)
 
 
 def write(page: Path, text: str) -> None:
@@ -82,6 +85,27 @@ def write(page: Path, text: str) -> None:
     page.parent.mkdir(parents=True, exist_ok=True)
     with replacing(page) as beside:
         beside.write_text(text, encoding="utf-8")
+
+
+def read_table(file: Path) -> list[dict[str, str]]:
+    """Return the rows of a table by their heads, without their commits."""
+    with file.open(encoding="utf-8", newline="") as lines:
+        return [{head: cell for head, cell in row.items() if head != "commit"} for row in csv.DictReader(lines)]
+
+
+def write_table(file: Path, rows: Rows, merge: bool = False, parts: Sequence[str] = ()) -> None:
+    """Write a table as CSV, each row with the commit it was measured at, and stamp it or its parts.
+
+    `merge` keeps the rows of other names.
+    """
+    heads, *new = [[*rows[0], "commit"], *([*row, commit()] for row in rows[1:])]
+    before = [*csv.reader(file.read_text(encoding="utf-8").splitlines())][1:] if merge else []
+    names, places = {row[0] for row in new}, [row[0] for row in (*before, *new)]
+    every = sorted([*(row for row in before if row[0] not in names), *new], key=lambda row: places.index(row[0]))
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(file) as beside, beside.open("w", encoding="utf-8", newline="") as lines:
+        csv.writer(lines, lineterminator="\n").writerows([heads, *every])
+    stamp(file, *parts)
 
 
 def block(page: Path, name: str) -> str:

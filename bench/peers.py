@@ -23,7 +23,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from pages import count
-from size import Table, heading, text_of
+from size import heading, section, text_of
 
 from tachometry.sim.studies.size import SEEDS, TARGETS, call, measure_verilog, synthesis, versions, wrapper
 from tachometry.spec import Port
@@ -114,7 +114,7 @@ def run(options: argparse.Namespace) -> None:
         one = measure_verilog(verilog, options.top, between, DEVICES[name], tools, seeds, prepare)
         figures = [*DEVICES[name].cells, "Fmax"]
         row = [options.top, *(text_of(figure, one) for figure in figures), one.limit]
-        print(Table(name, ["core", *map(heading, figures), "what limits Fmax"], [row]).markdown())
+        print(section(name, ["core", *map(heading, figures), "what limits Fmax"], [row]))
 
 
 def main(words: Sequence[str] | None = None) -> int:

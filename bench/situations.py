@@ -1,17 +1,16 @@
 """The table of all situations: cores as they are, and every rival with its best setting for the row.
 
-Part of docs/measured/compare.md.
+Part of docs/measured/compare.md, in tables beside it.
 """
 
 import math
-import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from motions import OTHERS, SITUATIONS, Situation
-from pages import markdown
+from pages import Rows, markdown
 
 from tachometry.cli.options.methods import listed_methods
 from tachometry.sim.signals.recording import PinTrace
@@ -98,11 +97,7 @@ def errors(situation: Situation, seed: int, names: Iterable[str]) -> Errors:
 def measured(
     situations: Iterable[Situation], n_seeds: int, jobs: int, columns: Iterable[str] = (*OURS, *RIVALS)
 ) -> Table:
-    """Return errors of all settings of the columns: by situation and by name.
-
-    - `n_seeds`: Number of seeds, from `FIRST_SEED` on, where something is random.
-    - `jobs`: Number of processes.
-    """
+    """Return errors of all settings of the columns by situation and name, with seeds from `FIRST_SEED` on."""
     names = [name for column in columns for name in tried(column)]
     tasks = [
         (situation, seed, names)
@@ -137,10 +132,7 @@ def best(table: Table, columns: Iterable[str]) -> Cells:
 
 
 def single(table: Table, column: str) -> str:
-    """Return the setting of a column that is the best over all situations, by the geometric mean of its errors.
-
-    An error that is less than `_SMALL` counts as that: what is good enough in one situation makes up for no other.
-    """
+    """Return the best setting of a column over all situations: the least geometric mean of errors above `_SMALL`."""
     everywhere = [name for name in tried(column) if all(name in by_name for by_name in table.values())]
 
     def logarithms(name: str) -> float:
@@ -149,82 +141,49 @@ def single(table: Table, column: str) -> str:
     return min(everywhere, key=logarithms)
 
 
-def error_table(heads: Sequence[str], cells: Cells) -> str:
-    """Return errors in Markdown; the least of a row is bold."""
-
-    def shown(row: list[Cell]) -> list[str]:
-        least = min(cell.mean for cell in row)
-        return [f"**{cell}**" if cell.mean == least else str(cell) for cell in row]
-
-    return markdown(["situation", *heads], [[situation, *shown(row)] for situation, row in cells.items()])
+def error_table(heads: Iterable[str], cells: Cells) -> Rows:
+    """Return errors in rad/s: a row for each situation."""
+    return [["situation", *heads], *([situation, *map(str, row)] for situation, row in cells.items())]
 
 
-def setting_table(cells: Cells) -> str:
-    """Return the situations as options of the command, and the best settings behind the names of the methods, in
-    Markdown.
-    """
-    options = {situation.name: f"`{situation.options}`" for situation in (*SITUATIONS, *OTHERS)}
-
-    def shown(cell: Cell) -> str:
-        return f"`{text}`" if (text := cell.name.partition(":")[2]) else "as it comes"
-
-    body = [[name, options.get(name, ""), *map(shown, row)] for name, row in cells.items()]
-    return markdown(["situation", "options", *RIVALS], body, left=range(len(RIVALS) + 2))
+def setting_table(cells: Cells) -> Rows:
+    """Return the situations as options of the command, and the best settings behind the names of the methods."""
+    options = {situation.name: situation.options for situation in (*SITUATIONS, *OTHERS)}
+    settings = {name: [cell.name.partition(":")[2] for cell in row] for name, row in cells.items()}
+    return [["situation", "options", *RIVALS], *([name, options.get(name, ""), *row] for name, row in settings.items())]
 
 
 def model_table() -> str:
-    """Return the float models, in Markdown."""
-
-    def values(name: str) -> str:
-        swept = BASELINES[name].swept
-        options = dict.fromkeys(option for one in swept for option in one)
-        texts = {option: dict.fromkeys(" ".join(one.get(option, "") for one in swept).split()) for option in options}
-        return "; ".join(f"{option}: {', '.join(of)}" for option, of in texts.items())
-
-    heads = ["method", "what it is", "without options", "options", "tuned over"]
-    body = [
-        [f"`{name}`", model.title, model.usual, ", ".join(f"`{option}`" for option in model.parameters), values(name)]
-        for name, model in BASELINES.items()
-    ]
+    """Return the float models and their options, in Markdown."""
+    heads = ["method", "what it is", "without options", "options"]
+    body = [[f"`{name}`", one.title, one.usual, ", ".join(one.parameters)] for name, one in BASELINES.items()]
     return markdown(heads, body, left=range(len(heads)))
 
 
-def wins(cells: Cells) -> dict[str, float]:
-    """By situation the error of the first column over that of the best tuned one, as shown, where that is less."""
-    shown = {name: [float(f"{cell.mean:.3g}") for cell in row] for name, row in cells.items()}
-    ratio = {name: row[0] / min(row[len(OURS) :]) for name, row in shown.items()}
+def wins(errors: Mapping[str, Sequence[float]]) -> dict[str, float]:
+    """By situation the error of the first column over that of the best tuned one, where that is less."""
+    ratio = {name: row[0] / min(row[len(OURS) :]) for name, row in errors.items()}
     return {name: over for name, over in sorted(ratio.items(), key=lambda item: -item[1]) if over * _WON > 1}
 
 
-def verdict(cells: Cells) -> str:
+def verdict(errors: Mapping[str, Sequence[float]]) -> str:
     """Return the claim, and a table of the situations in which a tuned rival is better than tracking."""
-    better, body = wins(cells), []
+    better, body = wins(errors), []
     for name, over in better.items():
-        errors = [float(f"{cell.mean:.3g}") for cell in cells[name][len(OURS) :]]
-        body.append([name, f"{over:.{0 if over >= 100 else 2}f}", RIVALS[errors.index(min(errors))]])
-    text = (
-        f"In {len(cells) - len(better)} of {len(cells)} situations no rival tuned for the row is better than tracking,"
-    )
-    text += f" which has no settings. In {len(better)} situations a rival is better; tracking is worse by this factor:"
-    return f"{textwrap.fill(text, 120)}\n\n{markdown(['situation', 'factor', 'best rival'], body, left=(0, 2))}"
+        tuned = [*errors[name][len(OURS) :]]
+        body.append([name, f"{over:.{0 if over >= 100 else 2}f}", RIVALS[tuned.index(min(tuned))]])
+    text = f"In {len(errors) - len(better)} of {len(errors)} situations no tuned rival is better than tracking. In the "
+    shown = markdown(["situation", "factor", "best rival"], body, (0, 2))
+    return f"{text}other {len(better)} tracking is worse by this factor:\n\n{shown}"
 
 
-def parts(n_seeds: int, jobs: int) -> dict[str, object]:
-    """Return the holes of the page that the tables of situations fill."""
-    everything, columns = measured((*SITUATIONS, *OTHERS), n_seeds, jobs), (*OURS, *RIVALS)
-    table, others = ({one.name: everything[one.name] for one in some} for some in (SITUATIONS, OTHERS))
-    singles = [single(table, rival) for rival in RIVALS]
-    in_all = {situation: [by_name[name] for name in (*OURS, *singles)] for situation, by_name in table.items()}
-
-    def tables(some: Table) -> dict[str, str]:
-        heads = [*(f"`{name}`" for name in OURS), *RIVALS]
-        return {"errors": error_table(heads, best(some, columns)), "settings": setting_table(best(some, RIVALS))}
-
+def tables(n_seeds: int, jobs: int) -> dict[str, Rows]:
+    """Return the tables of all situations, by the names of their files."""
+    everything = measured((*SITUATIONS, *OTHERS), n_seeds, jobs)
+    some = {one.name: everything[one.name] for one in SITUATIONS}
+    names = (*OURS, *(single(some, rival) for rival in RIVALS))
     return {
-        "all": tables(table),
-        "others": tables(others),
-        "verdict": verdict(best(everything, columns)),
-        "in_all": error_table([f"`{name}`" for name in (*OURS, *singles)], in_all),
-        "first": FIRST_SEED,
-        "last": FIRST_SEED + n_seeds - 1,
+        "compare": error_table((*OURS, *RIVALS), best(everything, (*OURS, *RIVALS))),
+        "settings": setting_table(best(everything, RIVALS)),
+        "one-setting": error_table(names, {one: [of[name] for name in names] for one, of in some.items()}),
     }

@@ -10,15 +10,14 @@ Exit codes: 0, 1 if a bar is missed, 2 if a tool fails.
 import argparse
 import json
 import os
-import re
 import sys
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from cores import CONFIGURATIONS, Configuration
-from pages import MEASURED, ROOT, count, data, filled, markdown, stamp, write
+from pages import MEASURED, ROOT, Rows, count, data, filled, markdown, read_table, stamp, write, write_table
 from rich.console import Console
 from rich.progress import track
 
@@ -32,31 +31,24 @@ METHOD_CELLS = {
     **{name: f"{name}-max-speed" for name in ("m", "t", "mt", "rairan")},
     **{name: name for name in ("track", "track-block")},
 }
-COSTS = (("ECP5", "COMB"), ("ECP5", "FF"), ("ECP5", "DP16KD"), ("HX8K", "LC"), ("HX8K", "RAM"), ("ECP5", "latency"))
+COSTS = (("ECP5", "COMB"), ("ECP5", "FF"), ("HX8K", "LC"), ("ECP5", "latency"))
+SHOWN = (
+    *(("ECP5", figure) for figure in ("COMB", "FF", "DP16KD", "MULT", "Fmax")),
+    *((target, figure) for target in ("HX8K", "UP5K") for figure in ("LC", "Fmax")),
+    ("ECP5", "latency"),
+)
+FIGURES = tuple(dict.fromkeys([*(cell for target in TARGETS.values() for cell in target.cells), "Fmax", "latency"]))
 UNITS = {"Fmax": "MHz", "latency": "clocks"}
-SPEED_TEXT = "Differences of Fmax of a few percent are less than those between seeds."
-# Columns of words.
-WORDS = {"configuration", "what", "what limits Fmax", "option", "core", "gives", "target", "bars", "missed", "without"}
-WORDS |= {"project", "revision", "files", "options", "words after the files"}
+WORDS = {"configuration", "target", "what", "what limits Fmax", "option", "core", "gives"}  # columns of words
 
 
-@dataclass(frozen=True)
-class Table:
-    """A table with a title, and a text below it."""
-
-    title: str
-    header: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    text: str = ""
-
-    def markdown(self) -> str:
-        """Return a section in Markdown."""
-        words = [column for column, head in enumerate(self.header) if head in WORDS]
-        below = f"\n{self.text}\n" if self.text else ""
-        return f"## {self.title}\n\n{markdown(self.header, self.rows, words)}{below}"
+def section(title: str, header: Sequence[str], rows: Rows, text: str = "") -> str:
+    """Return a table in Markdown, with a title, and a text below it."""
+    words = [column for column, head in enumerate(header) if head in WORDS]
+    return f"## {title}\n\n{markdown(header, rows, words)}" + (f"\n{text}\n" if text else "")
 
 
-PEERS, PEER_SOURCES = (Table(**table) for table in data("peers").values())
+PEERS = data("peers")["peers"]
 Results = Mapping[tuple[str, str], Measurement]  # by core and target
 
 
@@ -79,78 +71,50 @@ def heading(figure: str) -> str:
     return f"{figure} ({UNITS.get(figure, 'cells')})"
 
 
-def target_table(target_name: str, results: Results) -> Table:
-    """Return all configurations on one target."""
-    figures = [*TARGETS[target_name].cells, *UNITS]
-    rows = [
-        [one.name, one.what, *(text_of(figure, found) for figure in figures), found.limit]
-        for one in CONFIGURATIONS
-        if (found := results.get((one.name, target_name)))
+def rows(results: Results) -> Rows:
+    """Return the table size.csv: all figures of all cores, and which bars they miss."""
+    made = [["configuration", "target", "what", *FIGURES, "slowest", "fastest", "what limits Fmax", "missed"]]
+    for (name, target), found in results.items():
+        (one,) = (one for one in CONFIGURATIONS if one.name == name)
+        cells = [str(round(found.figures[figure], 1)) if figure in found.figures else "" for figure in FIGURES]
+        spread = [f"{end:.0f}" for end in found.spread or ()] or ["", ""]
+        made.append([name, target, one.what, *cells, *spread, found.limit, ", ".join(missed(one, target, found))])
+    return made
+
+
+def missed(one: Configuration, target: str, found: Measurement) -> list[str]:
+    """Return figures that miss their bar: Fmax must be at least the bar, all others at most."""
+    bars = {figure: bar for figure, bar in one.bars.get(target, {}).items() if figure in found.figures}
+    signs = {figure: 1 if figure == "Fmax" else -1 for figure in bars}
+    return [figure for figure, bar in bars.items() if signs[figure] * (found.figures[figure] - bar) < 0]
+
+
+def figures(results: Results, name: str, places: Sequence[tuple[str, str]]) -> list[float | None]:
+    """Return figures of a core at targets; None if unknown."""
+    return [results[name, at].figures.get(figure) if (name, at) in results else None for at, figure in places]
+
+
+def core_table(results: Results) -> str:
+    """Return the cores that a reader chooses between."""
+    shown = [one for one in CONFIGURATIONS if not one.is_option and one.has_speed_bar and "external" not in one.name]
+    found = {(one.name, one.what): figures(results, one.name, SHOWN) for one in shown}
+    made = [[*one, *("" if n is None else f"{n:.0f}" for n in row)] for one, row in found.items() if any(row)]
+    header = ["configuration", "what", *(f"{target} {heading(figure)}" for target, figure in SHOWN)]
+    return section("Cores", header, made)
+
+
+def cost_table(results: Results) -> str:
+    """Return the cost of each option: differences from the reference."""
+    reference = CONFIGURATIONS[0].name
+    found = {(one.name, one.what): figures(results, one.name, COSTS) for one in CONFIGURATIONS if one.is_option}
+    base = figures(results, reference, COSTS)
+    made = [
+        [*one, *(f"{n - m:+.0f}" for n, m in zip(row, base, strict=True) if n is not None and m is not None)]
+        for one, row in found.items()
+        if None not in row
     ]
-    header = ["configuration", "what", *map(heading, figures), "what limits Fmax"]
-    return Table(f"{target_name} ({TARGETS[target_name].device})", header, rows)
-
-
-def difference(results: Results, name: str, base: str, target: str, figure: str) -> str:
-    """Return how much a figure of a core is above that of another one; empty if one of them is not known."""
-    found, other = (
-        results[one, target].figures.get(figure) if (one, target) in results else None for one in (name, base)
-    )
-    return "" if found is None or other is None else f"{found - other:+.{1 if figure == 'Fmax' else 0}f}"
-
-
-def cost_table(results: Results) -> Table:
-    """Return what each option costs: differences from the reference."""
-    base, rows = CONFIGURATIONS[0].name, []
-    for one in (one for one in CONFIGURATIONS if one.is_option):
-        cells = [difference(results, one.name, base, *place) for place in COSTS]
-        rows += [[one.name, one.what, *cells]] if all(cells) else []
     header = ["option", "what", *(f"{target} {heading(figure)}" for target, figure in COSTS)]
-    return Table(f"What each option costs: difference from {base}", header, rows)
-
-
-def speed_table(results: Results) -> Table:
-    """Return what a greatest speed changes: differences from the same core without one."""
-    shown = [
-        (target, figure)
-        for target, device in TARGETS.items()
-        for figure in (next(iter(device.cells)), "FF", "Fmax")
-        if figure in (*device.cells, "Fmax")
-    ]
-    rows = []
-    for one in (one for one in CONFIGURATIONS if one.without_max_speed):
-        cells = [difference(results, one.name, one.without_max_speed, *place) for place in shown]
-        rows += [[one.name, one.without_max_speed, *cells]] if any(cells) else []
-    header = ["configuration", "without", *(f"{target} {heading(figure)}" for target, figure in shown)]
-    return Table("What --max-speed 1000rad/s changes: difference from the core without", header, rows, SPEED_TEXT)
-
-
-def is_met(figure: str, bar: float, found: Measurement) -> bool:
-    """Return whether a figure is what it should be: Fmax at least the bar, all others at most."""
-    value = found.figures[figure]
-    return value >= bar if figure == "Fmax" else value <= bar
-
-
-def bar_table(results: Results) -> Table:
-    """Return the bars of each configuration, and which of them are missed."""
-    rows, missed = [], []
-    for one in CONFIGURATIONS:
-        for target, bars in one.bars.items():
-            found = results.get((one.name, target))
-            if found is None or not (judged := {name: bar for name, bar in bars.items() if name in found.figures}):
-                continue
-            texts = [f"{name} {'≥' if name == 'Fmax' else '≤'} {bar}" for name, bar in judged.items()]
-            wrong = [name for name, bar in judged.items() if not is_met(name, bar, found)]
-            missed += [one] if wrong else []
-            rows.append([one.name, target, ", ".join(texts), ", ".join(wrong)])
-    why = dict.fromkeys(f"- `{one.name}`: {one.missed}" for one in missed if one.missed)
-    return Table("Bars", ["configuration", "target", "bars", "missed"], rows, "\n".join(why))
-
-
-def tables(results: Results) -> list[Table]:
-    """Return all tables of measured figures that are not empty."""
-    made = [*(target_table(target, results) for target in TARGETS), bar_table(results), speed_table(results)]
-    return [table for table in (*made, cost_table(results)) if table.rows]
+    return section(f"What each option costs: difference from {reference}", header, made)
 
 
 def used(tools: Mapping[str, str]) -> str:
@@ -158,30 +122,29 @@ def used(tools: Mapping[str, str]) -> str:
     return ", ".join(f"{package} {version}" for package, version in tools.items())
 
 
-def page(measured: Sequence[Table], tools: Mapping[str, str]) -> str:
+def page(results: Results, tools: Mapping[str, str]) -> str:
     """Return the page docs/measured/size.md."""
-    sections = [table.markdown() for table in (*measured, PEERS, PEER_SOURCES)]
+    sections = [core_table(results), cost_table(results), section(**PEERS)]
     return filled("size.md", used=used(tools), measured="\n".join(sections))
 
 
-def kept(text: str, tools: Mapping[str, str]) -> dict[tuple[str, str], Measurement]:
-    """Return what stands on the page; RuntimeError if it was measured with other tools."""
-    if used(tools) not in text:
-        raise RuntimeError(f"{PAGE.name} was not written with {used(tools)}: make size")
+def table_of(page: Path) -> Path:
+    """Return the file with all figures of a page."""
+    return page.parent / "tables" / "size.csv"
+
+
+def kept(page: Path, tools: Mapping[str, str]) -> dict[tuple[str, str], Measurement]:
+    """Return the figures of the table beside the page; RuntimeError if they were measured with other tools."""
+    if used(tools) not in page.read_text(encoding="utf-8"):
+        raise RuntimeError(f"{page.name} was not written with {used(tools)}: make size")
     results = {}
-    for target in TARGETS:
-        section = text.partition(f"## {target} (")[2].partition("\n## ")[0]
-        lines = [line.strip("| ").split(" | ") for line in section.splitlines() if line.startswith("|")]
-        figures = [head.partition(" (")[0] for head in lines[0][2:-1]] if lines else []
-        for line in lines[2:]:
-            name, _, *cells = (cell.strip() for cell in line)
-            found = {figure: float(cell.split(" (")[0]) for figure, cell in zip(figures, cells, strict=False) if cell}
-            spread = re.search(r"\((\d+)–(\d+)\)", " ".join(cells))
-            results[name, target] = Measurement(
-                {figure: value if figure == "Fmax" else int(value) for figure, value in found.items()},
-                cells[len(figures)] if len(cells) > len(figures) else "",
-                (float(spread[1]), float(spread[2])) if spread else None,
-            )
+    for row in read_table(table_of(page)):
+        found = {figure: float(row[figure]) for figure in FIGURES if row[figure]}
+        results[row["configuration"], row["target"]] = Measurement(
+            {figure: value if figure == "Fmax" else int(value) for figure, value in found.items()},
+            row["what limits Fmax"],
+            (float(row["slowest"]), float(row["fastest"])) if row["slowest"] else None,
+        )
     return results
 
 
@@ -215,20 +178,22 @@ def run(options: argparse.Namespace) -> int:
     with ThreadPoolExecutor(options.jobs) as pool:
         done = track(pool.map(measured, work), "measuring", len(work), console=console, disable=not console.is_terminal)
         results = {(one.name, target): result for (one, target), result in zip(work, done, strict=True)}
-    for table in tables(results):
-        print(table.markdown())
-    if options.update:
-        names = {one.name for one in chosen}
-        before = kept(PAGE.read_text(encoding="utf-8"), tools)
-        results |= {place: found for place, found in before.items() if place[0] not in names}
+    made = rows(results)
+    print(markdown(made[0], made[1:], left=[at for at, head in enumerate(made[0]) if head in WORDS]))
     if options.output:
-        write(options.output, page(tables(results), tools))
-        stamp(options.output, *(one.name for one in chosen))
+        names = [one.name for one in chosen]
+        before = kept(PAGE, tools) if options.update else {}
+        results = {place: found for place, found in before.items() if place[0] not in names} | results
+        write_table(table_of(options.output), made, merge=options.update, parts=names)
+        write(options.output, page(results, tools))
+        stamp(options.output)
         if options.output == PAGE:
             cells = {name: results[row, "ECP5"].figures["COMB"] for name, row in METHOD_CELLS.items()}
             CELLS.write_text(json.dumps(cells, indent=2) + "\n", encoding="utf-8")
         print(f"written: {options.output}")
-    return int(any(row[-1] for row in bar_table(results).rows))
+    wrong = {one.name: one for one, target in work if missed(one, target, results[one.name, target])}
+    print("".join(f"{name} misses a bar. {one.missed}\n" for name, one in wrong.items()), end="")
+    return int(bool(wrong))
 
 
 def main(words: Sequence[str] | None = None) -> int:

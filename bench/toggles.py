@@ -1,4 +1,4 @@
-"""Counts flip-flop changes per tick of cores, box by box, as dynamic power follows them: docs/measured/toggles.md.
+"""Counts flip-flop changes per tick of cores, box by box, as dynamic power follows them: docs/measured/evidence.md.
 
 The shaft turns at a constant speed, and the changes of all flip-flops are counted in every clock (Amaranth's
 simulator), from the third tick on. Clock tree and wires are not counted.
@@ -12,7 +12,7 @@ from typing import Any
 from amaranth import Cat, Fragment, Module, Signal
 from amaranth.sim import Simulator
 from cores import CONFIGURATIONS
-from pages import MEASURED, markdown, measure
+from pages import MEASURED, Rows, measure
 
 from tachometry.hdl import Tachometer
 from tachometry.spec import TachometerSpec
@@ -70,15 +70,15 @@ def changes(spec: TachometerSpec, rad_per_s: float, ticks: int) -> Counter[str]:
     return counted
 
 
-def table() -> str:
+def table() -> Rows:
     """Return a row for each box, and a column for each core."""
     chosen = [one for one in CONFIGURATIONS if one.name in CORES]
     columns = [changes(one.spec, RAD_PER_S, TICKS) for one in chosen]  # type: ignore[arg-type]
     boxes = sorted({box for column in columns for box in column}, key=lambda box: -max(c[box] for c in columns))
     rows = [[box, *(f"{column[box] / TICKS:.1f}" for column in columns)] for box in boxes]
     rows.append(["total", *(f"{column.total() / TICKS:.1f}" for column in columns)])
-    return markdown(["box", *(one.name for one in chosen)], rows)
+    return [["box", *(one.name for one in chosen)], *rows]
 
 
 if __name__ == "__main__":
-    measure(MEASURED / "toggles.md", {"toggles": table})
+    measure(MEASURED / "evidence.md", {"toggles": table})

@@ -1,4 +1,4 @@
-"""Measures the errors of the tracking method when an update appears, for docs/measured/track.md."""
+"""Measures the errors of the tracking method when an update appears, for docs/measured/compare.md."""
 
 import math
 import sys
@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from motions import OTHERS, REAL, SITUATIONS, Situation
 from numpy.typing import NDArray
-from pages import MEASURED, ROOT, markdown, measure
+from pages import MEASURED, ROOT, Rows, measure
 from situations import Cell, core
 
 from tachometry.sim import golden
@@ -133,7 +133,7 @@ def alarm_cases(runs: int) -> Iterator[tuple[str, str, float, int, Callable[[int
     yield "start at 50 rad/s", "real, 0.25 off centre", BURST, STARTS, start
 
 
-def alarms(seeds: int, runs: int) -> str:
+def alarms(seeds: int, runs: int) -> Rows:
     """Return the table of false alarms."""
     rows = []
     for motion, encoder, limit, n, run in alarm_cases(runs):
@@ -141,16 +141,16 @@ def alarms(seeds: int, runs: int) -> str:
         false = sum(error > limit for error in worst)
         rows.append([motion, encoder, f"{100 * limit:g}", str(n), str(false), f"{100 * max(worst):.1g}"])
     heads = ["motion", "encoder", "alarm from (%)", "runs", "of them with an alarm", "greatest error (%)"]
-    return markdown(heads, rows, left=range(2))
+    return [heads, *rows]
 
 
-def table(seeds: int, runs: int) -> str:
+def table(seeds: int, runs: int) -> Rows:
     """Return the table of errors in all situations."""
     heads = ["situation"]
     for tick in TICKS:
-        heads += [f"ticks of {tick[:-2]} µs", "in float", "within velocity_std (%)"]
-    return markdown(heads, [row(situation, seeds) for situation in (*SITUATIONS, *OTHERS, GENTLE)])
+        heads += [f"{what} {tick[:-2]} µs" for what in ("ticks of", "in float,", "within velocity_std (%),")]
+    return [heads, *(row(situation, seeds) for situation in (*SITUATIONS, *OTHERS, GENTLE))]
 
 
 if __name__ == "__main__":
-    measure(MEASURED / "track.md", {"errors": table, "alarms": alarms}, usual=["errors"], seeds=20, runs=100)
+    measure(MEASURED / "compare.md", {"tracking": table, "alarms": alarms}, usual=["tracking"], seeds=20, runs=100)

@@ -4,6 +4,7 @@ import re
 from typing import Any
 
 import pytest
+from support import docs
 from support.nightly import nightly, only
 from support.script import load
 
@@ -12,25 +13,24 @@ situations = load("situations")
 DOCS = page.PAGE.read_text(encoding="utf-8")
 
 
+def row(table: str, situation: str) -> dict[str, str]:
+    """Return a row of a table beside the page."""
+    (found,) = (row for row in docs.table(table) if row.pop("situation") == situation)
+    return found
+
+
+def test_the_page_has_what_its_tables_have() -> None:
+    assert DOCS.startswith(page.page())
+
+
 @pytest.mark.parametrize("situation", page.SITUATIONS, ids=lambda situation: situation.title)
 def test_table_of_a_situation(situation: Any) -> None:
-    """Methods that the page does not have yet may be in the table; those that it has must have these numbers."""
-    _, part = DOCS.split(f"## {situation.title}\n")
-    shown = part.split("\n## ")[0]
-    assert " ".join(situation.command.split()) in " ".join(shown.replace("\\", "").split())
-    expected = page.table(page.rows(situation.command)).splitlines()[2:]
-    names = re.findall(r"^\| ([a-z][^ |]*) \|", shown, re.MULTILINE)[1:]
-    assert len(names) >= 7
-    rows = {line.split(" | ")[0].removeprefix("| "): line for line in expected}
-    for name in names:
-        assert rows[name] in shown, name
-
-
-def cells(heading: str, name: str) -> list[str]:
-    """Return a row of the first table under a heading."""
-    part = DOCS.split(f"## {heading}\n")[1].split("\n## ")[0]
-    (line, *_) = [line for line in part.splitlines() if line.startswith(f"| {name} |")]
-    return [cell.strip().strip("*") for cell in line.strip("|").split("|")[1:]]
+    """Methods that the table does not have yet may be added; those that it has must have these numbers."""
+    assert " ".join(situation.command.split()) in " ".join(DOCS.replace("\\", "").split())
+    shown = [[*row.values()][1:] for row in docs.table("single") if row["situation"] == situation.title]
+    assert len(shown) >= 7
+    found = page.table(page.rows(situation.command))
+    assert [one for one in found if one[0] in [name for name, *_ in shown]] == shown
 
 
 NOT_RANDOM = [situation for situation in situations.SITUATIONS if not situation.random]
@@ -41,7 +41,7 @@ def test_row_of_all_situations(situation: Any) -> None:
     """Of those that take one seed; some errors are nothing but rounding, which is that of the machine."""
     columns = (*situations.OURS, *situations.RIVALS)
     (found,) = situations.best(situations.measured([situation], 10, 1, columns), columns).values()
-    shown = [float(cell) for cell in cells("All situations", situation.name)]
+    shown = [float(cell) for cell in row("compare", situation.name).values()]
     assert [cell.mean for cell in found] == pytest.approx(shown, rel=0.01, abs=1e-7)
     assert all(cell.spread is None for cell in found)
 
@@ -49,37 +49,26 @@ def test_row_of_all_situations(situation: Any) -> None:
 @nightly  # with all seeds of the page
 @pytest.mark.parametrize("name", ["slow sine, real", "stop, real"])
 def test_row_of_one_setting_for_all(name: str) -> None:
-    part = DOCS.split("## One setting for all situations\n")[1]
-    heads = re.findall("`([^`]+)`", next(line for line in part.splitlines() if line.startswith("| situation")))
-    ((first, last),) = re.findall(r"with seeds (\d+) to (\d+)", DOCS)
+    ((first, last),) = re.findall(r"over seeds (\d+) to (\d+)", DOCS)
     assert int(first) == situations.FIRST_SEED
     (situation,) = [one for one in situations.SITUATIONS if one.name == name]
-    assert tuple(heads[: len(situations.OURS)]) == situations.OURS
-    columns = ["hostmot2", "mt", *situations.OURS]
+    columns, shown = ["hostmot2", "mt", *situations.OURS], row("one-setting", name)
+    assert (*shown,)[: len(situations.OURS)] == situations.OURS
     table = situations.measured([situation], int(last) - int(first) + 1, 1, columns)[name]
-    checked = 0
-    for head, shown in zip(heads, cells("One setting for all situations", name), strict=True):
-        if head in table:
-            assert str(table[head]) == shown
-            checked += 1
-    assert checked >= len(columns)
+    checked = {head: str(table[head]) for head in shown if head in table}
+    assert len(checked) >= len(columns)
+    assert checked.items() <= shown.items()
 
 
 def test_options_of_the_models_are_on_the_page() -> None:
     assert situations.model_table() in DOCS
-    for situation in (*situations.SITUATIONS, *situations.OTHERS):
-        assert f"| {situation.name} | `{situation.options}` |" in DOCS
+    every = {situation.name: situation.options for situation in (*situations.SITUATIONS, *situations.OTHERS)}
+    assert {one["situation"]: one["options"] for one in docs.table("settings")} == every
 
 
-def test_the_verdict_follows_from_the_tables_and_tracking_tells_where_others_are_better() -> None:
-    found = {}
-    for heading in ("All situations", "Other situations"):
-        part = DOCS.split(f"## {heading}\n")[1]
-        for line in part.split("\n\nThe situations as")[0].split("---: |\n")[1].splitlines():
-            name, *texts = line.strip("| ").split(" | ")
-            found[name] = [situations.Cell("", float(text.strip("*").split()[0]), None) for text in texts]
-    assert list(found) == [situation.name for situation in (*situations.SITUATIONS, *situations.OTHERS)]
-    assert " ".join(situations.verdict(found).split()) in " ".join(DOCS.split())
+def test_tracking_tells_where_others_are_better() -> None:
+    found = page.errors_of("compare")
+    assert [*found] == [situation.name for situation in (*situations.SITUATIONS, *situations.OTHERS)]
     page_of_track = (page.PAGE.parents[1] / "concepts" / "track.md").read_text(encoding="utf-8")
     told = page_of_track.split("## Where others are better\n")[1]
     assert [name for name, over in situations.wins(found).items() if over > 1.1 and f"*{name}*" not in told] == []
@@ -102,8 +91,8 @@ def test_the_best_has_the_least_mean_and_one_for_all_the_least_product(monkeypat
     table["1"]["x:a=2"] = cell("x:a=2", 2000)
     assert situations.single(table, "x") == "x"  # and x:a=3 cannot be everywhere
     shown = situations.error_table(["`x`"], found)
-    assert shown.splitlines()[2] == "| 1 | **2 ± 1** |"
-    assert situations.setting_table(found).splitlines()[2] == "| 1 |  | `a=1` |"
+    assert shown[1] == ["1", "2 ± 1"]
+    assert situations.setting_table(found)[1] == ["1", "", "a=1"]
 
 
 def test_processes_find_what_one_finds() -> None:

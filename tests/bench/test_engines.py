@@ -35,7 +35,7 @@ def test_part_of_a_trace_has_the_same_levels(trace: PinTrace) -> None:
 def test_hardware_that_disagrees_is_no_result(trace: PinTrace, monkeypatch: pytest.MonkeyPatch) -> None:
     name, *cells = bench.golden_row("m", SPEC, trace, slow=3000)
     assert name == "m"
-    assert len(cells) == len(bench.GOLDEN_COLUMNS) - 1
+    assert len(cells) == len(bench.GOLDEN_COLUMNS) - 2
     monkeypatch.setattr(PySim, "run", lambda *_: golden.run(bench.CORES["s"], bench.part_of(trace, 100_000, 3000)))
     with pytest.raises(RuntimeError, match="disagree"):
         bench.golden_row("m", SPEC, trace, slow=3000)

@@ -12,7 +12,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 from support.nightly import only
 
-SIZE = "docs/measured/size.md"
+SIZE = "docs/measured/tables/size.csv"
 STAMPS = json.loads(pages.STAMPS.read_text(encoding="utf-8"))
 ROWS = [one.name for one in made_of.CONFIGURATIONS]
 # Cores that differ from another row in numbers, or in what another method has as well.
@@ -21,9 +21,12 @@ LIKE_OTHERS = re.compile(
     "|.+-tick|no-cancel|index-reset|compare-both|every-clock-rad|velocity-16|.+-exact|m-10|[a-z]+-bounds|bus-(a|w|n).*"
     "|default|m|t|mt|rairan"
 )
-RECOMPUTED = {"encoder.md", "encoder.svg", "figures.md", "sweep.md"}  # as a whole, by tests of their own
+# As a whole, by tests of their own.
+PAGES = ("compare", "encoder", "evidence", "figures", "size", "sweep", "tables/single")
+RECOMPUTED = {"encoder.svg", *(f"{name}.{'csv' if '/' in name else 'md'}" for name in PAGES)}
 # Speeds, routings, proofs and samples of wrong cores.
-RUNS = {"bench.md", "estimate.md", "formal.md", "mutation.md", "upset.md", "verify.md"}
+TABLES = ("engines", "golden", "mutation", "proofs", "upsets", "verify", "verify-every-clock", "whole")
+RUNS = {"estimate.md", *(f"tables/{name}.csv" for name in TABLES)}
 OTHERS = {f"docs/measured/{name}" for name in RECOMPUTED | RUNS}
 OTHERS |= {"docs/demo.png", "docs/guides/disc.png"}  # tests/test_readme.py and test_calibrate.py draw them
 OTHERS |= {"docs/overview.svg", "docs/guides/wiring.svg"}  # by hand

@@ -30,6 +30,20 @@ def test_a_block_of_a_page_is_replaced(tmp_path: Path) -> None:
         pages.write_block(file, "three", "")
 
 
+def test_rows_of_a_table_are_replaced_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "one.csv"
+    for commit, rows, merge in (("a", ["s", "m"], False), ("b", ["m", "t"], True)):
+        monkeypatch.setattr(pages, "commit", lambda commit=commit: commit)
+        pages.write_table(file, [["core", "n"], *([name, "1,000"] for name in rows)], merge)
+    assert file.read_text().split() == ["core,n,commit", 's,"1,000",a', 'm,"1,000",b', 't,"1,000",b']
+
+
+def test_the_page_of_evidence_has_what_its_tables_have() -> None:
+    """If this fails, run `python bench/evidence.py`."""
+    evidence = load("evidence")
+    assert pages.block(evidence.PAGE, "summary") == evidence.summary()
+
+
 def test_the_site_has_every_page_once() -> None:
     shown = re.findall(r": (\w+/[\w-]+\.md)$", (DOCS.parent / "mkdocs.yml").read_text(), re.MULTILINE)
     assert sorted(shown) == sorted(page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md"))

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support import docs
 from support.compiled import lint
 from support.script import load
 
@@ -197,35 +198,14 @@ def test_without_seeds_there_is_no_fmax(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(synthesis, "made", lambda files, commands, results, tools: [REPORT][: len(results)])
     found = synthesis.measure_core(SPEC, size.TARGETS["ECP5"], "", {}, seeds=())
     assert "Fmax" not in found.figures
-    table = size.target_table("ECP5", {("reference", "ECP5"): found})
-    assert table.rows[0][2:] == ["325", "215", "1", "0", "", str(SPEC.latency.tick_to_velocity), ""]
-
-
-def test_what_a_greatest_speed_changes() -> None:
-    """Rows in pairs, each of which differs in nothing else."""
-    specs = {configuration.name: configuration.spec for configuration in size.CONFIGURATIONS}
-    pairs = {one.name: one.without_max_speed for one in size.CONFIGURATIONS if one.without_max_speed}
-    assert {specs[name].method for name in pairs} == set(METHODS)
-    for name, without in pairs.items():
-        with_, base = specs[name], specs[without]
-        assert (with_.max_speed, base.max_speed) == (size.CONFIGURATIONS[0].spec.max_speed, None)
-        assert (with_.method, with_.timing, with_.tick.longest) == (
-            base.method,
-            base.timing,
-            base.tick.longest,
-        )
-    found = results()
-    changes: dict[str, dict[str, float]] = {"ECP5": {"COMB": 264, "FF": 273}, "HX8K": {"LC": 330, "Fmax": 135.5}}
-    for target, changed in changes.items():
-        found["default", target] = size.Measurement({**found["reference", target].figures, **changed}, "")
-    assert size.speed_table(found).rows == [["reference", "default", "+1", "-13", "+0.0", "+10", "-5.5", "", ""]]
+    row = size.rows({("reference", "ECP5"): found})[1]
+    assert row[3:12] == ["325", "215", "1", "0", "", "", "", "", str(SPEC.latency.tick_to_velocity)]
 
 
 @pytest.mark.parametrize(("changed", "missed"), [({}, ""), ({"LC": 341}, "LC"), ({"Fmax": 129.9}, "Fmax")])
 def test_bars(changed: dict[str, float], missed: str) -> None:
-    rows = size.bar_table(results(**changed)).rows
-    assert [row[1] for row in rows] == list(size.CONFIGURATIONS[0].bars)
-    assert [row[3] for row in rows if row[3]] == ([missed] if missed else [])
+    rows = size.rows(results(**changed))[1:]
+    assert [row[-1] for row in rows if row[-1]] == ([missed] if missed else [])
 
 
 def test_what_is_not_measured_again_stays_on_the_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -234,43 +214,50 @@ def test_what_is_not_measured_again_stays_on_the_page(monkeypatch: pytest.Monkey
     found["reference", "HX8K"] = size.Measurement(
         found["reference", "HX8K"].figures, "a → b: logic 9.0 ns", (127.0, 133.0)
     )
-    text = size.page(size.tables(found), tools)
-    assert size.kept(text, tools) == found
-    with pytest.raises(RuntimeError, match=r"^size\.md was not written with yosys 0\.71: make size$"):
-        size.kept(text, {"yosys": "0.71"})
     written = tmp_path / "size.md"
-    written.write_text(text, encoding="utf-8")
     monkeypatch.setattr(size, "PAGE", written)
     monkeypatch.setattr(size, "CELLS", tmp_path / "cells.json")
     monkeypatch.setattr(size, "METHOD_CELLS", {"s": "reference", "t": "t"})
     monkeypatch.setattr(size, "versions", lambda: tools)
+    size.write(written, size.page(found, tools))
+    size.write_table(size.table_of(written), size.rows(found))
+    assert size.kept(written, tools) == found
+    with pytest.raises(RuntimeError, match=r"^size\.md was not written with yosys 0\.71: make size$"):
+        size.kept(written, {"yosys": "0.71"})
     monkeypatch.setattr(size, "measure", lambda *_: size.Measurement({"COMB": 300, "latency": 21}, ""))
     assert size.main(["--only", "t", "--update", "-o", str(written)]) == 0
-    assert "| t | ECP5 |" in written.read_text(encoding="utf-8")
-    assert size.kept(written.read_text(encoding="utf-8"), tools)["reference", "HX8K"] == found["reference", "HX8K"]
+    after = size.kept(written, tools)
+    assert (after["reference", "HX8K"], after["t", "ECP5"].figures["COMB"]) == (found["reference", "HX8K"], 300)
+    assert "| t | T method | 300 |" in written.read_text(encoding="utf-8")
     assert json.loads((tmp_path / "cells.json").read_text()) == {"s": 265, "t": 300}
 
 
+def test_the_page_has_what_its_table_has() -> None:
+    page = size.PAGE.read_text(encoding="utf-8")
+    (words,) = re.findall(r"make size` wrote it with (.*)\.\n", page)
+    tools = dict(word.rsplit(" ", 1) for word in words.split(", "))
+    assert page.startswith(size.page(size.kept(size.PAGE, tools), tools))
+
+
 def test_every_peer_can_be_measured_again() -> None:
-    peers = load("peers")
-    assert [row[0] for row in size.PEERS.rows] == [row[0] for row in size.PEER_SOURCES.rows]
-    for name, _, revision, files, options, seeds, words in size.PEER_SOURCES.rows:
+    peers, sources = load("peers"), size.data("peers")["sources"]["rows"]
+    assert [row[0] for row in size.PEERS["rows"]] == [row[0] for row in sources]
+    for name, _, revision, files, options, seeds, words in sources:
         assert re.fullmatch("[0-9a-f]{12}|this one", revision), name
         assert all((files, options)), name
         if revision == "this one":
             assert (size.ROOT / files).is_file(), name
         assert peers.arguments([__file__, *words.strip("`").split()]).seeds == int(seeds), name
-    for table in (size.PEERS, size.PEER_SOURCES):
-        assert table.markdown() in size.PAGE.read_text("utf-8")
 
 
-def test_exit_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_exit_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(size, "versions", lambda: {"yosys": "0.70"})
     for changed, code in (({}, 0), ({"LC": 341}, 1)):
         found = results(**changed)
         monkeypatch.setattr(size, "measure", lambda item, target, *_, found=found: found[item.name, target])
         assert size.main(["--only", "reference", "-o", str(tmp_path / "size.md")]) == code
-    assert "| reference | HX8K | LC ≤ 340, RAM ≤ 0, Fmax ≥ 130 | LC |" in (tmp_path / "size.md").read_text()
+    assert "reference misses a bar. " in capsys.readouterr().out
+    assert size.read_table(tmp_path / "tables" / "size.csv")[1]["missed"] == "LC"
 
 
 def test_latency_of_a_core(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -284,8 +271,7 @@ def test_latency_of_a_core(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_cells_that_commands_know_are_those_of_the_page() -> None:
-    page = size.PAGE.read_text(encoding="utf-8").split("\n## ")[1]
-    rows = dict(re.findall(r"^\| (\S+) \| [^|]+ \| (\d+) \|", page, re.MULTILINE))
+    rows = {row["configuration"]: row["COMB"] for row in docs.table("size") if row["target"] == "ECP5"}
     assert {name: int(rows[row]) for name, row in size.METHOD_CELLS.items()} == CELLS
     assert {name.removesuffix("-block") for name in CELLS} == set(METHODS)
-    assert f" {CELLS['track']} cells of an ECP5" in (size.ROOT / "docs/concepts/track.md").read_text(encoding="utf-8")
+    assert f" {CELLS['track']} cells of an ECP5" in docs.page("concepts/track.md")

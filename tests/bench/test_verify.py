@@ -12,9 +12,8 @@ PASS: pysim, cxxrtl and golden models agree in every bit of 4 updates and 5 tick
 
 
 def test_rows_are_those_that_were_printed() -> None:
-    assert load("verify").table(SAID).splitlines() == [
-        "| method | engine | configurations | motions |",
-        "| --- | --- | ---: | ---: |",
-        "| s | pysim | 28 | 36 |",
-        "| track | cxxrtl | 15 | 34 |",
+    assert load("verify").table(SAID) == [
+        ["method", "engine", "configurations", "motions"],
+        ["s", "pysim", "28", "36"],
+        ["track", "cxxrtl", "15", "34"],
     ]

@@ -48,9 +48,8 @@ def test_a_mutant_that_was_killed_must_be_killed_again(small: pytest.MonkeyPatch
 
     def passes(survivors: list[int], sample: list[Mutant] = sample) -> bool:
         small.setattr(command, "judge", lambda case, pool: Score(case, sample, survivors))
-        return command.main(["mt", "-o", str(tmp_path / "page.md")])
+        return command.main(["mt", "-o", str(tmp_path / "mutation.csv")])
 
-    (tmp_path / "page.md").write_text("<!-- mt -->\n<!-- end of mt -->\n")
     assert not passes([*range(9)])  # 77.5 %
     assert passes([*range(8)])
     assert not passes([0, 8])

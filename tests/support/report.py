@@ -2,37 +2,37 @@
 
 import argparse
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 from support.script import load
 
 
 def arguments(text: str, metavar: str) -> argparse.ArgumentParser:
-    """Return a command that takes names, and a page to write its tables into."""
+    """Return a command that takes names, and a file to write its table into."""
     parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar=metavar, help="only these")
-    parser.add_argument("-o", "--output", type=Path, metavar="PAGE", help="page whose tables are replaced")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="table of CSV whose rows are replaced")
     return parser
 
 
 class Table:
-    """A table in Markdown that is printed line by line; `left` are the columns of words."""
+    """A table that is printed line by line in Markdown."""
 
-    def __init__(self, *heads: str, left: Sequence[int] = (0,)) -> None:
-        self.lines: list[str] = []
+    def __init__(self, *heads: str) -> None:
+        self.rows: list[list[str]] = []
         self.add(*heads)
-        self.add(*("---" if column in left else "---:" for column in range(len(heads))))
+        print("| --- " * len(heads) + "|")
 
     def add(self, *cells: object) -> None:
         """Print a row."""
-        self.lines.append("| " + " | ".join(str(cell).replace("|", r"\|") for cell in cells) + " |\n")
-        print(self.lines[-1], end="", flush=True)
+        self.rows.append([str(cell) for cell in cells])
+        print(f"| {' | '.join(self.rows[-1])} |", flush=True)
 
-    def write(self, page: Path | None, block: str) -> None:
-        """Put the table into a block of a page, if there is one."""
-        if page is not None:
-            load("pages").write_block(page, block, "".join(self.lines))
+    def write(self, file: Path | None) -> None:
+        """Replace the rows of these names in a table of CSV, if there is one."""
+        if file is not None:
+            load("pages").write_table(file, self.rows, merge=file.exists())
 
 
 def chosen(what: str, words: Iterable[str], known: Iterable[str]) -> list[str]:

@@ -24,7 +24,7 @@ def _exported(proof: Proof, wrong: Mutant | None = None) -> str:
 
 
 def _properties(result: Result) -> str:
-    return ", ".join(f"`{name}`" for name in result.names if name.startswith("p"))
+    return ", ".join(name for name in result.names if name.startswith("p"))
 
 
 def _prove(proofs: dict[str, Proof], mutants: list[Mutant]) -> tuple[list[Result], list[Result]]:
@@ -48,7 +48,7 @@ def _prove(proofs: dict[str, Proof], mutants: list[Mutant]) -> tuple[list[Result
 def _row(proof: Proof, result: Result, refuted: list[tuple[Mutant, Result]]) -> tuple[str, ...]:
     begin = f"any state, {proof.recovers} clocks" if proof.recovers else f"{result.depth} clocks"
     begin = f"given, {begin}" if proof.given else begin
-    wrong = ", ".join(f"`{mutant.refuted}` {found.depth}" for mutant, found in refuted)
+    wrong = ", ".join(f"{mutant.refuted} {found.depth}" for mutant, found in refuted)
     return proof.name, _properties(result), begin, f"{result.seconds:.0f}", result.verdict, wrong
 
 
@@ -62,10 +62,10 @@ def main(words: list[str]) -> bool:
     mutants = [wrong for wrong in MUTANTS if wrong.proof in proofs and not quick]
     right, refuted = _prove(proofs, mutants)
     judged = list(zip(mutants, refuted, strict=True))
-    table = Table("core", "properties", "induction", "seconds", "verdict", "wrong cores refuted in", left=range(6))
+    table = Table("core", "properties", "induction", "seconds", "verdict", "wrong cores refuted in")
     for proof, result in zip(proofs.values(), right, strict=True):
         table.add(*_row(proof, result, [(wrong, found) for wrong, found in judged if wrong.proof == proof.name]))
-    table.write(given.output, "proofs")
+    table.write(given.output)
     for wrong, found in judged:
         if found.verdict != "refuted":
             print(f"\n{wrong.refuted} of {wrong.proof} is {found.verdict} with {wrong.box.__name__}: {wrong.wrong}")

@@ -34,7 +34,7 @@ def _share(scores: list[Score]) -> float:
     return killed / mutants
 
 
-def _judge_group(group: str, pool: Executor, page: Path | None) -> list[Score]:
+def _judge_group(group: str, pool: Executor, file: Path | None) -> list[Score]:
     """Judge and print the cores of a group."""
     scores: list[Score] = []
     print()
@@ -43,7 +43,7 @@ def _judge_group(group: str, pool: Executor, page: Path | None) -> list[Score]:
         scores.append(judge(case, pool))
         table.add(case.name, *_counts(scores[-1:]), f"{100 * _share(scores[-1:]):.1f} %")
     table.add(f"{group}, all", *_counts(scores), f"{100 * _share(scores):.1f} %")
-    table.write(page, group)
+    table.write(file)
     return scores
 
 

@@ -36,7 +36,7 @@ def _ticks(campaign: Campaign, clocks: int) -> str:
 def _table(done: Sequence[tuple[Campaign, float]]) -> Table:
     """Print the table of campaigns and the seconds that they took."""
     heads = ("core", "flip-flops", "upsets", "never seen", "mean", "99 %", "worst", "bound", "seconds", "verdict")
-    table = Table(*heads, left=(0, 9))
+    table = Table(*heads)
     for campaign, seconds in done:
         seen = sorted(campaign.clocks[campaign.clocks > 0].tolist()) or [0]
         bits = f"{campaign.bits.n_flip_flops}"
@@ -69,9 +69,7 @@ def main(words: Sequence[str] | None = None) -> int:
     for name in track(subjects, "upsets", console=console, transient=True, disable=not console.is_terminal):
         start = time.monotonic()
         done.append((SUBJECTS[name](options.upsets), time.monotonic() - start))
-    for block in ("upsets", "track"):
-        if rows := [one for one in done if (one[0].name in tracking.TRACK) == (block == "track")]:
-            _table(rows).write(options.output, block)
+    _table(done).write(options.output)
     print("\nmean, 99 %, worst: ticks until the outputs were right again, of those that were seen")
     for campaign, _ in done:
         worst = [f"{name} {_ticks(campaign, clocks)}" for name, clocks in list(by_register(campaign))[:5]]

@@ -80,7 +80,7 @@ def test_what_is_not_known_is_not_left_out() -> None:
 
 @pytest.mark.parametrize("name", ["reference", "track", "bus-apb"])
 def test_estimates_are_near_what_was_measured(name: str) -> None:
-    rows = size.kept(size.PAGE.read_text(encoding="utf-8"), {})
+    rows = size.kept(size.PAGE, {})
     (core,) = (one for one in CONFIGURATIONS if one.name == name)
     families = {about.target.device: family for family, about in FAMILIES.items()}
     for device, target in TARGETS.items():
