@@ -17,7 +17,7 @@ def test_pages_are_up_to_date(page: str) -> None:
 
 
 def test_the_page_of_choices_names_options_of_generate() -> None:
-    page, options = docs.page("guides/choose.md"), docs.page("reference/options.md")
+    page, options = docs.page("guides/integration.md"), docs.page("reference/options.md")
     named = set(re.findall(r"`(--[\w-]+)", page))
     assert len(named) >= 15
     assert [name for name in named if f"`{name}" not in options] == []

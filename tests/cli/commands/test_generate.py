@@ -136,7 +136,7 @@ def test_ctrl_c(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch:
 
 # `tachometry generate --loop`.
 CORE = "--ppr 25 --clock 1MHz --tick 250us --max-time 2ms --max-speed 500rad/s --loop".split()
-PAGE = docs.page("guides/integration.md")
+PAGE = docs.page("reference/manifest.md")
 
 
 def test_files_of_a_loop(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

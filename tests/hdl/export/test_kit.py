@@ -23,7 +23,7 @@ from tachometry.spec.core.extras.stream import READY
 from tachometry.spec.language.provenance import LICENSE, generator, version
 
 BIN = Path(sys.executable).parent
-PAGE = docs.page("guides/integration.md")
+PAGE = docs.page("reference/manifest.md")
 BASE = {"ppr": "8", "clock": "1MHz", "tick": "80us", "max-time": "800us"}
 CASES = {
     "s": {"external-tick": "yes", "index": "yes", "filter": "4", "unit": "rpm", "bounds": "yes", "age": "yes"},
