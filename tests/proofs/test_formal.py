@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 from proofs.formal.cases import PROOFS, QUICK
 from proofs.formal.mutants import MUTANTS
+from support import docs
 from support.nightly import nightly
 
 
@@ -22,6 +23,13 @@ def test_a_quick_proof_for_every_checker() -> None:
     checkers = {proof.name: proof.checker for proof in PROOFS}
     assert len(checkers) == len(PROOFS)
     assert {checkers[name] for name in QUICK} == {*checkers.values()}
+
+
+def test_every_proven_property_is_described() -> None:
+    described = {name for row in docs.table("properties", "concepts") for name in row["properties"].split(", ")}
+    proven = {name for row in docs.table("proofs") for name in row["properties"].split(", ") if name}
+    assert proven
+    assert proven - described == set()
 
 
 def test_every_mutant_stands_in_its_box() -> None:

@@ -1,15 +1,15 @@
 """The golden front end on steps and levels that are made by hand, and expected values of other counters.
 
-These are on the hardware, as docs/concepts/verification.md lists them.
+These are on the hardware, as docs/concepts/expected.csv lists them.
 """
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from reference.front import CYCLE
+from support import docs
 
 from tachometry.sim.engines.pysim import PySim
 from tachometry.sim.golden.front_end import Steps, count, decode, decoded, first_beyond
@@ -211,13 +211,8 @@ def test_rest(numbers: str, lengths: str, standstill: str) -> None:
     assert "".join(str(int(one)) for one in found) == standstill
 
 
-PAGE = Path(__file__).parents[3] / "docs/concepts/verification.md"
 CORE = {"ppr": "8", "clock": "1MHz", "tick": "1clk", "max-time": "10clk"}
-ROWS = [
-    tuple(cell.strip() for cell in line.strip("|\n").split("|"))
-    for line in PAGE.read_text().split("## Expected values of others")[1].splitlines()
-    if re.match(r"\| (?!who)\w", line)
-]
+ROWS = [(*row.values(),) for row in docs.table("expected", "concepts")]
 
 
 @pytest.mark.parametrize("row", ROWS, ids=[f"{row[0]}: {row[1]}" for row in ROWS])
