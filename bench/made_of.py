@@ -16,7 +16,7 @@ from amaranth.lib import wiring
 from cores import CONFIGURATIONS as CONFIGURATIONS
 from health import EXAMPLES, told
 from motions import OTHERS, SITUATIONS
-from pages import MEASURED, block
+from pages import MEASURED, block, read_table
 from pictures import CORE as MONITORED
 from situations import RIVALS, core, errors
 from tracking import errors as tracking_errors
@@ -29,6 +29,7 @@ from tachometry.spec import METHODS, of_texts
 from tachometry.spec.registers.demo import DemoMap
 
 SEED = 1  # no page has it
+PAPERS = MEASURED / "tables" / "papers.csv"
 
 
 def netlist(top: wiring.Component) -> list[str]:
@@ -89,7 +90,9 @@ MADE_OF: dict[str, Callable[[str], object]] = {
     "docs/measured/control.md": lambda _: tracking(),  # tests/cli/commands/test_loop_docs.py has the loops about S
     "docs/measured/control.png": lambda _: block(MEASURED / "control.md", "gains"),
     **{
-        f"docs/measured/figures/{file.name}": lambda _, name=file.stem: block(MEASURED / "figures.md", name)  # type: ignore[misc]
+        f"docs/measured/figures/{file.name}": lambda _, name=file.stem: [
+            row for row in read_table(PAPERS) if row["figure"] == name
+        ]  # type: ignore[misc]
         for file in MEASURED.glob("figures/*.png")
     },
     "docs/measured/health.md": lambda _: [f"{told(one, SEED):.7f}" for one in EXAMPLES],

@@ -8,14 +8,19 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from pages import markdown, stamp, write_block
+from pages import markdown, read_table, stamp, write_block, write_table
 
 from papers import FIGURES, LOOPS
 from papers.drawing import write_data, write_figure
 from papers.lab import Lab
 from tachometry.sim.build import find_compiler
 
-HEADS = ("the paper says", "computed", "agrees")
+HEADS = ("figure", "the paper says", "computed", "agrees")
+
+
+def shown(rows: Sequence[Sequence[str]]) -> str:
+    """Return claims in Markdown."""
+    return markdown(HEADS[:-1], [[cell.replace("|", "") for cell in row[:-1]] for row in rows], left=range(4))
 
 
 def draw(name: str, hdl: bool, folder: Path, page: Path | None) -> int:
@@ -26,14 +31,15 @@ def draw(name: str, hdl: bool, folder: Path, page: Path | None) -> int:
     for path in (picture, picture.with_suffix(".svg")):
         write_figure(path, result)
     write_data(picture.with_suffix(".csv"), result)
-    rows = [(claim.paper, claim.found, "yes" if claim.agrees else "no") for claim in result.claims]
-    table = markdown(HEADS, [[cell.replace("|", "") for cell in row] for row in rows], left=range(3))
-    print(f"{name}: {result.source}, {result.title}\n\n{table}", *lab.first, sep="\n", flush=True)
+    rows = [(name, claim.paper, claim.found, "yes" if claim.agrees else "no") for claim in result.claims]
+    print(f"{name}: {result.source}, {result.title}\n\n{shown(rows)}", *lab.first, sep="\n", flush=True)
     if page is not None:
-        write_block(page, name, table)
-        shown = page.parent / "figures" / picture.name
-        shown.write_bytes(picture.read_bytes())
-        stamp(shown)
+        table = page.parent / "tables" / "papers.csv"
+        write_table(table, [HEADS, *rows], merge=table.exists())
+        write_block(page, "differ", shown([(*row.values(),) for row in read_table(table) if row["agrees"] == "no"]))
+        copy = page.parent / "figures" / picture.name
+        copy.write_bytes(picture.read_bytes())
+        stamp(copy)
     return lab.mismatches
 
 

@@ -22,7 +22,7 @@ LIKE_OTHERS = re.compile(
     "|default|m|t|mt|rairan"
 )
 # As a whole, by tests of their own.
-PAGES = ("compare", "encoder", "evidence", "figures", "size", "sweep", "tables/single")
+PAGES = ("compare", "encoder", "evidence", "figures", "size", "sweep", "tables/papers", "tables/single")
 RECOMPUTED = {"encoder.svg", *(f"{name}.{'csv' if '/' in name else 'md'}" for name in PAGES)}
 # Speeds, routings, proofs and samples of wrong cores.
 TABLES = ("engines", "golden", "mutation", "proofs", "upsets", "verify", "verify-every-clock", "whole")

@@ -23,7 +23,7 @@ PAGE = docs.page("concepts/control.md")
 MEASURED = docs.page("measured/control.md")
 COMMANDS = [
     shlex.split(found.replace("\\\n", ""))
-    for found in re.findall(r"^    tachometry loop (--ppr(?:.*\\\n)*.*)$", PAGE, re.MULTILINE)
+    for found in re.findall(r"^    tachometry loop (--lines(?:.*\\\n)*.*)$", PAGE, re.MULTILINE)
 ]
 
 
