@@ -25,8 +25,7 @@ def results() -> dict[str, str]:
     speeds = (f"{ends('engines', name)} with {name}" for name in ("pysim", "verilator", "cxxrtl"))
     bitstreams = (f"{row['Fmax (MHz)']} MHz for {row['clock (MHz)']}" for row in read_table(TABLES / "boards.csv"))
     return {
-        "proofs": f"{proven} of {len(proofs)} proofs succeed, of {len(properties)} properties; {len(wrong)} wrong "
-        "cores are refuted",
+        "proofs": f"{proven} of {len(proofs)} proven, {len(properties)} properties; {len(wrong)} wrong cores refuted",
         **{
             name: ", ".join(f"{total(name, one)} {one}" for one in ("clocks", "updates", "mismatches"))
             for name in PLAYED
