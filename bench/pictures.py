@@ -95,7 +95,7 @@ def explore(picture: Path) -> None:
 
 def commands() -> dict[str, str]:
     """Return the commands of the guides that draw a picture in build/, by its name."""
-    page = (GUIDES / "encoder.md").read_text(encoding="utf-8")
+    page = (GUIDES / "captures.md").read_text(encoding="utf-8")
     found = re.findall(r"^tachometry (.* --plot build/(wheel\w*.png))$", page, re.MULTILINE)
     return {"sweep.png": "sweep docs/guides/sweep.toml", **{name: words for words, name in found}}
 

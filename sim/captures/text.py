@@ -45,7 +45,7 @@ def read_csv(
     _block: int = BLOCK,
 ) -> Recording:
     """Read two to four channels of a text with a line of names, such as `time,a,b`, and levels, see
-    docs/guides/encoder.md.
+    docs/guides/captures.md.
 
     Rows are change points or samples; rows that change nothing are dropped. Times count from the first row in which all
     levels are known, and the last row ends the recording. Without a column of times, a row is a sample, and the last

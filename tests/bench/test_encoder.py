@@ -12,7 +12,7 @@ from tachometry.sim.encoder.virtual import VirtualEncoder
 
 encoder = load("encoder")
 PAGE = encoder.PAGE.read_text("utf-8")
-GUIDE = docs.page("guides/encoder.md")
+GUIDE = docs.page("guides/encoder.md") + docs.page("guides/sensors.md")
 PICTURE = encoder.PICTURE.read_bytes()
 
 

@@ -59,7 +59,7 @@ def test_a_capture_in_place_of_a_motion(tmp_path: Path, capsys: pytest.CaptureFi
 @nightly
 def test_the_guide(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """The other tests of this file run the same command on shorter captures."""
-    (command,) = re.findall(r"^tachometry (compare --replay .*)", docs.page("guides/encoder.md"), re.MULTILINE)
+    (command,) = re.findall(r"^tachometry (compare --replay .*)", docs.page("guides/captures.md"), re.MULTILINE)
     (tmp_path / "tests").symlink_to(docs.DOCS.parent / "tests")
     monkeypatch.chdir(tmp_path)
     assert run(*command.split()) == 0

@@ -134,7 +134,7 @@ IN_GUIDE = {
 
 
 def commands_of_guide() -> list[str]:
-    section = docs.page("guides/encoder.md").partition("## Captures of real encoders")[2].partition("\n## ")[0]
+    section = docs.page("guides/captures.md").partition("## Captures of real encoders")[2].partition("\n## ")[0]
     return re.findall(r"^tachometry (.*)", section, re.MULTILINE)
 
 
@@ -166,8 +166,8 @@ def test_the_guide(
 def test_a_real_shaft_loses_no_count(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The command of docs/guides/encoder.md, and the net of the edges, found from the file's rows alone."""
-    page = (ROOT / "docs" / "guides" / "encoder.md").read_text(encoding="utf-8")
+    """The command of docs/guides/captures.md, and the net of the edges, found from the file's rows alone."""
+    page = (ROOT / "docs" / "guides" / "captures.md").read_text(encoding="utf-8")
     (command,) = re.findall(r"^tachometry (replay .*mouse.*)$", page, re.MULTILINE)
     (tmp_path / "tests").symlink_to(ROOT / "tests")
     monkeypatch.chdir(tmp_path)

@@ -150,7 +150,7 @@ def test_lines_at_fault() -> None:
     ],
 )
 def test_a_core_tells_them(fault: dict[str, int], code: Fault) -> None:
-    """Within twice as many edges of the line that still works as make a fault, as docs/guides/encoder.md has it."""
+    """Within twice as many edges of the line that still works as make a fault, as docs/guides/outputs.md has it."""
     words = {"ppr": "25", "clock": "1MHz", "tick": "100us", "health": "yes", "health-edges": "5", "health-errors": "3"}
     spec = of_texts("m", words | ({"differential": "3"} if code == Fault.B_OPEN else {}))
     begins = 20 * PERIOD

@@ -156,7 +156,7 @@ def test_a_refusal_names_the_option(
 
 
 def test_the_guide(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    page = (ROOT / "docs/guides/encoder.md").read_text(encoding="utf-8").partition("## Logs of time and count")[2]
+    page = (ROOT / "docs/guides/captures.md").read_text(encoding="utf-8").partition("## Logs of time and count")[2]
     page = page.partition("\n## ")[0]
     (tmp_path / "build").mkdir()
     rows = page.partition("```csv\n")[2].partition("```")[0]

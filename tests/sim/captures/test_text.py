@@ -300,7 +300,7 @@ def test_column_of_the_times(tmp_path: Path, time: str | int) -> None:
 
 
 def test_examples_of_the_documentation(tmp_path: Path) -> None:
-    page = docs.page("guides/encoder.md").partition("## Logs of time and count")[0]
+    page = docs.page("guides/captures.md").partition("## Logs of time and count")[0]
     examples = re.findall(r"```csv\n(.*?)```", page, re.DOTALL)
     assert len(examples) == 3
     for text in examples:
