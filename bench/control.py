@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from loops import IDEAL, KINDS, REAL, TASK, TICKS, check, setting, usable, variants
 from matplotlib.figure import Figure
-from pages import MEASURED, ROOT, markdown, measure, stamp
+from pages import MEASURED, ROOT, Rows, markdown, measure, stamp
 
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.engines.loop import Observer
@@ -98,17 +98,17 @@ def drawn(found: Sequence[Best]) -> Figure:
     return figure
 
 
-def weights(seeds: int, jobs: int | None) -> str:
+def weights(seeds: int, jobs: int | None) -> Rows:
     """Return ticks of 20 µs: the observer with every tick, and with every update, for S and M/T."""
     rows = []
     for disc, encoder in DISCS.items():
         for kv in (40.0, 80.0, 160.0):
             found = [cell(outcome_of(setting(kind, kv, 20e-6, encoder), range(seeds), jobs)) for kind in KINDS]
             rows.append((disc, f"{kv:g}", *found))
-    return markdown(("disc", "k_v", *(kind.name for kind in KINDS)), rows, left=range(len(KINDS) + 2))
+    return [("disc", "k_v", *(kind.name for kind in KINDS)), *rows]
 
 
-def assumptions(seeds: int, jobs: int | None) -> str:
+def assumptions(seeds: int, jobs: int | None) -> Rows:
     """Return the changes against the real disc, ticks of 1 ms and 20 µs, k_v = 40 and 80."""
     rows: dict[str, list[str]] = {}
     for kv, seconds in ((40.0, 1e-3), (80.0, 20e-6)):
@@ -116,10 +116,10 @@ def assumptions(seeds: int, jobs: int | None) -> str:
         conventional = replace(base, gains=replace(base.gains, way=Observer.CONVENTIONAL))
         for name, varied in (*variants(base), ("the conventional observer", conventional)):
             rows.setdefault(name, [name]).append(cell(outcome_of(varied, range(seeds), jobs)))
-    return markdown(("what is changed", "1 ms, k_v = 40", "20 µs, k_v = 80"), list(rows.values()), left=range(3))
+    return [("what is changed", "1 ms, k_v = 40", "20 µs, k_v = 80"), *rows.values()]
 
 
-def in_gates(seeds: int, jobs: int | None) -> str:
+def in_gates(seeds: int, jobs: int | None) -> Rows:
     """Return the controller in gates against its golden model, and against double precision."""
     held = setting(KINDS[0], 80.0, 20e-6, REAL)
     cosine = replace(
@@ -139,11 +139,11 @@ def in_gates(seeds: int, jobs: int | None) -> str:
         ticks, wrong = sum(one.ticks for one in found), sum(one.mismatches for one in found)
         errors = (f"{gates.rms:.4g}", f"{double.rms:.4g}", f"{gates.sound:.4g}", f"{double.sound:.4g}")
         rows.append((name, f"{ticks}", f"{wrong}", *errors))
-    heads = ("loop", "control ticks", "mismatches", "RMS error", "in double", "current above 50 Hz", "in double")
-    return markdown(heads, rows)
+    heads = ("loop", "control ticks", "mismatches", "RMS error", "in double", "current", "current in double")
+    return [heads, *rows]
 
 
-def solutions(seeds: int, jobs: int | None) -> str:
+def solutions(seeds: int, jobs: int | None) -> Rows:
     """Return the largest deviations of Fig. 14 with shorter ticks, mean of seeds: 1 s to 39 rad/s, from 2 s to 4 s."""
     motion, rows = parse_motion("ramp:0:39rad/s:1s+constant:39rad/s:3s"), []
     for seconds in (1e-3, 1e-4, 20e-6, 1e-6):
@@ -153,10 +153,10 @@ def solutions(seeds: int, jobs: int | None) -> str:
             logs = each_seed(solution(tick, motion, cancel, synchronised), range(seeds), jobs)
             found.append(sum(deviation(log, 2.0) for log in logs) / seeds)
         rows.append((head, *(f"{value:.2f}" for value in found)))
-    return markdown(("T_s", "(a)", "(b)", "(c)"), rows)
+    return [("T_s", "(a)", "(b)", "(c)"), *rows]
 
 
-def slow_shafts(seeds: int, jobs: int | None) -> str:
+def slow_shafts(seeds: int, jobs: int | None) -> Rows:
     """Return a shaft that rests, or turns slowly, under the load: real disc, ticks of 20 µs, usable gains."""
     rows = []
     tracking = KINDS[-1]
@@ -168,13 +168,11 @@ def slow_shafts(seeds: int, jobs: int | None) -> str:
             row.append(cell(outcome_of(replace(setting(kind, kv, 20e-6, REAL), task=task), range(seeds), jobs)))
         rows.append(row)
     heads = ("speed", *(kind.name for kind, _ in ways[:-1]), "tracking, with a filter")
-    return markdown(heads, rows, left=range(len(heads)))
+    return [heads, *rows]
 
 
-def accelerations(seeds: int, jobs: int | None) -> str:
-    """Return tracking, real disc, ticks of 20 µs: the disturbance from the velocity, and from the measured
-    acceleration.
-    """
+def accelerations(seeds: int, jobs: int | None) -> Rows:
+    """Return tracking, real disc, ticks of 20 µs: the disturbance from velocity and measured acceleration."""
     rows = []
     ways = {"velocity": Observer.SYNCHRONISED, "acceleration": Observer.ACCELERATION}
     for kv, times in ((40.0, 2), (80.0, 2), (113.1, 2), (113.1, 1), (160.0, 1)):
@@ -183,17 +181,17 @@ def accelerations(seeds: int, jobs: int | None) -> str:
             changed = replace(base.gains, way=way, observer=times * kv)
             found = outcome_of(replace(base, gains=changed), range(seeds), jobs)
             rows.append((f"{kv:g}", f"{times * kv:g}", name, cell(found)))
-    return markdown(("k_v", "G", "observer", "errors, dip, current"), rows, left=(2, 3))
+    return [("k_v", "G", "observer", "errors, dip, current"), *rows]
 
 
 BLOCKS = {
     "gains": gains,
-    "weights": weights,
-    "assumptions": assumptions,
-    "solutions": solutions,
-    "slow": slow_shafts,
-    "acceleration": accelerations,
-    "gates": in_gates,
+    "loop-weights": weights,
+    "loop-assumptions": assumptions,
+    "loop-solutions": solutions,
+    "loop-slow": slow_shafts,
+    "loop-acceleration": accelerations,
+    "loop-gates": in_gates,
 }
 
 if __name__ == "__main__":

@@ -29,6 +29,7 @@ from tachometry.spec import METHODS, of_texts
 from tachometry.spec.registers.demo import DemoMap
 
 SEED = 1  # no page has it
+LOOPS = [file.stem for file in MEASURED.glob("tables/loop-*.csv")]
 PAPERS = MEASURED / "tables" / "papers.csv"
 
 
@@ -99,5 +100,5 @@ MADE_OF: dict[str, Callable[[str], object]] = {
     "docs/measured/tables/size.csv": measured_core,
     "docs/measured/tables/toggles.csv": lambda _: [measured_core(name) for name in ("reference", "table")],
     **{f"docs/measured/tables/{name}.csv": lambda _: estimates() for name in ("compare", "one-setting", "settings")},
-    **{f"docs/measured/tables/{name}.csv": lambda _: tracking() for name in ("alarms", "tracking")},
+    **{f"docs/measured/tables/{name}.csv": lambda _: tracking() for name in ("alarms", "tracking", *LOOPS)},
 }

@@ -36,7 +36,7 @@ def test_a_row_and_a_mark_for_every_gain_that_is_usable(tmp_path: Path, monkeypa
 
 def test_mismatches_of_all_seeds_are_added(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench, "check", lambda one, seed: Checked(1000, seed, FINE, FINE))
-    rows = bench.in_gates(6, 1).splitlines()[2:]
+    rows = bench.in_gates(6, 1)[1:]
     assert len(rows) == 4
-    for line in rows:
-        assert line.split(" | ")[1:] == ["6000", "15", "0.1234", "0.1234", "0.3", "0.3 |"]
+    for row in rows:
+        assert [*row[1:]] == ["6000", "15", "0.1234", "0.1234", "0.3", "0.3"]

@@ -1,4 +1,4 @@
-"""The commands of docs/concepts/control.md run, and rows of docs/measured/control.md are what comes of them."""
+"""The commands of docs/concepts/control.md run, and rows of docs/measured/tables are what comes of them."""
 
 import re
 import shlex
@@ -20,7 +20,6 @@ from tachometry.sim.engines.loop import Observer
 from tachometry.sim.studies.loops.control import Outcome, outcome_of, simulation_of
 
 PAGE = docs.page("concepts/control.md")
-MEASURED = docs.page("measured/control.md")
 COMMANDS = [
     shlex.split(found.replace("\\\n", ""))
     for found in re.findall(r"^    tachometry loop (--lines(?:.*\\\n)*.*)$", PAGE, re.MULTILINE)
@@ -33,10 +32,11 @@ def figures(found: Outcome) -> list[float]:
     return [float(f"{value:.3g}") for value in (found.rms, found.largest, found.dip, found.sound)]
 
 
-def cells(*begin: str) -> list[str]:
+def cells(table: str, *begin: str) -> list[str]:
     """Return the other cells of the only row that begins so."""
-    (line,) = [line for line in MEASURED.splitlines() if line.startswith(f"| {' | '.join(begin)} | ")]
-    return line.strip("| ").split(" | ")[len(begin) :]
+    rows = [[*row.values()] for row in docs.table(table)]
+    (found,) = (row[len(begin) :] for row in rows if row[: len(begin)] == [*begin])
+    return found
 
 
 def numbers(cell: str) -> list[float]:
@@ -69,15 +69,17 @@ def test_the_command_with_axes_means_loops() -> None:
 @pytest.mark.parametrize("place", [0, 1])
 def test_rows_of_what_synchronising_does(place: int) -> None:
     found = outcome_of(setting(KINDS[place], 80.0, 20e-6, REAL), range(6))
-    assert numbers(cells("real disc", "80")[place]) == figures(found)
+    assert numbers(cells("loop-weights", "real disc", "80")[place]) == figures(found)
 
 
 def test_rows_of_what_was_assumed() -> None:
     base = setting(KINDS[0], 40.0, 1e-3, REAL)
     for name, varied in list(variants(base))[1::3]:
-        assert numbers(cells(name)[0]) == figures(outcome_of(varied, range(6))), name
+        assert numbers(cells("loop-assumptions", name)[0]) == figures(outcome_of(varied, range(6))), name
     conventional = replace(base, gains=replace(base.gains, way=Observer.CONVENTIONAL))
-    assert numbers(cells("the conventional observer")[0]) == figures(outcome_of(conventional, range(6)))
+    assert numbers(cells("loop-assumptions", "the conventional observer")[0]) == figures(
+        outcome_of(conventional, range(6))
+    )
 
 
 def test_what_is_held_is_more_than_the_speed() -> None:
