@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import situations
-from pages import MEASURED, Rows, count, data, filled, markdown, read_table, stamp, write, write_table
+from pages import MEASURED, count, data, markdown, read_table, stamp, write_block, write_table
 
 from tachometry.cli.main import main as tachometry
 
@@ -64,10 +64,9 @@ def table(found: list[dict[str, str]]) -> list[list[str]]:
     return [[row["name"], *(cell(row, name, scale) for name, scale in numbers)] for row in found]
 
 
-def single() -> Rows:
-    """Return the tables of all commands in one."""
-    made = [[one.title, *row] for one in SITUATIONS for row in table(rows(one.command))]
-    return [["situation", *HEADS], *made]
+def code(command: str) -> str:
+    """Return a command as the page shows it."""
+    return re.sub(" (?=--(methods|motion|jitter|tradeoff))", " \\\\\n        ", f"\n    {command}\n\n")
 
 
 def errors_of(name: str) -> dict[str, list[float]]:
@@ -76,20 +75,19 @@ def errors_of(name: str) -> dict[str, list[float]]:
     return {row.pop("situation"): [float(cell.split()[0]) for cell in row.values()] for row in rows}
 
 
-def page() -> str:
-    """Return the page docs/measured/compare.md from the tables."""
+def blocks() -> dict[str, str]:
+    """Return the blocks of docs/measured/compare.md from the tables."""
     table = errors_of("one-setting")
     heads = [*read_table(TABLES / "one-setting.csv")[0]][1:]
     shown = [at for at, head in enumerate(heads) if head in _DATA["shown"] or head.split(":")[0] in _DATA["shown"]]
     body = [[name, *(f"{row[at]:.2g}" for at in shown)] for name, row in table.items()]
-    return filled(
-        "compare.md",
-        verdict=situations.verdict(errors_of("compare")),
-        one_setting=markdown(["situation", *(f"`{heads[at]}`" for at in shown)], body),
-        models=situations.model_table(),
-        costs=re.sub(" (?=--(methods|jitter|tradeoff))", " \\\\\n        ", COSTS),
-        situations=SITUATIONS,
-    )
+    return {
+        "verdict": situations.verdict(errors_of("compare")),
+        "one-setting": markdown(["situation", *(f"`{heads[at]}`" for at in shown)], body),
+        "models": situations.model_table(),
+        "costs": code(COSTS),
+        "situations": "".join(f"### {one.title}\n\n{one.text}\n{code(one.command)}" for one in SITUATIONS),
+    }
 
 
 if __name__ == "__main__":
@@ -99,7 +97,8 @@ if __name__ == "__main__":
     options = parser.parse_args()
     rows(COSTS.replace(f"docs/measured/{FIGURE.name}", shlex.quote(str(FIGURE))))
     stamp(FIGURE)
-    for name, made in (situations.tables(options.seeds, options.jobs) | {"single": single()}).items():
+    single = [["situation", *HEADS], *([one.title, *row] for one in SITUATIONS for row in table(rows(one.command)))]
+    for name, made in (situations.tables(options.seeds, options.jobs) | {"single": single}).items():
         write_table(TABLES / f"{name}.csv", made)
-    write(PAGE, page())
-    stamp(PAGE)
+    for name, text in blocks().items():
+        write_block(PAGE, name, text)
