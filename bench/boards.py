@@ -2,22 +2,15 @@
 
 import json
 import re
-import resource
 from collections.abc import Mapping
 
-from pages import MEASURED, ROOT, Rows, measure, tachometry
+from pages import MEASURED, ROOT, Rows, measure, processor_time, tachometry
 
 from tachometry.boards.fpga.boards import BOARDS
 
 BUILT = ("tang-nano-9k", "icebreaker", "ulx3s-25f")
 CORE = ("--ppr", "500", "--max-speed", "1000rad/s", "--filter", "4")
 HEADS = ("board", "cells", "Fmax (MHz)", "clock (MHz)", "processor time (s)", "tools")
-
-
-def processor_time() -> float:
-    """Return seconds that programs took which this one has run, whatever else the machine did meanwhile."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
 
 
 def row(name: str, printed: str, seconds: float, tools: Mapping[str, str]) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 
-from pages import MEASURED, ROOT, Rows, measure
+from pages import MEASURED, ROOT, Rows, measure, processor_time
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import Vibration, parse_motion
@@ -121,16 +121,16 @@ def whole(name: str, spec: TachometerSpec, trace: PinTrace) -> list[str]:
     return [name, *cells, f"{len(run.updates.clock):,}", "0"]
 
 
-def processor_time(*words: str) -> float:
+def time_of(*words: str) -> float:
     """Return seconds that all processes of some tests take; CalledProcessError if one fails."""
-    before = sum(os.times()[2:4])
+    before = processor_time()
     subprocess.run([sys.executable, "-m", "pytest", "-q", "-m", "not nightly", *words], cwd=ROOT, check=True)
-    return sum(os.times()[2:4]) - before
+    return processor_time() - before
 
 
 def tests() -> Rows:
     """Return how long the tests take, and how much longer than one of them."""
-    one, every = processor_time(FIXED_TEST), processor_time("-n", "auto", "--dist", "worksteal")
+    one, every = time_of(FIXED_TEST), time_of("-n", "auto", "--dist", "worksteal")
     return [["tests", "processor time", "÷ one test"], ["all", f"{every:.0f} s", f"{every / one:.0f}"]]
 
 

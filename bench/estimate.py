@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 from cores import CONFIGURATIONS
-from pages import MEASURED, ROOT, data, filled, markdown, stamp, write
+from pages import MEASURED, ROOT, data, markdown, read_table, write, write_block, write_table
 from size import PAGE as SIZES
 from size import kept, used
 
@@ -31,6 +31,7 @@ from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.registers.buses import BUSES, Bus, bus_of, ports_on
 
 PAGE, FITTED = MEASURED / "estimate.md", ROOT / "sim" / "studies" / "estimate.json"
+TABLE, HEADS = MEASURED / "tables" / "estimate.csv", ("family", "core", "cells", "estimated", "MHz", "estimated MHz")
 _DATA = data("estimate")
 DRAWN: dict[str, dict[str, Any]] = _DATA["families"]
 
@@ -81,12 +82,16 @@ def known(family: str) -> list[tuple[Mapped, Mapping[str, float]]]:
     return found
 
 
-def drawn(family: str, part: str) -> Iterator[tuple[AnySpec, Bus | None, str, Mapping[str, float]]]:
+def drawn(
+    family: str, part: str, only: Sequence[int] | None = None, stays: Mapping[str, Mapping[str, float]] = {}
+) -> Iterator[tuple[AnySpec, Bus | None, str, Mapping[str, float]]]:
     """Yield the random cores of a family that are compared, or that have a part in its fit, with their figures."""
     target, numbers = FAMILIES[family].target, DRAWN[family]
     tools, first = versions(target.route[0]), 0 if part == "cores" else numbers["cores"]
     for at, (spec, bus, text) in enumerate(random_cores(first + numbers.get(part, 0))):
-        if at >= first:
+        if at >= first and only is not None and at not in only:
+            yield spec, bus, text, stays[text]
+        elif at >= first:
             verilog = export(spec, CORE, bus.name if bus else "none")[f"{CORE}.v"]
             seeds = range(1, 4) if at < numbers["routed"] else ()
             yield spec, bus, text, measure_core(spec, target, verilog, tools, ports_on(spec, bus), [*seeds]).figures
@@ -113,46 +118,45 @@ def fit(family: str) -> dict[str, list[float]]:
     return {"cells": [round(float(each), 3) for each in weights], "times": [round(each, 3) for each in times]}
 
 
-def measured(family: str) -> list[tuple[str, float, float, float, float]]:
-    """Return random cores: options, cells that nextpnr packs and those estimated, MHz and those estimated, or 0."""
+def measured(family: str, only: Sequence[int] | None) -> list[tuple[str, float, float, float, float]]:
+    """Return random cores: options, cells packed and estimated, MHz and estimated; those not in `only` stay."""
+    stays = {row["core"]: {"cells": float(row["cells"]), "Fmax": float(row["MHz"] or 0)} for row in read_table(TABLE)}
     rows = []
-    for spec, bus, text, figures in drawn(family, "cores"):
+    for spec, bus, text, figures in drawn(family, "cores", only, stays):
         found, (cells, *_), clock = estimate.Estimate.of(spec, bus, family), figures.values(), figures.get("Fmax", 0)
         guess = found.clock_hz / 1e6 if clock or FAMILIES[family].timed else 0
         rows.append((text, cells, float(found.cells), clock, guess))
     return rows
 
 
-def page(found: Mapping[str, Sequence[tuple[str, float, float, float, float]]]) -> str:
-    """Return docs/measured/estimate.md."""
+def summary(found: Mapping[str, Sequence[tuple[str, float, float, float, float]]]) -> str:
+    """Return the block of docs/measured/estimate.md."""
 
-    def spread(pairs: Sequence[tuple[float, float]]) -> list[str]:
-        off = sorted(abs(guess / real - 1) for real, guess in pairs if real)
+    def spread(each: Sequence[tuple[str, float, float, float, float]], at: int) -> list[str]:
+        off = sorted(abs(float(row[at + 1]) / float(row[at]) - 1) for row in each if row[at])
         return [str(len(off)), f"{statistics.median(off):.1%}", f"{off[-1]:.1%}"] if off else ["0", "", ""]
 
-    columns = ("core", "cells", "estimated", "MHz", "estimated MHz")
     heads = ("family", "cores", "median, cells", "worst, cells", "routed", "median, MHz", "worst, MHz")
-    rows, cores = [], ""
-    for name, each in found.items():
-        about = FAMILIES[name]
-        rows.append([about.title, *spread([(r[1], r[2]) for r in each]), *spread([(r[3], r[4]) for r in each])])
-        lines = [[text, *(f"{value:.0f}" if value else "" for value in values)] for text, *values in each]
-        cores += f"\n## {about.title} ({about.target.device})\n\n{markdown(columns, lines)}"
+    rows = [[FAMILIES[name].title, *spread(each, 1), *spread(each, 3)] for name, each in found.items()]
     tools = used(versions(*(FAMILIES[name].target.route[0] for name in found)))
-    return filled("estimate.md", used=tools, summary=markdown(heads, rows), cores=cores)
+    return f"{markdown(heads, rows)}\nMeasured with {tools}.\n"
 
 
 def main() -> None:
     """Fit, measure, and write both files; `--keep` measures the estimates as they are."""
     parser = argparse.ArgumentParser(description="Fit the estimates of cells and greatest clock, and measure them.")
     parser.add_argument("--keep", action="store_true", help="measure only: the weights stay")
-    parser.add_argument("--families", nargs="+", choices=FAMILIES, default=[*DRAWN])
+    parser.add_argument("--families", nargs="+", choices=FAMILIES, default=[*DRAWN], help="some of the families")
+    parser.add_argument("--only", nargs="+", type=int, metavar="N", help="measure these cores of them: the others stay")
     options = parser.parse_args()
     if not options.keep:
         estimate.FITTED.update({family: fit(family) for family in options.families})
         write(FITTED, json.dumps(estimate.FITTED).replace('}, "', '},\n "') + "\n")
-    write(PAGE, page({family: measured(family) for family in options.families}))
-    stamp(PAGE)
+    numbers = {family: options.only if family in options.families else [] for family in DRAWN}
+    found = {family: measured(family, only) for family, only in numbers.items()}
+    rows = [(FAMILIES[f].title, text, *(f"{n:.0f}" * bool(n) for n in each)) for f in found for text, *each in found[f]]
+    write_table(TABLE, [HEADS, *rows])
+    write_block(PAGE, "summary", summary(found))
 
 
 if __name__ == "__main__":

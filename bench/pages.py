@@ -3,6 +3,7 @@
 import argparse
 import csv
 import json
+import os
 import re
 import subprocess
 import sys
@@ -39,6 +40,11 @@ def tachometry(*words: object) -> str:
     """Run the command, with its errors shown; return its output. It raises CalledProcessError if it fails."""
     command = [f"{sysconfig.get_path('scripts')}/tachometry", *map(str, words)]
     return subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, cwd=ROOT).stdout
+
+
+def processor_time() -> float:
+    """Return seconds that ended programs took which this one has run, whatever else the machine did meanwhile."""
+    return sum(os.times()[2:4])
 
 
 def markdown(columns: Sequence[str], rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> str:

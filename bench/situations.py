@@ -83,14 +83,12 @@ def errors(situation: Situation, seed: int, names: Iterable[str]) -> Errors:
         ((_, method, given),) = listed_methods(name, BASELINES)
         if method is None:
             return steps_curve(name, steps)
-        spec = core(situation, method, given)
-        return core_curve(name, spec, PinTrace.of(truth.recording, spec))
+        return core_curve(name, spec := core(situation, method, given), PinTrace.of(truth.recording, spec))
 
     found = {}
     for name in names:
         with suppress(ValueError):  # such as a loop that is not stable
-            error = error_of(curve(name), judge)
-            if error is not None:
+            if (error := error_of(curve(name), judge)) is not None:
                 found[name] = error
     return found
 

@@ -25,7 +25,7 @@ LIKE_OTHERS = re.compile(
 PAGES = ("compare", "encoder", "evidence", "figures", "size", "sweep", "tables/papers", "tables/single")
 RECOMPUTED = {"encoder.svg", *(f"{name}.{'csv' if '/' in name else 'md'}" for name in PAGES)}
 # Speeds, routings, proofs and samples of wrong cores.
-TABLES = ("engines", "golden", "mutation", "proofs", "upsets", "verify", "verify-every-clock", "whole")
+TABLES = ("engines", "estimate", "golden", "mutation", "proofs", "upsets", "verify", "verify-every-clock", "whole")
 RUNS = {"estimate.md", *(f"tables/{name}.csv" for name in TABLES)}
 OTHERS = {f"docs/measured/{name}" for name in RECOMPUTED | RUNS}
 OTHERS |= {"docs/demo.png", "docs/guides/disc.png"}  # tests/test_readme.py and test_calibrate.py draw them
