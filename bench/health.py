@@ -127,7 +127,7 @@ def faulty(example: Example, seeds: int = SEEDS) -> list[str]:
     return [f"`--{example.option}`", core, str(int(Fault[example.code])), f"{1e3 * worst:.3f} ms", stated]
 
 
-HEADS = ["fault", "core", "`health`", f"told after, worst of {SEEDS}", "stated"]
+HEADS = ["fault", "core", "`health`", f"reported after, worst of {SEEDS}", "stated"]
 BLOCKS = {
     "clean": lambda: markdown(["disc", "clocks", "edges", "indices", "faults"], list(map(clean, DISCS))),
     "faults": lambda: markdown(HEADS, list(map(faulty, EXAMPLES)), left=(0, 1, 4)),
