@@ -33,6 +33,8 @@ from tachometry.sim.signals.recording import Recording, packed
 from tachometry.sim.signals.source import Source
 from tachometry.spec.language.units import plural
 
+_FILES = {"--trace": "interval,forced,velocity_raw", "--counts": "tick,pulse_count", "--events": "clock,event"}
+
 
 def read_csv(
     path: str | os.PathLike[str],
@@ -61,6 +63,8 @@ def read_csv(
         options = replace(options, time=own)
     with reading(path), opened(path) as file:
         source = Lines(path, file)
+        for option in (name for name, columns in _FILES.items() if any(columns in line for line in source.head[:1])):
+            raise CaptureError(f"{path} has outputs of a core, from {option}: replay what --save-capture wrote")
         header = read_header(path, source.head, options, samplerate_hz)
         if rows_are_pulses or not header.channels:
             return _pulses(path, source, header, options, one_line=b == SAME)
