@@ -141,14 +141,14 @@ def _count(axes: Axes, spec: TachometerSpec, run: Run, scale: float) -> None:
 
 def _interval(axes: Axes, spec: TachometerSpec, run: Run, scale: float) -> None:
     updates = run.updates
+    ticks = updates.interval * (spec.times.interval_unit / spec.timing.tick_cycles)
     for forced, colour, label in ((False, ESTIMATE, spec.facts.update_by), (True, FORCED, "forced")):
         chosen = updates.forced == forced
-        time = updates.clock[chosen] / spec.timing.clock_hz
-        m_s = updates.interval[chosen] * (spec.times.interval_unit / spec.timing.tick_cycles)
+        time, m_s = updates.clock[chosen] / spec.timing.clock_hz, ticks[chosen]
         kept = columns(time, m_s)
         axes.plot(time[kept] * scale, m_s[kept], ".", color=colour, markersize=2.5, label=label)
     axes.set_yscale("log")
-    axes.set_ylim(0.8 * spec.times.interval_unit / spec.timing.tick_cycles, spec.timing.max_ticks * 1.25)
+    axes.set_ylim(0.8 * ticks.min(where=ticks > 0, initial=1), spec.timing.max_ticks * 1.25)
     axes.yaxis.set_major_formatter("{x:g}")
     axes.set_ylabel("measurement (ticks)")
     axes.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.2, markerscale=3, ncols=2)
