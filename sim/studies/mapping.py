@@ -3,7 +3,7 @@
 A netlist is a graph of bits. A gate is known by its inputs alone, as a lookup table holds any function of them.
 """
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -63,7 +63,18 @@ class Logic:
         self.late: set[int] = set()  # bits that a block RAM has read
         for port in module["ports"].values():
             self.ends += _nets(port["bits"]) if port["direction"] == "output" else ()
-        for cell in module["cells"].values():
+        cells = module["cells"].values()
+        pins = [bits for cell in cells for bits in cell["connections"].values()]
+        uses = Counter(bit for bits in [*pins, self.ends] for bit in bits)  # with the one that drives it
+        sums = {(*cell["connections"]["Y"],): cell for cell in cells if cell["type"] in _SUMS}
+        self._joined = {  # sums that only another sum takes: Yosys adds all at once
+            bits: sums[bits]
+            for y, cell in sums.items()
+            for name in "AB"
+            if (bits := (*cell["connections"].get(name, ()),)) in sums and len(bits) == len(y)
+            if all(uses[bit] == 2 for bit in bits)
+        }
+        for cell in cells:
             self._add(cell, defaultdict(list, cell["connections"]), cell["parameters"])
 
     def _add(self, cell: Mapping[str, Any], pins: Mapping[str, Any], parameters: Mapping[str, str]) -> None:
@@ -73,11 +84,12 @@ class Logic:
             self.ends += _nets([*pins["D"], *pins["E"], *pins["R"]])
         elif kind.startswith("$_"):
             self.gate([*a, *b, *s], y[0], _TREES.get(kind, "gate"))
-        elif kind in _SUMS or kind in _COMPARISONS:
-            width = len(y) if kind in _SUMS else max(len(a), len(b))
-            signed = parameters["A_SIGNED"][-1] == "1"  # as B, if there is one
-            a, b = ([*bits, *[bits[-1] if signed and bits else "0"] * width][:width] for bits in (a, b))
+        elif kind in _COMPARISONS:
+            a, b = self._terms(cell, max(len(a), len(b)))
             self._chain(a, b, y)
+        elif kind in _SUMS:
+            if (*y,) not in self._joined:
+                self._sum([*self._terms(cell, len(y))], y)
         elif kind == "$mul":
             self.products.append((len(a), len(b)))
             self.nodes |= {bit: ("product", _nets([*a, *b])) for bit in _nets(y)}
@@ -105,12 +117,27 @@ class Logic:
             left = [*left[2:], self.gate(left[:2], None, "or")]
         self.gate(left, output, "or")
 
-    def _chain(self, a: Bits, b: Bits, y: Bits) -> None:
+    def _terms(self, cell: Mapping[str, Any], width: int) -> Iterator[Bits]:
+        signed = cell["parameters"]["A_SIGNED"][-1] == "1"  # as B, if there is one
+        for bits in (cell["connections"][name] for name in "AB" if name in cell["connections"]):
+            if (inner := self._joined.get((*bits,))) is not None:
+                yield from self._terms(inner, width)
+            else:
+                yield [*bits, *[bits[-1] if signed and bits else "0"] * width][:width]
+
+    def _sum(self, terms: list[Bits], y: Bits) -> None:
+        carries = [at for at, term in enumerate(terms) if {*term[1:]} <= {"0"}][: len(terms) - 2]
+        first = [bit for at in carries[:1] for bit in _nets(terms.pop(at))]
+        while len(terms) > 2:
+            triples = [*zip(*terms[:3], strict=True)]
+            terms = [*terms[3:], [self.gate(each) for each in triples], ["0", *map(self.gate, triples[:-1])]]
+        self._chain(terms[0], [*terms, ["0"] * len(y)][1], y, tuple(first))
+
+    def _chain(self, a: Bits, b: Bits, y: Bits, carry: tuple[int, ...] = ()) -> None:
         long = len(a) > self.fabric.short
         if long:
             self.chains.append(len(a))
-            self.ends += _nets([*a, *b])
-        carry: tuple[int, ...] = ()
+            self.ends += _nets([*a, *b, *carry])
         for at, pair in enumerate(zip(a, b, strict=True)):
             inputs = _nets(pair) + carry
             if len(y) == len(a):

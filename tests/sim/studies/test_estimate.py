@@ -64,6 +64,16 @@ def test_sums_are_carry_chains_but_for_short_ones() -> None:
     assert (found.logic.chains, len(found.tables)) == ([8], 0)
 
 
+def test_sums_of_sums_are_one_chain() -> None:
+    """Three summands take a table for each bit and each carry but the last; one of a bit is the first carry."""
+    a, b, c, y, z = ([*range(start, start + 8)] for start in (2, 12, 22, 32, 42))
+    inner = add("$add", a, b, y)
+    for last, tables in ((c, 15), ([22], 0)):
+        found = mapped(ECP5, [inner, add("$sub", y, last, z)], z)
+        assert (found.logic.chains, len(found.tables)) == ([8], tables)
+    assert mapped(ECP5, [inner, add("$add", y, c, z)], [*z, y[0]]).logic.chains == [8, 8]
+
+
 def test_memories_are_blocks_tables_or_constants() -> None:
     constants = mapped(ECP5, [memory(16, 5)], [*range(100, 105)])
     assert (len(constants.tables), len(constants.logic.flip_flops), constants.logic.late) == (5, 5, set())
