@@ -5,45 +5,35 @@ from __future__ import annotations
 import inspect
 import re
 import textwrap
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import zip_longest
 from typing import Any, NamedTuple
 
 from amaranth import Module
 from amaranth.hdl import _ast, _ir
-from amaranth.hdl._nir import (
-    AssignmentList,
-    AsyncReadPort,
-    FlipFlop,
-    Memory,
-    Net,
-    Operator,
-    Part,
-    SyncReadPort,
-    Value,
-)
+from amaranth.hdl import _nir as nir
 from amaranth.lib import wiring
 
-from tachometry.hdl.export.expressions import is_clocked
-from tachometry.hdl.export.names import number, plain, span
+from tachometry.hdl.export.expressions import Body, Scope, merge, number, plain, span
 from tachometry.hdl.export.netlist import Circuit, runs
-from tachometry.hdl.export.processes import Processes, ascii_of, attributes_of
+from tachometry.hdl.export.render import ascii_of, comment
 from tachometry.hdl.wires.commented_memory import CommentedMemory
 from tachometry.spec.language.port import Port
 
 _COLUMNS = 118
-_COMBINATIONAL = (Operator, Part, AssignmentList, AsyncReadPort)
-_BOX = re.compile("\0(\\d+)\0")
+_COMBINATIONAL = (nir.Operator, nir.Part, nir.AssignmentList, nir.AsyncReadPort)
 _SENTENCE = re.compile(r"(?<=[.;])(?<!Sec\.)(?<!eqs\.)(?<!eq\.)(?<!Fig\.)(?<!p\.)\s")
 
 
-@dataclass(frozen=True)
-class Written:
+Path = tuple[str, ...]  # of a module: names of instances, the outermost first
+
+
+class Written(NamedTuple):
     """The text of a core, and the names in it of what has other names in Amaranth."""
 
     text: str
-    names: Mapping[str, str]  # paths of registers and memories, by those that Amaranth gives
+    names: Mapping[str, str]  # paths of signals and memories, by those that Amaranth gives
 
 
 class Link(NamedTuple):
@@ -54,27 +44,17 @@ class Link(NamedTuple):
     value: Any
 
 
-@dataclass
-class Origin:
-    """The component from which a module is."""
-
-    kind: str = ""
-    comment: str = ""
-    members: dict[Any, str] = field(default_factory=lambda: _ast.SignalDict())  # names of its signals
-    ports: Mapping[str, str] = field(default_factory=dict)  # of the top: comments by name, in order
-    words: dict[str, Sequence[str]] = field(default_factory=dict)  # by name of a memory: comments of its words
-
-
-class ModuleWriter(Processes):
+class ModuleWriter(Scope):
     """Writes one module."""
 
-    def __init__(self, circuit: Circuit, index: int, origin: Origin) -> None:
+    def __init__(self, circuit: Circuit, index: int, things: Mapping[Path, Any], comments: Mapping[str, str]) -> None:
         super().__init__(circuit, index)
-        self.origin = origin
-        self.renamed: dict[str, str] = {}  # by names of Amaranth
+        self.things = things
+        self.comments = comments if index == 0 else {}  # of ports
         self.instances: list[tuple[ModuleWriter, str, str]] = []  # with their names in Amaranth, and their own
-        found = self._top_ports() if index == 0 else self._boundary()
-        self.ports = [Link(name if index == 0 else self.unique(name), way, value) for name, way, value in found]
+        links = [*(self._top_ports() if index == 0 else self._boundary())]
+        links.sort(key=lambda link: (link.way, link.name != "clk", link.name != "rst"))
+        self.ports = [Link(name if index == 0 else self.unique(name), way, value) for name, way, value in links]
         self.taken |= {port.name for port in self.ports}
         self.outputs: dict[Any, str] = {}
         for port in self.ports:
@@ -83,204 +63,229 @@ class ModuleWriter(Processes):
             else:
                 self.outputs.setdefault(port.value, port.name)
         self.driven: set[str] = set()  # outputs that are no copies of another
-        self.started: dict[str, tuple[dict[str, Any], str]] = {}  # outputs that are registers: attributes, first level
+        self.registers: dict[str, tuple[str, str]] = {}  # attributes and first level
         self.declared: list[str] = []
 
-    def _top_ports(self) -> list[Link]:
-        top = self.circuit.netlist.top
-        found = {
-            name: Link(name, "input", Value(Net.from_cell(0, first + bit) for bit in range(width)))
-            for name, (first, width) in top.ports_i.items()
-        }
-        found |= {name: Link(name, "output", value) for name, value in top.ports_o.items()}
-        order = [*self.origin.ports, *found]
-        names = sorted(dict.fromkeys(order), key=lambda name: (name != "clk", name != "rst"))
-        links = [found[name] for name in names if name in found]
-        return sorted(links, key=lambda link: link.way)
+    def all_of(self, *kinds: type) -> list[int]:
+        return [cell for cell in self.own if isinstance(self.circuit.cells[cell], kinds)]
 
-    def _boundary(self) -> list[Link]:
-        """Return the ports that the component declares; what is led through has the name of its signal."""
+    def _top_ports(self) -> Iterator[Link]:
+        for name, (first, width) in self.circuit.top.ports_i.items():
+            yield Link(name, "input", nir.Value(nir.Net.from_cell(0, first + bit) for bit in range(width)))
+        yield from (Link(name, "output", value) for name, value in self.circuit.top.ports_o.items())
+
+    def _boundary(self) -> Iterator[Link]:
+        """Yield the ports that the component declares; what is led through has the name of its signal."""
         left = dict(self.circuit.flow[self.index])
-        links: list[tuple[int, Link]] = []
-        for place, name, value in self._fields():
+        members = _members(self.things.get(self.module.name))
+        order = {name: place for place, name in enumerate(members.values())}
+        found = []
+        for signal, name in self.module.signal_names.items():
+            base, place = members.get(signal, name), order.get(members.get(signal), 1 << 16)
+            fields = self.circuit.signal_fields[signal]
+            for path in fields:
+                if not any(longer[: len(path)] == path != longer for longer in fields):
+                    whole = "_".join([base.removesuffix("__payload") if path else base, *map(str, path)])
+                    found.append((place, whole, fields[path].value))
+        found.sort(key=lambda one: (one[0] == 1 << 16, -len(one[2]), "$" in one[1]))
+        links = []
+        for place, name, value in found:
             ways = {left.get(net, "") for net in value}
             if value and len(set(value)) == len(value) and len(ways) == 1 and "" not in ways:
-                cell = self.circuit.source(value[0])
-                own = isinstance(cell, FlipFlop) and cell.module_idx == self.index and value in self.called
-                links.append((place, Link(self.called[value][0] if own else name, ways.pop(), value)))
+                own = value in self.called and value[0].cell in self.all_of(nir.FlipFlop)
+                links.append((place, value, Link(self.called[value][0] if own else name, ways.pop(), value)))
                 for net in value:
                     del left[net]
-        pieces = [(Value(Net(first + bit) for bit in range(count))) for first, count in runs(sorted(left))]
-        for way in ("input", "output"):
-            for piece in pieces:
-                value = Value(net for net in piece if left[net] == way)
-                if value:
-                    links.append((1 << 16, Link(self.near(value) or f"{self.module.name[-1]}_{way}", way, value)))
-        key = lambda one: (one[1].way, one[1].name != "clk", one[1].name != "rst", one[0], one[1].value)  # noqa: E731
-        return [link for _, link in sorted(links, key=key)]
+        yield from (link for *_, link in sorted(links, key=lambda one: one[:2]))
+        for first, count in runs(sorted(left)):
+            for way in ("input", "output"):
+                if value := nir.Value(nir.Net(net) for net in range(first, first + count) if left[net] == way):
+                    yield Link(self.near(value) or f"{self.module.name[-1]}_{way}", way, value)
 
-    def _fields(self) -> list[tuple[int, str, Any]]:
-        """Return names and values of signals and their fields, with the places of declared ones, which come first."""
-        found, members = [], self.origin.members
-        order = {name: place for place, name in enumerate(members.values())}
-        for signal, name in self.module.signal_names.items():
-            inner = {path: one.value for path, one in self.circuit.netlist.signal_fields[signal].items() if path}
-            leaves = [path for path in inner if not any(longer[: len(path)] == path != longer for longer in inner)]
-            base = members.get(signal, name)
-            place = order.get(members.get(signal, ""), 1 << 16)
-            found += [
-                (place, "_".join([base.removesuffix("__payload"), *map(str, path)]), inner[path]) for path in leaves
-            ]
-            found += [(place, base, self.circuit.netlist.signals[signal])] * (not leaves)
-        return sorted(found, key=lambda one: (one[0] == 1 << 16, -len(one[2]), "$" in one[1]))
-
-    def _carrier(self, value: Any, fallback: Callable[[], str]) -> str:
+    def _carrier(self, value: Any, made_up: str = "") -> str:
         """Name a value that this module makes: the output that it is, its signal, or what it is for."""
-        names = self.called.get(value, ())
         if value in self.outputs and value[0] not in self.home:
             name = self.outputs[value]
             self.driven.add(name)
         else:
-            name = self.unique(names[0]) if names else self.unique(fallback(), True)
-        self.renamed |= {old: name for old in names if old not in self.renamed}
+            name = self.unique(self.called[value][0]) if value in self.called else self.unique(made_up, True)
         self.place(name, value)
         return name
 
     def lines(self, instances: Iterable[tuple[ModuleWriter, str]]) -> list[str]:
         """Return the lines of the module behind its name; `instances` have their names in Amaranth."""
-        cells = self.circuit.cells
-        registers = {cell: self._register_name(cell) for cell in self.own if is_clocked(cells[cell])}
+        for cell in self.all_of(nir.FlipFlop, nir.SyncReadPort):
+            self._declare(cell)
         for writer, name in instances:
             self._add_instance(writer, name)
-        self.memories = {cell: self.unique(cells[cell].name) for cell in self.all_of(Memory)}
-        self.renamed |= {cells[cell].name: name for cell, name in self.memories.items()}
-        choices = {cell: self.folded(cell) for cell in registers if isinstance(cells[cell], FlipFlop)}
-        wires = self._wires({choice for choice in choices.values() if choice is not None})
-        clocked = self.clocked(registers, choices)
-        for cell, name in registers.items():
-            self._declare(cell, name)
-        words = self.origin.words
-        memories = [
-            line
-            for cell, name in self.memories.items()
-            for line in self.contents(cells[cell], name, words.get(cells[cell].name, ()))
-        ]
-        boxes = [line for writer, _, own in self.instances for line in self._instance(writer, own)]
+        self.memories = {cell: self.unique(self.circuit.cells[cell].name) for cell in self.all_of(nir.Memory)}
+        choices = {cell: self.folded(cell) for cell in self.all_of(nir.FlipFlop)}
+        wires = [*self._wires({*choices.values()})]
+        clocked = [*map(self._read_or_write, self.all_of(nir.SyncWritePort, nir.SyncReadPort)), *self._clocked(choices)]
         ends = [
             f"assign {port.name} = {self.text(port.value)};"
             for port in self.ports
             if port.way == "output" and port.name not in self.driven
         ]
+        written = {word for lines in (wires, *clocked) for line in lines for word in re.findall(r"[A-Z]\w+", line)}
         constants = [
             f"localparam {span(width)}{name} = {value};"
             for name, (width, value) in self.constants.items()
-            if any(re.search(rf"\b{name}\b", line) for line in (*wires, *clocked))  # not in what was left out
+            if name in written
         ]
-        groups = [[*constants, *self.declared], memories, wires, clocked, boxes, ends]
-        body = [line for group in groups if group for line in ("", *group)][1:]
-        body = [part for line in body for part in _wrapped(f"    {line}" if line else "")]
-        return [*self._port_lines(), ");", *body, "endmodule"]
-
-    def _register_name(self, cell: int) -> str:
-        kind = "data" if isinstance(self.circuit.cells[cell], SyncReadPort) else "state"
-        return self._carrier(self.circuit.whole(cell), lambda: kind)
+        memories = [[*self._contents(cell)] for cell in self.memories]
+        boxes = [[*self._instance(*instance)] for instance in self.instances]
+        blocks = [[*constants, *self.declared], *memories, wires, *clocked, *boxes, ends]
+        body = [f"    {line}" if line else "" for block in blocks if block for line in ("", *block)][1:]
+        return [*self._port_lines(), ");", *(part for line in body for part in _wrapped(line)), "endmodule"]
 
     def _add_instance(self, writer: ModuleWriter, name: str) -> None:
         """Name an instance, and declare what it drives."""
         for port in writer.ports:
             if port.way == "output" and port.value[0] not in self.home:
-                wire = self._carrier(port.value, lambda port=port: f"{name}_{port.name}")  # type: ignore[misc]
+                wire = self._carrier(port.value, f"{name}_{port.name}")
                 if wire not in self.driven:
                     self.declared.append(f"wire {span(len(port.value))}{wire};")
         own = plain(name)
-        own = self.unique(f"{own}_unit" if own in self.taken else own)
-        self.instances.append((writer, name, own))
+        self.instances.append((writer, name, self.unique(f"{own}_unit" if own in self.taken else own)))
 
-    def _instance(self, writer: ModuleWriter, name: str) -> Iterator[str]:
-        """Yield an instance; a blank line is before all but the first."""
-        yield from [""] * (name != self.instances[0][2])
-        yield f"{_box(writer.index)} {name} ("
-        links = [f"    .{port.name}({self.text(port.value)})" for port in writer.ports]
-        yield from (f"{link}," for link in links[:-1])
-        yield from (links[-1], ");")
+    def _instance(self, writer: ModuleWriter, _: str, name: str) -> Iterator[str]:
+        links = [f"    .{port.name}({self.text(port.value)})," for port in writer.ports]
+        yield from (f"\0{writer.index}\0 {name} (", *links[:-1], links[-1].rstrip(","), ");")
 
-    def _wires(self, choices: set[int]) -> list[str]:
-        """Return definitions of what is computed between registers, each before its use."""
-        cells = self.circuit.cells
-        computed = [cell for cell in self.all_of(*_COMBINATIONAL) if cell not in choices]
-        for cell in computed:
-            if self.circuit.whole(cell) not in self.outputs and self.is_inline(cell):
-                self.inline[cell] = None
-        named = [cell for cell in computed if cell not in self.inline]
-        has_name = {
-            cell: self.circuit.whole(cell) in self.called or self.circuit.whole(cell) in self.outputs for cell in named
-        }
-        for cell in sorted(named, key=lambda cell: (not has_name[cell], cell)):
-            self._carrier(self.circuit.whole(cell), lambda cell=cell: self.meaning(cell))  # type: ignore[misc]
-        done: set[int] = set()
-        lines: list[str] = []
+    def _wires(self, choices: set[int | None]) -> Iterator[str]:
+        """Yield definitions of what is computed between registers, each before its use."""
+        cells, whole = self.circuit.cells, self.circuit.whole
+        left = dict.fromkeys(cell for cell in self.all_of(*_COMBINATIONAL) if cell not in choices)
+        known = {cell for cell in left if whole[cell] in self.called or whole[cell] in self.outputs}
+        self.inline = {cell for cell in left if cell not in known and self.is_inline(cell)}
+        named = [cell for cell in left if cell not in self.inline]
+        for cell in sorted(named, key=lambda cell: cell not in known):
+            self._carrier(whole[cell], "" if cell in known else self.meaning(cell))
 
-        def define(cell: int) -> None:
-            done.add(cell)
-            for net in (net for value in self.circuit.inputs(cells[cell]) for net in value if net.is_cell):
-                if net.cell not in done and net.cell in computed_set:
-                    define(net.cell)
-            if cell not in self.inline:
-                lines.extend(self._definition(cell))
+        def define(number_: int) -> Iterator[str]:
+            if number_ not in left:
+                return
+            del left[number_]
+            cell = cells[number_]
+            for net in (net for value in self.circuit.inputs(cell) for net in value if net.is_cell):
+                yield from define(net.cell)
+            if number_ not in self.inline:
+                name = self.home[whole[number_][0]][0]
+                above, text = self.indexed(cell, name) if isinstance(cell, nir.Part) else ([], self.made(number_))
+                start = f"assign {name}" if name in self.driven else f"wire {span(len(whole[number_]))}{name}"
+                yield from (*above, f"{start} = {text};")
 
-        computed_set = set(computed)
         for cell in named:
-            if cell not in done:
-                define(cell)
-        return lines
+            yield from define(cell)
 
-    def _definition(self, number_: int) -> list[str]:
-        cell, width = self.circuit.cells[number_], self.circuit.width[number_]
-        name = self.home[self.circuit.whole(number_)[0]][0]
-        above, text = self.indexed(cell, name) if isinstance(cell, Part) else ([], self.made(number_))
-        start = f"assign {name}" if name in self.driven else f"wire {span(width)}{name}"
-        return [*above, f"{start} = {text};"]
-
-    def _declare(self, number_: int, name: str) -> None:
-        """Declare a register, here or among the ports."""
-        cell, whole = self.circuit.cells[number_], self.circuit.whole(number_)
-        is_register = isinstance(cell, FlipFlop)
-        attributes = {**(cell.attributes if is_register else {}), **self.attributes[whole]}
-        level = f" = {number(Value.from_const(cell.init, len(whole)))}" if is_register else ""
-        if name in self.driven:
-            self.started[name] = attributes, level
-        else:
-            self.declared.append(f"{attributes_of(attributes)}reg {span(len(whole))}{name}{level};")
+    def _declare(self, cell_number: int) -> None:
+        """Name a register, and declare it here unless it is among the ports."""
+        cell, whole = self.circuit.cells[cell_number], self.circuit.whole[cell_number]
+        name = self._carrier(whole, "state")
+        attributes, level = self.attributes[whole], ""
+        if isinstance(cell, nir.FlipFlop):
+            attributes = cell.attributes | attributes
+            level = f" = {number(nir.Value.from_const(cell.init, len(whole)))}"
+        self.registers[name] = _attributes(attributes), level
+        if name not in self.driven:
+            self.declared.append(f"{_attributes(attributes)}reg {span(len(whole))}{name}{level};")
 
     def _port_lines(self) -> Iterator[str]:
-        for place, port in enumerate(self.ports):
-            attributes, level = self.started.get(port.name, ({}, ""))
-            attributes = attributes or (self.attributes[port.value] if port.way == "input" or self.index == 0 else {})
-            kind = "reg " if port.name in self.started else "wire"
-            yield from _commented(self.origin.ports.get(port.name, ""), "    ")
-            if attributes:
-                yield f"    {attributes_of(attributes)}".rstrip()
-            comma = "," if place + 1 < len(self.ports) else ""
+        for port in self.ports:
+            own = self.attributes[port.value] if port.way == "input" or self.index == 0 else {}
+            attributes, level = self.registers.get(port.name, ("", ""))
+            kind = "reg " if port.name in self.registers else "wire"
+            yield from comment(self.comments.get(port.name, ""), "    //").splitlines()
+            yield from (f"    {text}".rstrip() for text in [attributes or _attributes(own)] if text)
+            comma = "," if port is not self.ports[-1] else ""
             yield f"    {port.way:6} {kind} {span(len(port.value)):8}{port.name}{level}{comma}"
 
+    def _clocked(self, choices: Mapping[int, int | None]) -> Iterator[list[str]]:
+        """Yield processes: of the registers with the reset, and of those without."""
+        groups: dict[Any, tuple[list[str], Body]] = defaultdict(lambda: ([], []))
+        for number_, choice in choices.items():
+            cell, whole = self.circuit.cells[number_], self.circuit.whole[number_]
+            level = nir.Value.from_const(cell.init, len(whole))
+            body: Body = [("=", 0, cell.data)]
+            reset = None
+            if choice is not None:
+                default = self.circuit.cells[choice].default
+                body = [*[("=", 0, default)] * (default != whole), *self.tree(self.circuit.cells[choice])]
+                match body[-1]:
+                    case ("if", int(test), [[("=", 0, value)]]) if value == level and self._is_reset(test):
+                        reset, body = test, body[:-1]
+            resets, merged = groups[self._edge(cell), reset]
+            name = self.home[whole[0]][0]
+            resets.append(f"        {name} <= {number(level)};")
+            merge(merged, body, (name, len(whole)))
+        for (edge, reset), (resets, body) in groups.items():
+            if reset is None:
+                yield [edge, *self.statements(body, 1), "end"]
+            else:
+                rest = self.statements(body, 2)
+                yield [edge, "    if (rst) begin", *resets, "    end else begin", *rest, "    end", "end"]
 
-def _commented(text: str, pad: str = "") -> list[str]:
-    return textwrap.wrap(text, 110, initial_indent=f"{pad}// ", subsequent_indent=f"{pad}// ")
+    def _is_reset(self, test: int) -> bool:
+        """Return whether a test is for the input rst alone."""
+        return [self.condition(patterns) for patterns, _ in self.cases(test, [[]])] == ["rst"]
+
+    def _edge(self, cell: Any) -> str:
+        return f"always @({cell.clk_edge}edge {self.text(nir.Value(cell.clk))}) begin"
+
+    def _read_or_write(self, cell_number: int) -> list[str]:
+        """Return the process of a port of a memory."""
+        cell = self.circuit.cells[cell_number]
+        word = f"{self.memories[cell.memory]}[{self.text(cell.addr)}]"
+        if isinstance(cell, nir.SyncReadPort):
+            enable, statement = cell.en, f"{self.home[self.circuit.whole[cell_number][0]][0]} <= {word};"
+        else:
+            enable, statement = cell.en[0], f"{word} <= {self.text(cell.data)};"
+        test = "" if enable == 1 else f"if ({self.text(nir.Value(enable))}) "
+        return [self._edge(cell), f"    {test}{statement}", "end"]
+
+    def _contents(self, cell_number: int) -> Iterator[str]:
+        """Yield the declaration of a memory, and the words that it begins with."""
+        memory, name = self.circuit.cells[cell_number], self.memories[cell_number]
+        yield f"{_attributes(memory.attributes)}reg {span(memory.width)}{name} [0:{memory.depth - 1}];"
+        if not any(memory.init):
+            at = self.unique(f"{name}_at", True)
+            loop = f"for ({at} = 0; {at} < {memory.depth}; {at} = {at} + 1)"
+            yield from (f"integer {at};", f"initial {loop} {name}[{at}] = {memory.width}'d0;")
+            return
+        yield "// FPGAs load these words with the bitstream; a tool that ignores `initial` needs a ROM of them here."
+        yield "initial begin"
+        thing = self.things.get((*self.module.name, memory.name))
+        comments = thing.comments if isinstance(thing, CommentedMemory) else ()
+        for place, (word, text) in enumerate(zip_longest(memory.init, comments, fillvalue="")):
+            value = f"{word & ((1 << memory.width) - 1):0{-(-memory.width // 4)}x}"
+            yield f"    {name}[{place}] = {memory.width}'h{value};{text and f'  // {ascii_of(text)}'}"
+        yield "end"
+
+    def paths(self) -> Iterator[tuple[str, str]]:
+        """Yield the paths of signals and memories as Amaranth names them, with their paths in the text."""
+        for value, names in self.called.items():
+            if self.home.get(value[-1], ("", 0, 0))[1:] == (len(value) - 1, len(value)):
+                yield from ((name, self.home[value[0]][0]) for name in names)
+        yield from ((self.circuit.cells[cell].name, name) for cell, name in self.memories.items())
+        for inner, name, own in self.instances:
+            yield from ((f"{name}.{old}", f"{own}.{new}") for old, new in inner.paths())
+
+
+def _attributes(attributes: Mapping[str, Any]) -> str:
+    """Return attributes as they stand before a declaration."""
+    texts = {key: value if isinstance(value, int) else f'"{value}"' for key, value in attributes.items()}
+    return "".join(f"(* {key} = {text} *) " for key, text in texts.items())
 
 
 def _wrapped(line: str) -> list[str]:
-    """Break a long line behind an operator, a colon or a comma."""
-    pad = " " * (len(line) - len(line.lstrip()) + 4)
-    least = len(pad) + 20
+    """Break a long line, but no comment, and not before a comparison."""
     if len(line) <= _COLUMNS or "//" in line:
         return [line]
-    cut = max(line.rfind(mark, least, _COLUMNS) + len(mark) - 1 for mark in (" : ", " | ", " & ", ", ", " ^ ", " + "))
-    return [line] if cut <= least else [line[:cut].rstrip(), *_wrapped(pad + line[cut:].lstrip())]
-
-
-def _box(index: int) -> str:
-    """Return what stands for the name of a module until all modules are written."""
-    return f"\0{index}\0"
+    pad = " " * (len(line) - len(line.lstrip()) + 4)
+    bound = re.sub(r" ([=!<>?]=?) ", "~~\\1 ", re.sub(r" ([=!<>]=) ", "~~\\1~~", line))
+    made = textwrap.wrap(bound, _COLUMNS, subsequent_indent=pad, break_long_words=False, break_on_hyphens=False)
+    return [part.replace("~~", " ") for part in made]
 
 
 def _sentence(text: str) -> str:
@@ -296,22 +301,17 @@ def _comment(port: Port) -> str:
     return _sentence(port.help).rstrip(".") + ascii_of(unit) + strobe
 
 
-def _origin(thing: Any) -> Origin:
-    """Return what the component of a module says of it: its first sentence, and names of its signals."""
-    if thing is None:
-        return Origin()
-    kind = re.sub(r"(?<!^)(?=[A-Z])", "_", type(thing).__name__).lower()
-    doc = "" if type(thing).__module__.startswith("amaranth") else inspect.getdoc(type(thing)) or ""
-    origin = Origin(kind, _sentence(doc))
+def _members(thing: Any) -> Any:
+    """Return the names that a component has for its signals."""
+    found = _ast.SignalDict()
+    members = {} if thing is None else vars(thing)
     if isinstance(thing, wiring.Component):
         members = {"__".join(map(str, path)): value for path, _, value in thing.signature.flatten(thing)}
-    else:
-        members = {name: value for name, value in vars(thing).items() if not name.startswith("_")}
     for name, member in members.items():
         value = member.as_value() if isinstance(member, _ast.ValueCastable) else member
-        if isinstance(value, _ast.Signal):
-            origin.members[value] = name
-    return origin
+        if isinstance(value, _ast.Signal) and not name.startswith("_"):
+            found[value] = name
+    return found
 
 
 def write(top: wiring.Component, name: str, ports: Iterable[Port] = ()) -> Written:
@@ -323,66 +323,47 @@ def write(top: wiring.Component, name: str, ports: Iterable[Port] = ()) -> Writt
         If there is an unknown kind of cell, or an instance of a foreign module.
     """
     ways = {wiring.In: _ir.PortDirection.Input, wiring.Out: _ir.PortDirection.Output}
+    comments = {port.name: _comment(port) for port in ports}
     members = {
         "__".join(map(str, path)): (_ast.Value.cast(value), ways[member.flow])
         for path, member, value in top.signature.flatten(top)
     }
-    design = _ir.Fragment.get(top, None).prepare(ports=members, hierarchy=(name,))
+    ordered = {port: members[port] for port in (*comments, *members) if port in members}
+    design = _ir.Fragment.get(top, None).prepare(ports=ordered, hierarchy=(name,))
     things = {
         design.fragments[fragment].name: thing
         for thing, fragment in design.elaboratables.items()
         if not isinstance(thing, Module)  # of which components are made
     }
-    circuit = Circuit(design)
-    origins = {module.name: _origin(things.get(module.name)) for module in circuit.modules}
-    origins[name,].ports = {port.name: _comment(port) for port in ports}
-    for path, thing in things.items():
-        if isinstance(thing, CommentedMemory):
-            origins[path[:-1]].words[path[-1]] = thing.comments
-    return _joined(circuit, origins)
+    return _joined(Circuit(design), things, comments)
 
 
-def _joined(circuit: Circuit, origins: Mapping[tuple[str, ...], Origin]) -> Written:
+def _joined(circuit: Circuit, things: Mapping[Path, Any], comments: Mapping[str, str]) -> Written:
     """Return the modules as one text, equal ones once."""
     writers: dict[int, ModuleWriter] = {}
     first: dict[tuple[str, ...], int] = {}  # by its text: the module that has it
-    same: dict[int, int] = {}
+    same = Counter[int]()
     for index in reversed(range(len(circuit.modules))):
         module = circuit.modules[index]
         inner = [one for one in module.submodules if one in writers]
-        if not inner and not any(cell in circuit.live for cell in module.cells if cell):
-            continue
-        writer = writers[index] = ModuleWriter(circuit, index, origins[module.name])
-        lines = writer.lines([(writers[one], circuit.modules[one].name[-1]) for one in inner])
-        same[index] = first.setdefault(
-            tuple(_BOX.sub(lambda box: _box(same[int(box[1])]), line) for line in lines), index
-        )
-    names = _module_names(circuit, origins, same)
-    text = [
-        _BOX.sub(lambda box: names[int(box[1])], line)
-        for lines, index in sorted(first.items(), key=lambda one: one[1])
-        for line in (*_commented(origins[circuit.modules[index].name].comment), f"module {names[index]} (", *lines, "")
-    ]
-    return Written("\n".join(text), dict(_paths(writers[0])))
-
-
-def _module_names(
-    circuit: Circuit, origins: Mapping[tuple[str, ...], Origin], same: Mapping[int, int]
-) -> dict[int, str]:
-    """Return the name of each module that is written: its path, or, of what has several, the top and its class."""
-    shared, names = Counter(same.values()), dict[int, str]()
-    for index in sorted(shared):
+        if inner or any(cell in circuit.live for cell in module.cells if cell):
+            writer = writers[index] = ModuleWriter(circuit, index, things, comments)
+            lines = writer.lines([(writers[one], circuit.modules[one].name[-1]) for one in inner])
+            writer.index = first.setdefault(tuple(lines), index)
+            same[writer.index] += 1
+    text, names = list[str](), dict[str, int]()
+    for body, index in sorted(first.items(), key=lambda one: one[1]):
         path = circuit.modules[index].name
-        kind = origins[path].kind if shared[index] > 1 else ""
-        name = plain("_".join([path[0], kind] if kind else path))
-        while name in names.values():
+        kind = type(things.get(path))
+        shared = same[index] > 1 and path in things
+        snake = re.sub(r"(?<!^)(?=[A-Z])", "_", kind.__name__).lower()
+        name = plain(f"{path[0]}_{snake}" if shared else "_".join(path))
+        while name in names:
             name += "_"
-        names[index] = name
-    return names
-
-
-def _paths(writer: ModuleWriter) -> Iterator[tuple[str, str]]:
-    """Yield the paths of registers and memories as Amaranth names them, with their paths in the text."""
-    yield from writer.renamed.items()
-    for inner, name, own in writer.instances:
-        yield from ((f"{name}.{old}", f"{own}.{new}") for old, new in _paths(inner))
+        names[name] = index
+        doc = "" if kind.__module__.startswith(("amaranth", "builtins")) else _sentence(inspect.getdoc(kind) or "")
+        text += [*comment(doc).splitlines(), f"module {name} (", *body, ""]
+    whole = "\n".join(text)
+    for name, index in names.items():
+        whole = whole.replace(f"\0{index}\0", name)
+    return Written(whole, dict(writers[0].paths()))

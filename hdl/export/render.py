@@ -20,7 +20,8 @@ def render_files(templates: Iterable[str], name: str, **holes: object) -> dict[s
     return {file.replace("NAME", name): render(file, name=name, **holes) for file in templates}
 
 
-def _comment(text: str, mark: str = "//") -> str:
+def comment(text: str, mark: str = "//") -> str:
+    """Return a text as lines of a comment."""
     return "\n".join(f"{mark} {line}" for line in textwrap.wrap(text, 110, break_on_hyphens=False))
 
 
@@ -34,12 +35,13 @@ def _shape(port: Port) -> str:
     return "signed " * port.signed + f"[{port.width - 1}:0] " * (port.width > 1)
 
 
-_IN_ASCII = {ord(letter): plain for letter, plain in {"²": "^2", "·": "*", "π": "pi"}.items()}
+_PLAIN = "<- floor( ) - <= >= * ^2 x .. - pi -> +- u u sqrt inf".split()
+_ASCII = {ord(letter): plain for letter, plain in zip("←⌊⌋−≤≥·²×…–π→±μµ√∞", _PLAIN, strict=True)}
 
 
-def _ascii(text: str) -> str:
-    """Return a text in the letters that every reader of VHDL takes."""
-    return text.translate(_IN_ASCII)
+def ascii_of(text: str) -> str:
+    """Return a text in the letters that every reader of Verilog and VHDL takes."""
+    return text.translate(_ASCII).encode("ascii", "replace").decode()
 
 
 def _vhdl_name(name: str) -> str:
@@ -65,8 +67,8 @@ _TEMPLATES = Environment(
 )
 _TEMPLATES.globals |= {"notice": lambda mark: notice(mark).rstrip("\n"), "version": version}
 _TEMPLATES.filters |= {
-    "ascii": _ascii,
-    "comment": _comment,
+    "ascii": ascii_of,
+    "comment": comment,
     "literal": _literal,
     "shape": _shape,
     "vhdl_name": _vhdl_name,
