@@ -43,13 +43,13 @@ class Circuit(nir.Netlist):
         self.__dict__ |= vars(_ir.build_netlist(design))
         for cell in self.cells:
             self._check(cell)
+        self.whole = {cell: nir.Value(sorted(made.output_nets(cell))) for cell, made in enumerate(self.cells)}
         self.connections: dict[Any, Any] = {}  # nets, by those in whose place they are read
         while self._simplify():
             self.resolve_all_nets()
         while self._trim():
             pass
         self.live = self._live()
-        self.whole = {cell: _nets(self.cells[cell], cell) for cell in self.live}
         self.reads: dict[int, list[tuple[int, int, int]]] = defaultdict(list)  # by cell: reader, first bit, length
         self.flow: list[dict[Any, str]] = [{} for _ in self.modules]  # nets that cross the boundary of a module
         self._follow()
@@ -125,13 +125,12 @@ class Circuit(nir.Netlist):
         """Find wires for cells that only lead bits on, and for all but one of equal ones of a module."""
         before, first = len(self.connections), dict[Any, int]()
         for number, cell in enumerate(self.cells):
-            whole = _nets(cell, number)
+            whole = self.whole[number]
             if not whole or whole[0] in self.connections:
                 continue
             value, key = _led(cell), _key(cell)
             if value is None and key:
-                one = first.setdefault((cell.module_idx, *key), number)
-                value = _nets(self.cells[one], one)
+                value = self.whole[first.setdefault((cell.module_idx, *key), number)]
             self.connections |= {bit: net for bit, net in zip(whole, value or (), strict=False) if bit != net}
         return len(self.connections) > before
 
@@ -144,16 +143,19 @@ class Circuit(nir.Netlist):
         changed = False
         for number, width in used.items():
             cell = self.cells[number]
-            if isinstance(cell, nir.Operator) and cell.operator in _LOW and width < cell.width:
+            if width == len(self.whole[number]):
+                continue
+            if isinstance(cell, nir.Operator) and cell.operator in _LOW:
                 keep = {"m": (1, width, width), "<<": (width, 1 << 16)}.get(cell.operator, (width, width))
                 cell.inputs = tuple(value[:most] for value, most in zip(cell.inputs, keep, strict=False))
-                changed = True
-            elif isinstance(cell, nir.AssignmentList) and width < len(cell.default):
+            elif isinstance(cell, nir.AssignmentList):
                 cell.default = cell.default[:width]
                 cell.assignments = tuple(each for each in cell.assignments if each.start < width)
                 for each in cell.assignments:
                     each.value = each.value[: width - each.start]
-                changed = True
+            else:
+                continue
+            self.whole[number], changed = self.whole[number][:width], True
         return changed
 
     def _live(self) -> set[int]:
@@ -191,11 +193,6 @@ class Circuit(nir.Netlist):
             else:
                 self.flow[to].setdefault(net, "input")
                 to = self.modules[to].parent
-
-
-def _nets(cell: Any, number: int) -> Any:
-    """Return the nets that a cell makes, the lowest first."""
-    return nir.Value(sorted(cell.output_nets(number)))
 
 
 def _key(cell: Any) -> tuple[Any, ...]:
