@@ -159,16 +159,9 @@ class Scope:
         return f"{test} ? {yes} : {no}"
 
     def _unary(self, operator: str, a: Any) -> str:
-        if operator in ("b", "r|"):
-            return self._binary("!=", a, nir.Value.zeros(len(a)))
         inner = self.circuit.source(a[0]) if a[0].is_cell and a[0].cell in self.inline else None
-        if operator == "~" and len(a) == 1 and isinstance(inner, nir.Operator):
-            if inner.operator in _OPPOSITE:
-                return self._binary(_OPPOSITE[inner.operator], *inner.inputs)
-            if inner.operator in ("b", "r|"):
-                return self._binary("==", inner.inputs[0], nir.Value.zeros(len(inner.inputs[0])))
-            if inner.operator == "~":
-                return self.text(inner.inputs[0])
+        if operator == "~" and len(a) == 1 and isinstance(inner, nir.Operator) and inner.operator in _OPPOSITE:
+            return self._binary(_OPPOSITE[inner.operator], *inner.inputs)
         return f"{operator.removeprefix('r')}{operand(self.text(a))}"
 
     def _binary(self, operator: str, a: Any, b: Any) -> str:
@@ -341,7 +334,8 @@ class Scope:
             texts = [
                 self.literal(cell.inputs[0], value) if value.is_const else self.text(value) for value in cell.inputs
             ]
-            made = plain(f"_{_WORDS[operator]}_".join(re.sub(r"^\d+'[bdh]", "", text) for text in texts).lower())
+            bare = (plain(re.sub(r"^\d+'[bdh]", "", text)).strip("_").lower() for text in texts)
+            made = f"_{_WORDS[operator]}_".join(bare)
             if len(made) <= _LONGEST_NAME and made[0].isalpha():
                 return made
         kind = "next" if isinstance(cell, nir.AssignmentList) else _KINDS.get(operator, "")

@@ -24,8 +24,6 @@ from tachometry.spec.language.port import Port
 _COLUMNS = 118
 _COMBINATIONAL = (nir.Operator, nir.Part, nir.AssignmentList, nir.AsyncReadPort)
 _SENTENCE = re.compile(r"(?<=[.;])(?<!Sec\.)(?<!eqs\.)(?<!eq\.)(?<!Fig\.)(?<!p\.)\s")
-
-
 Path = tuple[str, ...]  # of a module: names of instances, the outermost first
 
 
@@ -213,8 +211,9 @@ class ModuleWriter(Scope):
                 default = self.circuit.cells[choice].default
                 body = [*[("=", 0, default)] * (default != whole), *self.tree(self.circuit.cells[choice])]
                 match body[-1]:
-                    case ("if", int(test), [[("=", 0, value)]]) if value == level and self._is_reset(test):
-                        reset, body = test, body[:-1]
+                    case ("if", int(test), [[("=", 0, value)]]) if value == level:
+                        tests = [self.condition(patterns) for patterns, _ in self.cases(test, [[]])]
+                        reset, body = (test, body[:-1]) if tests == ["rst"] else (None, body)
             resets, merged = groups[self._edge(cell), reset]
             name = self.home[whole[0]][0]
             resets.append(f"        {name} <= {number(level)};")
@@ -225,10 +224,6 @@ class ModuleWriter(Scope):
             else:
                 rest = self.statements(body, 2)
                 yield [edge, "    if (rst) begin", *resets, "    end else begin", *rest, "    end", "end"]
-
-    def _is_reset(self, test: int) -> bool:
-        """Return whether a test is for the input rst alone."""
-        return [self.condition(patterns) for patterns, _ in self.cases(test, [[]])] == ["rst"]
 
     def _edge(self, cell: Any) -> str:
         return f"always @({cell.clk_edge}edge {self.text(nir.Value(cell.clk))}) begin"

@@ -128,6 +128,11 @@ class Circuit(nir.Netlist):
             whole = self.whole[number]
             if not whole or whole[0] in self.connections:
                 continue
+            match isinstance(cell, nir.Operator) and (cell.operator, *cell.inputs):
+                case "b" | "r|", a:
+                    cell.operator, cell.inputs = "!=", (a, nir.Value.zeros(len(a)))
+                case "m", test, (0,), (1,):
+                    cell.operator, cell.inputs = "~", (test,)
             value, key = _led(cell), _key(cell)
             if value is None and key:
                 value = self.whole[first.setdefault((cell.module_idx, *key), number)]
@@ -218,12 +223,14 @@ def _led(cell: Any) -> Iterable[Any] | None:
         return None
     zero = nir.Net.from_const(0)
     match cell.operator, *cell.inputs:
+        case "m", test, (1,), (0,):
+            return test
         case "m", test, yes, no if test.is_const or yes == no:
             return yes if test[0] == 1 else no
-        case "b" | "r|" | "r&" | "r^", a if len(a) == 1:
+        case "r&" | "r^", a if len(a) == 1:
             return a
-        case "b" | "r|" | "r^", a if not any(a):  # of zeros, or of nothing
-            return [zero]
+        case "!=", a, b if len(a) == 1 and not any(b):
+            return a
         case "~", a if a.is_const:
             return nir.Value.from_const(~number_of(a), len(a))
         case "==" | "!=" as operator, a, b if a == b:
