@@ -160,8 +160,11 @@ class Scope:
 
     def _unary(self, operator: str, a: Any) -> str:
         inner = self.circuit.source(a[0]) if a[0].is_cell and a[0].cell in self.inline else None
-        if operator == "~" and len(a) == 1 and isinstance(inner, nir.Operator) and inner.operator in _OPPOSITE:
-            return self._binary(_OPPOSITE[inner.operator], *inner.inputs)
+        if operator == "~" and isinstance(inner, nir.Operator) and a == self.circuit.whole[a[0].cell]:
+            if inner.operator in _OPPOSITE:
+                return self._binary(_OPPOSITE[inner.operator], *inner.inputs)
+            if inner.operator == "~":
+                return self.text(inner.inputs[0])
         return f"{operator.removeprefix('r')}{operand(self.text(a))}"
 
     def _binary(self, operator: str, a: Any, b: Any) -> str:

