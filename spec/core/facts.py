@@ -14,7 +14,7 @@ class Facts:
     summary: str  # what it does, for --help: it stands behind the name
     update_by: str  # what makes its updates
     interval: str  # what the output of this name is
-    forced: str = "No count or alteration caused this update: the maximum time passed, or the velocity decayed."
+    forced: str = "No count caused this update: the maximum time passed, or the velocity decayed."
     own_ticks: bool = False  # whether it ends the ticks itself, by what it counts
     bounds: bool = True  # whether its windows can have bounds
     last_at_rest: bool = False  # whether the 0 that the maximum time forces is the last update before the next count

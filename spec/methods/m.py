@@ -96,6 +96,7 @@ class MTachometer(TachometerSpec):
         summary="counts the pulses of one tick, or of several",
         update_by="tick",
         interval="the number of averaged ticks",
+        forced="Never high: every tick has its update.",
     )
 
     @cached_property

@@ -143,6 +143,7 @@ class STachometer(TachometerSpec):
         summary="averages in step with the alterations of the pulse number",
         update_by="alteration",
         interval="m_s in ticks",
+        forced="No alteration closed this window: the maximum time passed.",
         pairs_all=True,
     )
 
