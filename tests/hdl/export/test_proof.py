@@ -11,9 +11,14 @@ from support.compiled import lint
 from support.nightly import nightly, only
 
 from tachometry.hdl.export.files import both_texts
+from tachometry.hdl.export.modules import write
+from tachometry.sim import build
+from tachometry.sim.encoder.stress import stress
+from tachometry.sim.engines import cxxrtl
+from tachometry.sim.studies.lockstep import lockstep
 from tachometry.sim.studies.pairs import AXES, WHEELS, configurations, core_of
 from tachometry.sim.testbench.proof import differences
-from tachometry.spec import METHODS, of_options
+from tachometry.spec import METHODS, TachometerSpec, of_options
 from tachometry.spec.control import AnySpec
 from tachometry.spec.registers.buses import bus_of
 
@@ -66,6 +71,23 @@ def test_the_exported_text_is_the_circuit(kind: str, tmp_path: Path) -> None:
     done = subprocess.run(icarus, cwd=tmp_path, capture_output=True, text=True)
     assert done.stdout + done.stderr == ""
     assert differences(gold, text, "core", names, YOSYS) == []
+
+
+@pytest.mark.parametrize("method", only(["s"], METHODS))
+def test_the_exported_text_is_right_in_cxxrtl(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`tests/test_matrix.py` has the same in Verilator, and `tests/test_random_cores.py` in Icarus."""
+
+    def translate(text: str) -> str:
+        script = f"read_verilog <<text\n{text}\ntext\nhierarchy -top top\nproc\nflatten\nwrite_cxxrtl -g0\n"
+        return build.run([YOSYS, "-q", "-"], "Yosys", text=script)
+
+    monkeypatch.setattr(cxxrtl.rtlil, "convert", lambda top, **_: write(top, "top").text)
+    monkeypatch.setattr(cxxrtl, "translate", translate)
+    spec = core_of(configurations(method)[0])
+    assert isinstance(spec, TachometerSpec)
+    found = lockstep(spec, stress(spec, 1, 200), cxxrtl.Cxxrtl(every_clock=True))
+    assert found.n_mismatches == 0, found.first
+    assert len(found.actual.updates.clock) > 50
 
 
 @nightly
