@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from amaranth.back import rtlil
 from support.compiled import lint
 from support.nightly import nightly, only
 
@@ -81,7 +82,7 @@ def test_the_exported_text_is_right_in_cxxrtl(method: str, monkeypatch: pytest.M
         script = f"read_verilog <<text\n{text}\ntext\nhierarchy -top top\nproc\nflatten\nwrite_cxxrtl -g0\n"
         return build.run([YOSYS, "-q", "-"], "Yosys", text=script)
 
-    monkeypatch.setattr(cxxrtl.rtlil, "convert", lambda top, **_: write(top, "top").text)
+    monkeypatch.setattr(rtlil, "convert", lambda top, **_: write(top, "top").text)
     monkeypatch.setattr(cxxrtl, "translate", translate)
     spec = core_of(configurations(method)[0])
     assert isinstance(spec, TachometerSpec)
