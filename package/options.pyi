@@ -20,6 +20,8 @@ class CoreOptions(TypedDict, total=False):
     differential: Value | None
     dt: Value | None
     edge_error: Value | None
+    electrical: Value | None
+    electrical_offset: Value | None
     estimate: Value | None
     external_tick: bool | None
     filter: Value | None
@@ -36,6 +38,7 @@ class CoreOptions(TypedDict, total=False):
     invert: Value | None
     kp: Value | None
     kv: Value | None
+    lead: Value | None
     lines: Value | None
     loop: bool | None
     loop_multiplier: Value | None

@@ -281,7 +281,8 @@ class Tachometer(wiring.Component):
         `level_a`, `ready` and `step` are of the decoder; `level_NAME` and `ready_NAME` of an asynchronous input, a bit
         for each line; `equal_a` says that a line equals its complement; `preset_rises` sets the position, and `moves`
         is high when anything but a step changes it; `next_position` is `position` of the next clock;
-        `native_velocity` and others are of an update as the method makes it.
+        `native_velocity` and others are of an update as the method makes it; `index_rises` is a clock before
+        `index_valid`.
         """
         decoder, box, counter, updates = self.decoder, self.conditioner, self.position_counter, self.datapath.updates
         moves = counter.clear if self._spec.preset is None else counter.clear | counter.load
@@ -290,6 +291,8 @@ class Tachometer(wiring.Component):
         taps |= {
             name: getattr(decoder, name) for name in decoder.signature.members if name[:5] in ("level", "ready", "step")
         }
+        if self.index_capture is not None:
+            taps["index_rises"] = self.index_capture.rises
         taps |= {f"{name}_rises": control.rises for name, control in self.controls.items()}
         for pin in self._spec.front_end.pins:
             name = pin.port.name

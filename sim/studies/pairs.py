@@ -34,7 +34,7 @@ def factors(method: str) -> dict[str, tuple[str, ...]]:
 
     Values in words depend on the rest: `most - 20` fraction bits, 20 less than there can be; `needed - 2` bits of the
     velocity, two less than it can need, if no speed must fit; `some counts per tick`, about the speed of the motions;
-    the `longest` minimum time. The maximum time is in ticks. An option that needs a flag is a value of that: `yes
+    the `longest` minimum time. The maximum time is in ticks. An option that needs another is a value of that: `yes
     index-reset`, `yes edge-error 0.3`.
     """
     every = spec_class(method).facts.pairs_all
@@ -45,9 +45,10 @@ def factors(method: str) -> dict[str, tuple[str, ...]]:
     for name in [name for name in found if known[name].needs]:
         values = found.pop(name)
         if known[name].needs in found and values:
-            more = [f"yes {name}"] if known[name].flag else [f"yes {name} {value}" for value in values]
-            # Where there are to be few values, the flag comes with the other option only.
             flag = known[name].needs
+            asked = "yes" if known[flag].flag else next(value for value in known[flag].tested if value)
+            more = [f"{asked} {name}"] if known[name].flag else [f"{asked} {name} {value}" for value in values]
+            # Where there are to be few values, the flag comes with the other option only.
             found[flag] = (*(value for value in found[flag] if every or value != "yes"), *more)
     possible = {
         name: tuple(value for value in values if _possible(method, {name: value})) for name, values in found.items()
@@ -172,9 +173,10 @@ def _texts(method: str, row: Texts) -> Texts:
     """Return the options of a row, with numbers where it says what is special about them."""
     texts = {"ppr": str(_PPR), "clock": str(_CLOCK_HZ)}
     for name, value in row.items():
-        if value.startswith("yes "):
-            other, _, given = value.removeprefix("yes ").partition(" ")
-            texts |= {name: "yes", other: given or "yes"}
+        first, _, more = value.partition(" ")
+        other, _, given = more.partition(" ")
+        if other in _known(method):
+            texts |= {name: first, other: given or "yes"}
         elif value:
             texts[name] = value
     cycles, decoding = int(texts.get("tick", "960")), int(texts.get("decoding", "4"))

@@ -7,6 +7,7 @@ until the next update.
 """
 
 from dataclasses import dataclass
+from fractions import Fraction
 
 from tachometry.spec.formats.velocity_output import VelocityOutput
 
@@ -25,6 +26,7 @@ class Carrying:
     more_bits: int
     # clocks from the end of a tick at the pins to the velocity per clock of its update, and three to use the place
     late: int
+    slope: Fraction  # LSB of the acceleration, in counts per clock²
 
     @property
     def adds(self) -> int:

@@ -229,7 +229,7 @@ def read_options(
     for about in options_of(spec):
         if about.name not in texts:
             continue
-        if about.needs and not parse_flag(about.needs, texts.get(about.needs, "no")):
+        if about.needs and texts.get(about.needs, "no").strip().lower() in _NO:
             raise ParameterError(about.parameter, f"must be given together with --{about.needs}")
         if other := given.get(about.field):
             raise ParameterError(about.parameter, f"must not be given together with --{other.name}")

@@ -40,7 +40,7 @@ class Acceleration:
     width = 32
 
     @property
-    def _per_count(self) -> Fraction:
+    def per_count(self) -> Fraction:
         """One count per tick² in the unit."""
         count = self.scale.per_count
         return count if self.asked.unit == NATIVE else count / self.asked.timing.tick_seconds
@@ -53,7 +53,7 @@ class Acceleration:
     @property
     def of_form(self) -> Fraction:
         """One LSB of the acceleration of the recursion in the unit."""
-        return self._per_count * self.asked.timing.tick_cycles**2 / (1 << self.form_bits)
+        return self.per_count * self.asked.timing.tick_cycles**2 / (1 << self.form_bits)
 
     @cached_property
     def frac_bits(self) -> int:
@@ -64,7 +64,7 @@ class Acceleration:
     @property
     def rad_per_s2_per_lsb(self) -> float:
         """One LSB in rad/s²; ticks are as long as nominal."""
-        counts = Fraction(1, 2) ** self.frac_bits / self._per_count
+        counts = Fraction(1, 2) ** self.frac_bits / self.per_count
         return self.scale.unit_velocity * float(counts / self.asked.timing.tick_seconds)
 
 
@@ -188,7 +188,8 @@ class TrackTachometer(TachometerSpec):
         per_clock = VelocityOutput(ratio, self.velocity.max << native + shift, bits + 2)
         latency = self.latency
         late = latency.pin_to_count + latency.tick + latency.datapath + per_clock.serial_latency + 3
-        return Carrying(per_clock, shift, self.position_fine_bits, bits - self.position_fine_bits, late)
+        slope = Fraction(1, 2) ** self.acceleration.frac_bits / self.acceleration.per_count / cycles**2
+        return Carrying(per_clock, shift, self.position_fine_bits, bits - self.position_fine_bits, late, slope)
 
     @property
     def remembered(self) -> None:

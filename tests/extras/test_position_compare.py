@@ -141,7 +141,9 @@ def test_a_position_that_is_set_moves_what_is_awaited(compare: Compare) -> None:
     assert len({*wanted}) > 1
 
 
-CARRYING = Carrying(VelocityOutput(Fraction(1, 10), 200, 12), shift=1, position_fine_bits=2, more_bits=2, late=12)
+CARRYING = Carrying(
+    VelocityOutput(Fraction(1, 10), 200, 12), 1, position_fine_bits=2, more_bits=2, late=12, slope=Fraction(1)
+)
 SPACING = CARRYING.latency + 4
 HALF = 1 << 8  # the place that is carried on wraps there
 

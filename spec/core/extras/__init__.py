@@ -5,6 +5,7 @@ predicts it, and `tests/extras/test_NAME.py` checks it. The order is that of opt
 ports and registers.
 """
 
+from tachometry.spec.core.extras.electrical import ElectricalAngle
 from tachometry.spec.core.extras.extra import Extra
 from tachometry.spec.core.extras.health import Health
 from tachometry.spec.core.extras.over_speed import OverSpeed
@@ -12,6 +13,6 @@ from tachometry.spec.core.extras.position_compare import PositionCompare
 from tachometry.spec.core.extras.probe import Probe
 from tachometry.spec.core.extras.stream import Stream
 
-EXTRAS: tuple[type[Extra], ...] = (Health, OverSpeed, Probe, Stream, PositionCompare)
+EXTRAS: tuple[type[Extra], ...] = (Health, OverSpeed, Probe, Stream, PositionCompare, ElectricalAngle)
 
 __all__ = ["EXTRAS", "Extra"]

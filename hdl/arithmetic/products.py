@@ -1,0 +1,41 @@
+"""Products of words with factors, one after the other in one multiplier."""
+
+from collections.abc import Sequence
+
+from amaranth import Array, C, Cat, Module, Mux, Signal, Value, signed
+
+Product = tuple[Value, Value | int, Value, Signal]  # a term, a factor, a base, and what takes the result
+
+
+def take_products(
+    m: Module, begin: Value, products: Sequence[Product], bits: int, result_bits: int
+) -> tuple[Value, Value]:
+    """Take products from `begin` on, in bits + 3 clocks each; return when the last one is there, and that.
+
+    A product is term·factor / 2^bits, rounded, and its base added; the last one is term·factor + base. A factor has so
+    many bits, with its sign. Term and factor are read in the first clock.
+    """
+    width = max(result_bits + 1, *(len(term) for term, *_ in products))
+    number, clock, done, ends = Signal(range(len(products))), Signal(range(bits + 4)), Signal(), Signal()
+    m.d.comb += [done.eq(clock == bits + 3), ends.eq(number == len(products) - 1)]
+    m.d.sync += clock.eq(Mux(begin | (done & ~ends), 1, Mux(clock.any() & ~done, clock + 1, 0)))
+    with m.If(begin | done):
+        m.d.sync += number.eq(Mux(begin, 0, number + 1))
+    term, factor, base = (Array([product[part] for product in products])[number] for part in range(3))
+    # The sum moves down as the factor does, whose last bit is its sign. Then the base is added, if it was not at first.
+    held, left, signs, adds = Signal(signed(width)), Signal(signed(bits)), Signal(), Signal()
+    sum_, high = Signal(signed(width + bits)), Signal(signed(width + 1))
+    addend = Mux(adds, Mux(ends, 0, base), Mux(left[0], held ^ signs.replicate(width), 0))
+    m.d.comb += [
+        signs.eq(clock == bits + 1),
+        adds.eq(clock == bits + 2),
+        high.eq(sum_[bits:].as_signed() + addend + (left[0] & signs)),
+    ]
+    m.d.sync += [sum_.eq(Mux(adds, Cat(sum_[:bits], high), Cat(sum_[1:bits], high))), left.eq(left >> 1)]
+    with m.If(clock == 1):
+        begun = Mux(ends, base, 1 << bits - 1)
+        m.d.sync += [held.eq(term), left.eq(factor), sum_.eq(Cat(C(0, bits), begun))]
+    for place, (*_, target) in enumerate(products[:-1]):
+        with m.If(done & (number == place)):
+            m.d.sync += target.eq(sum_ >> bits)
+    return done & ends, sum_[:result_bits]

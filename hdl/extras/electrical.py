@@ -1,0 +1,172 @@
+"""Gates of `spec.core.extras.electrical`."""
+
+from typing import Self
+
+from amaranth import C, Const, Module, Mux, Signal, Value, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.arithmetic.products import take_products
+from tachometry.hdl.wires.delay import delay
+from tachometry.spec import TachometerSpec
+from tachometry.spec.core.extras.electrical import REFUSED, REFUSED_BITS, ElectricalAngle
+from tachometry.spec.formats.angles import LEAD_BITS, PLACE_BITS, SHOWN_BITS, SLOPE_BITS, Angles
+
+
+class Gates(wiring.Component):
+    """The angle of the counts, carried on to every clock, and a shift that `angle_set` and an offset make.
+
+    A set in clock c takes the value of clock c + 1. `latency` is that of a step to the position that has it. `inputs`
+    have their widths. With `corrects` an index behind the first may show lost counts.
+    """
+
+    def __init__(
+        self, extra: ElectricalAngle, angles: Angles, latency: int, inputs: dict[str, int], *, corrects: bool
+    ) -> None:
+        self._angles, self._latency, self._corrects, self._offset = angles, latency, corrects, extra.offset
+        super().__init__(
+            {
+                "step": In(signed(2)),
+                **{name: In(signed(width) if width > 1 else 1) for name, width in inputs.items()},
+                **dict.fromkeys(("tick", "native_valid", "angle_set"), In(1)),
+                "position": In(PLACE_BITS),
+                "angle_value": In(SHOWN_BITS),
+                "angle_offset": In(SHOWN_BITS, init=extra.offset),
+                "angle_lead": In(LEAD_BITS, init=extra.lead),
+                "angle": Out(SHOWN_BITS),
+                "angle_valid": Out(1),
+                **({REFUSED: Out(REFUSED_BITS)} if corrects else {}),
+            }
+        )
+
+    @classmethod
+    def of(cls, extra: ElectricalAngle, spec: TachometerSpec) -> Self:
+        """Return the gates of this core."""
+        taken = [one for one in spec.method_ports if spec.carrying and one.name in ("acceleration", "position_fine")]
+        inputs = {"native_velocity": spec.velocity.native, **{f"native_{one.name}": one.width for one in taken}}
+        inputs |= {"index_rises": 1} if spec.index else {}
+        inputs |= {"home_rises": 1} if spec.front_end.index_once else {}
+        return cls(extra, extra.angles(spec), spec.latency.tick, inputs, corrects=extra.corrects(spec))
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        (step,) = delay(m, self.step, clocks=self._latency - 1)
+        indexed, sets, members = Signal(), Signal(), self.signature.members
+        rises = self.index_rises if "index_rises" in members else C(0)
+        counted, zeroes = self._count(m, step, rises, indexed)
+        m.d.sync += sets.eq(self.angle_set)
+        with m.If(sets | rises):
+            m.d.sync += [self.angle_valid.eq(1), indexed.eq(indexed | rises)]
+        if "home_rises" in members:
+            with m.If(self.home_rises):
+                m.d.sync += [indexed.eq(0), self.angle_valid.eq(0)]
+        phase = self._tracked(m, counted) if self._angles.tracks else self._counted(m, step, counted, zeroes)
+        # What the angle was set to, or nothing from the first index on.
+        difference, shift, offset = Signal(SHOWN_BITS), Signal(SHOWN_BITS), Signal(SHOWN_BITS, init=self._offset)
+        with m.If(self.native_valid):
+            m.d.sync += offset.eq(self.angle_offset)
+        with m.If(rises & ~indexed):
+            m.d.sync += difference.eq(0)
+        with m.Elif(sets):
+            m.d.sync += difference.eq(self.angle_value - phase[-SHOWN_BITS:] - offset)
+        m.d.sync += [shift.eq(difference + offset), self.angle.eq(phase[-SHOWN_BITS:] + shift)]
+        return m
+
+    def _count(self, m: Module, step: Value, rises: Value, indexed: Value) -> tuple[Signal, Signal]:
+        """Return the angle of the counts, a clock after a step, and whether an index zeroes it in the next clock.
+
+        It is a sum for each count, and a remainder whose carry is one more. An index behind the first is refused if the
+        angle is off by more than 1/16 of a turn, and is not that of the index before.
+        """
+        counts, zero, (quotient, remainder) = self._angles.counts, self._angles.of(0), self._angles.count
+        sum_, rest, back = Signal(self._angles.bits, init=zero), Signal(range(counts)), step[1]
+        marks, zeroes, later = Signal(), Signal(), Signal()
+        m.d.sync += [marks.eq(rises), later.eq(indexed)]
+        m.d.comb += zeroes.eq(marks)
+        if self._corrects:
+            # No two counts of a turn have the same bits here.
+            place = sum_[-max(counts.bit_length(), 4) :]
+            before, top = Signal.like(place, init=0), place[-4:]
+            m.d.comb += zeroes.eq(marks & (~later | ~top.any() | top.all() | (place == before)))
+            m.d.sync += before.eq(Mux(marks, place, before))
+            with m.If(marks & ~zeroes & ~self.angle_refused.all()):
+                m.d.sync += self.angle_refused.eq(self.angle_refused + 1)
+        angle, left, move = Mux(zeroes, zero, sum_), Mux(zeroes, 0, rest), Const(quotient, len(sum_))
+        up, down = Signal(range(2 * counts)), Signal(signed(counts.bit_length() + 1))
+        carry = Mux(back, ~(down < 0), up >= counts)
+        m.d.comb += [up.eq(left + remainder), down.eq(left - remainder)]
+        m.d.sync += [
+            sum_.eq(angle + Mux(step[0], move ^ back.replicate(len(move)), 0) + (step[0] & carry)),
+            rest.eq(left),
+        ]
+        with m.If(step[0]):
+            m.d.sync += rest.eq(Mux(back, Mux(down < 0, down + counts, down), Mux(up >= counts, up - counts, up)))
+        return sum_, zeroes
+
+    def _tracked(self, m: Module, counted: Value) -> Value:
+        """Return a phase that grows by its slope in each clock, and begins anew after each update.
+
+        The first phase owes nothing.
+        """
+        angles = self._angles
+        bits, factor_bits, half = angles.bits, angles.factor_bits, angles.tick >> 1
+        # Angle and place of the counts at a tick, for the update that it has.
+        at, place, fine_bits = Signal(bits), Signal(PLACE_BITS), angles.position_fine_bits
+        between = Signal(signed(fine_bits + PLACE_BITS))
+        with m.If(self.tick):
+            m.d.sync += [at.eq(counted), place.eq(self.position)]
+        m.d.comb += between.eq(self.native_position_fine - (place << fine_bits))
+        velocity, fine, acceleration = angles.factors
+        bend = acceleration.term(self.native_acceleration)
+        curve = Signal(signed(max(len(bend), 2)))
+        s, target, slope, now = Signal(factor_bits), Signal(bits), Signal(signed(bits)), Signal(signed(bits))
+        bent = curve << factor_bits - SLOPE_BITS
+        products = (
+            (fine.term(between), fine.number, at, target),  # before the next tick
+            (bend, acceleration.number, C(0), curve),
+            (velocity.term(self.native_velocity), velocity.number, C(0), slope),
+            (bent, s + (half - angles.late), slope, now),
+            (bent, (s >> 1) - angles.late, slope, slope),
+            (slope, s, target, target),
+        )
+        done, start = take_products(m, self.native_valid, products, factor_bits, bits)
+        phase, run, grows, begun = Signal(bits), Signal(bits), Signal(signed(bits)), Signal()
+        m.d.comb += run.eq(phase + grows)
+        m.d.sync += [phase.eq(Mux(done, start, run)), begun.eq(begun | done)]
+        debt = _owed(m, angles, done, Mux(begun, run - start, 0)[:bits])
+        with m.If(self.native_valid):
+            m.d.sync += s.eq(self.angle_lead + angles.span)
+        with m.If(done):
+            m.d.sync += grows.eq(now)
+        return (phase + debt)[:bits]
+
+    def _counted(self, m: Module, step: Value, counted: Value, zeroes: Value) -> Value:
+        """Return a phase that is at an edge after a count, and grows with the velocity, to the next edge at most."""
+        angles, bits, half = self._angles, self._angles.bits, self._angles.count[0] >> 1
+        velocity, *_ = angles.factors
+        s, slope = Signal(angles.factor_bits), Signal(signed(bits))
+        products = ((velocity.term(self.native_velocity), velocity.number, C(0), slope), (slope, s, C(0), slope))
+        done, far = take_products(m, self.native_valid, products, angles.factor_bits, bits)
+        near = signed(half.bit_length() + 1)
+        grows, place, ahead = Signal(near), Signal(near), Signal(bits)
+        with m.If(self.native_valid):
+            m.d.sync += s.eq(self.angle_lead + angles.span)
+        with m.If(done):
+            m.d.sync += [grows.eq(_held(slope, half)), ahead.eq(far)]
+        m.d.sync += place.eq(Mux(step[0], Mux(step[1], half, -half), _held(place + grows, half)))
+        phase, coming, moved = Signal(bits), Signal(bits), Signal()
+        m.d.comb += coming.eq(counted + place + ahead)
+        m.d.sync += [phase.eq(coming), moved.eq(done | step[0] | zeroes)]
+        return (phase + _owed(m, angles, moved, (phase - coming)[:bits]))[:bits]
+
+
+def _owed(m: Module, angles: Angles, jumps: Value, gap: Value) -> Signal:
+    """Return a debt: with `jumps` a gap is added to it; in all other clocks 2^-spread of it is paid."""
+    debt, pay, spread = Signal(signed(angles.bits)), Signal(angles.bits), angles.spread
+    m.d.comb += pay.eq(Mux(jumps, gap, ~(debt >> spread)))
+    m.d.sync += debt.eq(debt + pay + (~jumps & ~(debt[-1] & debt[:spread].any())))
+    return debt
+
+
+def _held(value: Value, most: int) -> Value:
+    return Mux(value > most, most, Mux(value < -most, -most, value))

@@ -1,0 +1,104 @@
+"""The electrical angle of a motor, new in every clock, at the instant of its use."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from tachometry.spec.core.extras.extra import Extra
+from tachometry.spec.core.front_end import Pin
+from tachometry.spec.core.numbers import Numbers
+from tachometry.spec.formats.angles import LEAD_BITS, SHOWN_BITS, Angles
+from tachometry.spec.language.field import Draft, Field
+from tachometry.spec.language.option import REQUIRED, ParameterError, option, parse_whole
+from tachometry.spec.language.port import TICK, Port, held, pin
+from tachometry.spec.language.units import DEGREES, TIME, Unit, read_quantity
+
+REFUSED = "angle_refused"
+REFUSED_BITS = 16  # of the number of refused indices, which stays at its end
+_UNIT = f"2^-{SHOWN_BITS} electrical turns"
+_POLE_PAIRS = """Electrical angle of a motor with P pole pairs, 1 to 512. Outputs angle, in 2^-16 electrical turns and \
+new in every clock, and angle_valid. It is 0 at the index, or what angle_set sets it to."""
+_OFFSET = "Electrical angle that is added, as 12.3deg. Or a number of 2^-16 turns. ANGLE_OFFSET begins with it."
+_LEAD = """Time from the angle at the port to its use, as 1.5tick. Or 75us, or 300clk; below 65536 clocks. The angle \
+is that of the motor so much later. Register ANGLE_LEAD begins with it."""
+
+
+def parse_offset(what: str, text: str) -> int:
+    """Return an angle in 2^-16 turns, from degrees or a number of these."""
+    value, unit = read_quantity(what, text, {"": Unit(), **DEGREES})
+    return round(value * (1 << SHOWN_BITS) / 360 if unit else value) % (1 << SHOWN_BITS)
+
+
+def parse_lead(what: str, text: str, timing: Mapping[str, Any]) -> int:
+    """Return a time in clocks, from a time, ticks or clocks."""
+    value, unit = read_quantity(what, text, {**TIME, "tick": Unit(), "clk": Unit()}, "clk")
+    clocks = {"tick": timing["tick_cycles"], "clk": 1}
+    return round(value * (clocks[unit] if unit in clocks else TIME[unit].exact * timing["clock_hz"]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ElectricalAngle(Extra):
+    """Output `angle` is that of a motor with so many pole pairs, `lead` clocks after the clock in which it is shown."""
+
+    name = "electrical"
+
+    pole_pairs: int = option(
+        REQUIRED, _POLE_PAIRS, name=name, metavar="P", parse=parse_whole, limits=(1, 512), tests=("", "7"), tacit=True
+    )
+    offset: int = option(0, _OFFSET, name="electrical-offset", metavar="ANGLE", parse=parse_offset, tests=("", "30deg"))
+    lead: int = option(0, _LEAD, metavar="TIME", parse_at=parse_lead, limits=(0, 65535), tests=("", "1.5tick"))
+
+    def angles(self, spec: Numbers) -> Angles:
+        """Return the formats of the angles of a core."""
+        counts, tick, bits = spec.encoder.counts_per_rev, spec.timing.tick_cycles, spec.velocity.native_frac_bits
+        late, carrying, tracks = spec.latency.pin_to_count + spec.latency.tick, spec.carrying, spec.latency.datapath
+        of_track = (tracks, carrying.position_fine_bits, carrying.slope) if carrying else (0, 0, Fraction(0))
+        return Angles(counts, self.pole_pairs, tick, spec.tick.longest, bits, late + of_track[0], *of_track)
+
+    def missing(self) -> Mapping[str, str]:
+        return {"axes": "does not work with --axes", "loop": "does not work with --loop"}
+
+    def check(self, spec: Numbers) -> None:
+        if spec.encoder.sensor == "hall":
+            raise ParameterError(self.name, "does not work with --sensor hall: take --position-modulo rev/P")
+        most = (spec.encoder.counts_per_rev - 1) // 2
+        if self.pole_pairs > most:
+            raise ParameterError(self.name, f"must be at most {most} with so few counts per revolution")
+        angles = self.angles(spec)
+        # All products are there before the next update, the first one before a tick.
+        clocks = max(angles.clocks, angles.tracks + angles.factor_bits + 4)
+        if (spec.times.shortest_tick if angles.tracks else angles.tick) < clocks:
+            raise ParameterError(self.name, f"needs a tick of {clocks} clocks: take a longer --tick")
+
+    def corrects(self, spec: Numbers) -> bool:
+        """Return whether an index behind the first may show lost counts."""
+        return spec.index is not None and not spec.index.reset and not spec.index.once
+
+    def pins(self, spec: Numbers) -> Iterable[Pin]:
+        text = "The angle is angle_value now, in the clock of a current vector that has aligned the motor."
+        yield Pin(pin("angle_set", text), act=True)
+        text = "The angle that angle_set sets, in 2^-16 electrical turns, in the clock after it."
+        yield Pin(pin("angle_value", text, SHOWN_BITS), act=True)
+
+    def ports(self, spec: Numbers) -> Iterable[Port]:
+        text = "Electrical angle, ANGLE_LEAD clocks after this one. It also changes between ticks, in every clock."
+        yield held(TICK, "angle", SHOWN_BITS, unit=_UNIT, help=text)
+        text = "The angle is that of the motor: an index was taken, or it was set. It also changes between ticks."
+        yield held(TICK, "angle_valid", help=text)
+        if self.corrects(spec):
+            text = "Refused indices: the angle was off by more than 1/16 turn. It also changes between ticks, to 65535."
+            yield held(TICK, REFUSED, REFUSED_BITS, unit="indices", help=text)
+
+    def registers(self, spec: Numbers) -> Iterable[Draft]:
+        offset = Field("offset", SHOWN_BITS, unit=_UNIT, writable=True, reset=self.offset, port="angle_offset")
+        yield "ANGLE_OFFSET", "Electrical angle that is added, from the next update on.", (offset,), {}
+        lead = Field("lead", LEAD_BITS, unit="clocks", writable=True, reset=self.lead, port="angle_lead")
+        yield "ANGLE_LEAD", "Time from the angle at the port to its use, from the next update on.", (lead,), {}
+        value = Field("value", SHOWN_BITS, help="The angle.", unit=_UNIT, writable=True, port="angle_value")
+        text = "1: the angle is this now."
+        sets = Field("set", 1, low=SHOWN_BITS, help=text, writable=True, single=True, port="angle_set")
+        yield "ANGLE_SET", "Sets the angle, and makes it valid.", (value, sets), {}
+
+    def row(self, spec: Numbers, run: Any) -> tuple[str, str]:
+        return "angle", f"{[0, *run.ticks.angle][-1] * 360 / 2**SHOWN_BITS:.1f}° electrical at the end"

@@ -1,0 +1,88 @@
+"""The electrical angle, from the pins and the words of the command line alone; see `extras.harness`."""
+
+import math
+import random
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from extras.harness import Case, agreeing, in_icarus, on_a_bus, refused
+
+from tachometry.sim import golden
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.spec import of_texts
+from tachometry.spec.formats.angles import Angles
+
+TRACK = "tick=2000clk max-time=8000clk"
+SLOW = "tick=200clk max-time=1000clk"
+CASES = (
+    Case("track", f"electrical=7 index=yes lead=1.5tick electrical-offset=30deg {TRACK}", edges=60, clocks=20_000),
+    Case("track", f"electrical=3 multiplier=block index=yes index-reset=yes {TRACK}", edges=60, clocks=20_000),
+    Case("s", f"electrical=7 index=yes lead=50clk unit=rpm {SLOW}", edges=60),
+    Case("mt", f"electrical=11 index=yes index-once=yes preset=7 {SLOW}", edges=60),
+    Case("m", f"electrical=7 index=yes {SLOW}", swings=True),
+    Case("mt", "electrical=18 ppr=97 tick=60clk max-time=300clk index=yes health=yes", swings=True),
+    Case("rairan", f"electrical=21 ppr=5000 index=yes reverse=yes {SLOW}", edges=200),
+    Case("s", f"electrical=21 ppr=5000 electrical-offset=-30deg position-modulo=rev/8 {SLOW}", edges=200),
+    Case("t", f"electrical=7 filter=3clk {SLOW}", clocks=5000),
+)
+BUS = Case("s", f"electrical=7 index=yes index-once=yes {SLOW}", edges=60)
+
+
+def rule(case: Case) -> None:
+    """The angle is valid from the first index or set on; a home that lets the next index through takes that back."""
+    ticks, index = case.run().ticks, case.run().tables.get("index_valid")
+    valid = [*np.flatnonzero(case.level("angle_set")) + 2, *(index.clock if index is not None else ())]
+    if "index-once" not in case.words:
+        assert ticks.angle_valid.tolist() == [any(at <= clock for at in valid) for clock in ticks.clock]
+    assert len(np.unique(ticks.angle)) > len(ticks) / 10
+
+
+test_cores = agreeing(CASES, rule)
+test_bus = on_a_bus(BUS)
+test_verilog = in_icarus(CASES[0])
+test_refusals = refused(
+    {
+        "electrical=0": "electrical must be from 1 to 512",
+        "electrical=7 lead=65536": "lead must be from 0 to 65535, not 65536",
+        "electrical=7 electrical-offset=1rad": "electrical_offset must be a number or one in deg, not '1rad'",
+        "electrical=60": "electrical must be at most 49",
+        "electrical=7": "electrical needs a tick of 43 clocks: take a longer --tick",
+        "lead=3": "lead must be given together with --electrical",
+    }
+)
+
+
+@pytest.mark.parametrize(
+    ("method", "motion", "rms", "worst"),
+    [
+        ("track", "constant:217rad/s:150ms", 0.004, 0.02),
+        ("track", "sine:300rad/s:20Hz:150ms", 0.1, 0.6),
+        ("track", "sine:50rad/s:5Hz:400ms", 0.04, 0.5),
+        ("mt", "constant:217rad/s:150ms", 0.15, 0.7),
+        ("mt", "sine:300rad/s:20Hz:150ms", 0.5, 2.5),
+    ],
+)
+def test_the_angle_is_that_of_the_motor_at_its_use(method: str, motion: str, rms: float, worst: float) -> None:
+    """In electrical degrees, 1.5 ticks ahead, of a real disc; where the zero is was not known, so the mean is off."""
+    words = {"lines": "1000", "clock": "48MHz", "tick": "100us", "max-speed": "6000rpm", "lead": "1.5tick"}
+    spec = of_texts(method, {**words, "electrical": "7", **({"position-fine-bits": "8"} if method == "track" else {})})
+    disc = VirtualEncoder(1000, phase_error_deg=10, nonuniformity=0.1, jitter=0.05, seed=11)
+    moved = parse_motion(motion)
+    trace = disc.record(moved).recording.place(48_000_000).completed(spec)
+    ticks = golden.run(spec, trace).ticks.rows(slice(400, -2))
+    error = ticks.angle * 360 / 2**16 - 7 * np.degrees(moved.angle((ticks.clock + 7200) / 48e6))
+    error = (error - error[0] + 180) % 360 - 180
+    assert np.std(error) < rms
+    assert np.abs(error - np.median(error)).max() < worst
+
+
+@pytest.mark.parametrize(("counts", "pole_pairs"), [(97, 18), (10, 3), (20_000, 21), (20_000, 18)])
+def test_counts_have_their_exact_angle(counts: int, pole_pairs: int) -> None:
+    """After a million turns the angle is that of the start; gates and golden model agree in every count, see CASES."""
+    angles, rng = Angles(counts, pole_pairs, 400, 400, 8, 9, 0, 0, Fraction(0)), random.Random(counts)
+    assert angles.of(1_000_000 * counts) == angles.of(-1_000_000 * counts) == angles.of(0) == 1 << angles.bits - 17
+    for number in (rng.randrange(-(10**9), 10**9) for _ in range(1000)):
+        exact = Fraction(number * pole_pairs, counts) * 2**angles.bits
+        assert (angles.of(number) - angles.of(0)) % 2**angles.bits == math.floor(exact) % 2**angles.bits
