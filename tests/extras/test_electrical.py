@@ -1,17 +1,24 @@
 """The electrical angle, from the pins and the words of the command line alone; see `extras.harness`."""
 
+import inspect
 import math
 import random
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
 from extras.harness import Case, agreeing, in_icarus, on_a_bus, refused
+from support.simulate import clock_by_clock
 
+from tachometry.hdl.extras import electrical
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import of_texts
+from tachometry.spec.core.extras.electrical import ElectricalAngle
 from tachometry.spec.formats.angles import Angles
 
 TRACK = "tick=2000clk max-time=8000clk"
@@ -52,6 +59,45 @@ test_refusals = refused(
         "lead=3": "lead must be given together with --electrical",
     }
 )
+
+
+FAULTS = (
+    ("(place == before)", "C(0)", 5),  # a second index that agrees
+    ("-half), _held", "0), _held", 5),  # the edge after a count
+    ("ahead.eq(far)", "ahead.eq(0)", 2),  # the lead
+    ("at.eq(counted)", "at.eq(at)", 0),
+    ("shift.eq(difference + offset)", "shift.eq(difference)", 0),
+)
+
+
+def wrong_gates(text: str, wrong: str) -> Any:
+    source, module = inspect.getsource(electrical), dict[str, Any]()
+    assert source.count(text) == 1
+    exec(source.replace(text, wrong), module)
+    return module["Gates"]
+
+
+@pytest.mark.parametrize(("text", "wrong", "case"), FAULTS)
+def test_wrong_gates_are_seen(text: str, wrong: str, case: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(electrical, "Gates", wrong_gates(text, wrong))
+    assert lockstep(CASES[case].spec, CASES[case].trace(), PySim()).n_mismatches
+
+
+def is_exact(gates: Any) -> bool:
+    """Return whether 9000 counts forward, and as many back, end at their angle; the place is half a count behind."""
+    angles = Angles(97, 13, 8, 8, 8, 9, 0, 0, Fraction(0))
+    box = gates(ElectricalAngle(pole_pairs=13), angles, 2, {"native_velocity": 8}, corrects=False)
+    ways = np.repeat([1, 0, -1, 0], [9000, 60, 9000, 60]).tolist()
+    shown = [row["angle"] for row in clock_by_clock(box, [{"step": way} for way in ways], ["angle"])]
+    half = angles.count[0] >> 1
+    places = ((angles.of(9000) - half, shown[9059]), (angles.of(0) + half, shown[-1]))
+    return all((place >> angles.bits - 16) % 2**16 == angle for place, angle in places)
+
+
+def test_gates_add_counts_exactly() -> None:
+    assert is_exact(electrical.Gates)
+    assert not is_exact(wrong_gates("up.eq(left + remainder)", "up.eq(left)"))
+    assert not is_exact(wrong_gates("(step[0] & carry)", "step[0]"))
 
 
 @pytest.mark.parametrize(
