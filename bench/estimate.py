@@ -120,7 +120,8 @@ def fit(family: str) -> dict[str, list[float]]:
 
 def measured(family: str, only: Sequence[int] | None) -> list[tuple[str, float, float, float, float]]:
     """Return random cores: options, cells packed and estimated, MHz and estimated; those not in `only` stay."""
-    stays = {row["core"]: {"cells": float(row["cells"]), "Fmax": float(row["MHz"] or 0)} for row in read_table(TABLE)}
+    table = (row for row in read_table(TABLE) if row["family"] == FAMILIES[family].title)
+    stays = {row["core"]: {"cells": float(row["cells"]), "Fmax": float(row["MHz"] or 0)} for row in table}
     rows = []
     for spec, bus, text, figures in drawn(family, "cores", only, stays):
         found, (cells, *_), clock = estimate.Estimate.of(spec, bus, family), figures.values(), figures.get("Fmax", 0)

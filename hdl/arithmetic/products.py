@@ -16,15 +16,22 @@ def take_products(
     many bits, with its sign. Term and factor are read in the first clock.
     """
     width = max(result_bits + 1, *(len(term) for term, *_ in products))
-    number, clock, done, ends = Signal(range(len(products))), Signal(range(bits + 4)), Signal(), Signal()
+    number = Signal(range(len(products)))
+    clock = Signal(range(bits + 4))
+    done = Signal()
+    ends = Signal()
     m.d.comb += [done.eq(clock == bits + 3), ends.eq(number == len(products) - 1)]
     m.d.sync += clock.eq(Mux(begin | (done & ~ends), 1, Mux(clock.any() & ~done, clock + 1, 0)))
     with m.If(begin | done):
         m.d.sync += number.eq(Mux(begin, 0, number + 1))
     term, factor, base = (Array([product[part] for product in products])[number] for part in range(3))
     # The sum moves down as the factor does, whose last bit is its sign. Then the base is added, if it was not at first.
-    held, left, signs, adds = Signal(signed(width)), Signal(signed(bits)), Signal(), Signal()
-    sum_, high = Signal(signed(width + bits)), Signal(signed(width + 1))
+    held = Signal(signed(width))
+    left = Signal(signed(bits))
+    signs = Signal()
+    adds = Signal()
+    sum_ = Signal(signed(width + bits))
+    high = Signal(signed(width + 1))
     addend = Mux(adds, Mux(ends, 0, base), Mux(left[0], held ^ signs.replicate(width), 0))
     m.d.comb += [
         signs.eq(clock == bits + 1),

@@ -51,7 +51,9 @@ class Gates(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         (step,) = delay(m, self.step, clocks=self._latency - 1)
-        indexed, sets, members = Signal(), Signal(), self.signature.members
+        indexed = Signal()
+        sets = Signal()
+        members = self.signature.members
         rises = self.index_rises if "index_rises" in members else C(0)
         counted, zeroes = self._count(m, step, rises, indexed)
         m.d.sync += sets.eq(self.angle_set)
@@ -62,7 +64,9 @@ class Gates(wiring.Component):
                 m.d.sync += [indexed.eq(0), self.angle_valid.eq(0)]
         phase = self._tracked(m, counted) if self._angles.tracks else self._counted(m, step, counted, zeroes)
         # What the angle was set to, or nothing from the first index on.
-        difference, shift, offset = Signal(SHOWN_BITS), Signal(SHOWN_BITS), Signal(SHOWN_BITS, init=self._offset)
+        difference = Signal(SHOWN_BITS)
+        shift = Signal(SHOWN_BITS)
+        offset = Signal(SHOWN_BITS, init=self._offset)
         with m.If(self.native_valid):
             m.d.sync += offset.eq(self.angle_offset)
         with m.If(rises & ~indexed):
@@ -79,20 +83,26 @@ class Gates(wiring.Component):
         angle is off by more than 1/16 of a turn, and is not that of the index before.
         """
         counts, zero, (quotient, remainder) = self._angles.counts, self._angles.of(0), self._angles.count
-        sum_, rest, back = Signal(self._angles.bits, init=zero), Signal(range(counts)), step[1]
-        marks, zeroes, later = Signal(), Signal(), Signal()
+        sum_ = Signal(self._angles.bits, init=zero)
+        rest = Signal(range(counts))
+        back = step[1]
+        marks = Signal()
+        zeroes = Signal()
+        later = Signal()
         m.d.sync += [marks.eq(rises), later.eq(indexed)]
         m.d.comb += zeroes.eq(marks)
         if self._corrects:
             # No two counts of a turn have the same bits here.
             place = sum_[-max(counts.bit_length(), 4) :]
-            before, top = Signal.like(place, init=0), place[-4:]
+            before = Signal.like(place, init=0)
+            top = place[-4:]
             m.d.comb += zeroes.eq(marks & (~later | ~top.any() | top.all() | (place == before)))
             m.d.sync += before.eq(Mux(marks, place, before))
             with m.If(marks & ~zeroes & ~self.angle_refused.all()):
                 m.d.sync += self.angle_refused.eq(self.angle_refused + 1)
         angle, left, move = Mux(zeroes, zero, sum_), Mux(zeroes, 0, rest), Const(quotient, len(sum_))
-        up, down = Signal(range(2 * counts)), Signal(signed(counts.bit_length() + 1))
+        up = Signal(range(2 * counts))
+        down = Signal(signed(counts.bit_length() + 1))
         carry = Mux(back, ~(down < 0), up >= counts)
         m.d.comb += [up.eq(left + remainder), down.eq(left - remainder)]
         m.d.sync += [
@@ -111,7 +121,9 @@ class Gates(wiring.Component):
         angles = self._angles
         bits, factor_bits, half = angles.bits, angles.factor_bits, angles.tick >> 1
         # Angle and place of the counts at a tick, for the update that it has.
-        at, place, fine_bits = Signal(bits), Signal(PLACE_BITS), angles.position_fine_bits
+        at = Signal(bits)
+        place = Signal(PLACE_BITS)
+        fine_bits = angles.position_fine_bits
         between = Signal(signed(fine_bits + PLACE_BITS))
         with m.If(self.tick):
             m.d.sync += [at.eq(counted), place.eq(self.position)]
@@ -119,7 +131,10 @@ class Gates(wiring.Component):
         velocity, fine, acceleration = angles.factors
         bend = acceleration.term(self.native_acceleration)
         curve = Signal(signed(max(len(bend), 2)))
-        s, target, slope, now = Signal(factor_bits), Signal(bits), Signal(signed(bits)), Signal(signed(bits))
+        s = Signal(factor_bits)
+        target = Signal(bits)
+        slope = Signal(signed(bits))
+        now = Signal(signed(bits))
         bent = curve << factor_bits - SLOPE_BITS
         products = (
             (fine.term(between), fine.number, at, target),  # before the next tick
@@ -130,7 +145,10 @@ class Gates(wiring.Component):
             (slope, s, target, target),
         )
         done, start = take_products(m, self.native_valid, products, factor_bits, bits)
-        phase, run, grows, begun = Signal(bits), Signal(bits), Signal(signed(bits)), Signal()
+        phase = Signal(bits)
+        run = Signal(bits)
+        grows = Signal(signed(bits))
+        begun = Signal()
         m.d.comb += run.eq(phase + grows)
         m.d.sync += [phase.eq(Mux(done, start, run)), begun.eq(begun | done)]
         debt = _owed(m, angles, done, Mux(begun, run - start, 0)[:bits])
@@ -144,17 +162,22 @@ class Gates(wiring.Component):
         """Return a phase that is at an edge after a count, and grows with the velocity, to the next edge at most."""
         angles, bits, half = self._angles, self._angles.bits, self._angles.count[0] >> 1
         velocity, *_ = angles.factors
-        s, slope = Signal(angles.factor_bits), Signal(signed(bits))
+        s = Signal(angles.factor_bits)
+        slope = Signal(signed(bits))
         products = ((velocity.term(self.native_velocity), velocity.number, C(0), slope), (slope, s, C(0), slope))
         done, far = take_products(m, self.native_valid, products, angles.factor_bits, bits)
         near = signed(half.bit_length() + 1)
-        grows, place, ahead = Signal(near), Signal(near), Signal(bits)
+        grows = Signal(near)
+        place = Signal(near)
+        ahead = Signal(bits)
         with m.If(self.native_valid):
             m.d.sync += s.eq(self.angle_lead + angles.span)
         with m.If(done):
             m.d.sync += [grows.eq(_held(slope, half)), ahead.eq(far)]
         m.d.sync += place.eq(Mux(step[0], Mux(step[1], half, -half), _held(place + grows, half)))
-        phase, coming, moved = Signal(bits), Signal(bits), Signal()
+        phase = Signal(bits)
+        coming = Signal(bits)
+        moved = Signal()
         m.d.comb += coming.eq(counted + place + ahead)
         m.d.sync += [phase.eq(coming), moved.eq(done | step[0] | zeroes)]
         return (phase + _owed(m, angles, moved, (phase - coming)[:bits]))[:bits]
@@ -162,7 +185,9 @@ class Gates(wiring.Component):
 
 def _owed(m: Module, angles: Angles, jumps: Value, gap: Value) -> Signal:
     """Return a debt: with `jumps` a gap is added to it; in all other clocks 2^-spread of it is paid."""
-    debt, pay, spread = Signal(signed(angles.bits)), Signal(angles.bits), angles.spread
+    debt = Signal(signed(angles.bits))
+    pay = Signal(angles.bits)
+    spread = angles.spread
     m.d.comb += pay.eq(Mux(jumps, gap, ~(debt >> spread)))
     m.d.sync += debt.eq(debt + pay + (~jumps & ~(debt[-1] & debt[:spread].any())))
     return debt
