@@ -79,7 +79,7 @@ def _explained(spec: TachometerSpec, build_core: Build, refused: list[str], aske
         why = f"it has --{asked[0]}"
     elif not why:
         core = build_core(spec)
-        fits = f"the turns of {core.axes} axes" if core.axes else f"its {spec.latency.busy} clocks"
+        fits = f"the turns of {core.axes} axes" if isinstance(core, AxesSpec) else f"its {spec.latency.busy} clocks"
         why = f"{fits} fit the tick of {spec.timing.tick_cycles} clocks"
     return replace(spec, chosen=f"as {why}")
 
@@ -137,7 +137,7 @@ class _Crowded(ParameterError):
 def _few_machines(build_core: Build, spec: TachometerSpec) -> None:
     """Refuse tracking of many axes with a ParameterError where the turns of a tick take more than two machines."""
     core = build_core(spec)
-    if core.axes is not None and (machines := core.plan.machines) > _MOST_MACHINES:
+    if isinstance(core, AxesSpec) and (machines := core.plan.machines) > _MOST_MACHINES:
         other = f"--tick {core.tick_of(_MOST_MACHINES)}"
         raise _Crowded("tick_cycles", f"must be longer: try {other}", f"needs {machines} machines or {other}")
 
