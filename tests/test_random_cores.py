@@ -25,6 +25,7 @@ from tachometry.spec.registers.buses import BUSES
 
 CLOCKS_HZ, MOST_COUNTS = (100_000, 400_000_000), 1 << 24
 EDGES, TICKS, LEAST_CLOCKS, MOST_CLOCKS = 20, 30, 6000, 24_000  # of a motion
+_LAST = {"electrical"}  # drawn by `_add_last`
 _NUMBERS = "ppr clock tick max-time unit sensor decoding frac-bits velocity-width max-speed over-speed filter lowpass"
 _QUADRATURE = {"health", "index-at"}  # which few other sensors have
 
@@ -84,6 +85,8 @@ def random_options(seed: int) -> tuple[dict[str, str], str]:
         axes = draw.choice((1, 2, 3, 5, 8, 32, 64))
         kept = {"method", "ppr", "clock", "unit", "max-speed", "filter", "index", "external-tick"}
         texts = {name: text for name, text in texts.items() if name in kept} | {"axes": str(axes)}
+    else:
+        _add_last(texts, _Draw(MANY + seed))
     return texts, draw.choice([*BUSES]) if draw.often(0.1) else "none"
 
 
@@ -93,7 +96,7 @@ def _add_others(texts: dict[str, str], draw: _Draw, method: str, sensor: str) ->
     for about in {about.name: about for about in (*common_options(), *own)}.values():
         values = [value for value in about.tested if value]
         rare = sensor != "quadrature" and {about.name, about.needs} & _QUADRATURE
-        if about.name in _NUMBERS.split() or not values or draw.often(0.99 if rare else 0.88):
+        if {about.name, about.needs} & {*_NUMBERS.split(), *_LAST} or not values or draw.often(0.99 if rare else 0.88):
             continue
         if method == "track" and "bounds" in (about.name, about.needs):
             continue
@@ -101,6 +104,12 @@ def _add_others(texts: dict[str, str], draw: _Draw, method: str, sensor: str) ->
             texts[about.needs] = "yes"
         within = about.limits is not None and draw.often(0.5)
         texts[about.name] = str(draw.randint(*about.limits)) if about.limits and within else draw.choice(values)
+
+
+def _add_last(texts: dict[str, str], draw: _Draw) -> None:
+    """Add options with random numbers of their own, so that the others of a seed stay."""
+    if draw.often(0.05) and texts.get("sensor") != "hall":
+        texts |= {"electrical": str(draw.log(1, 512)), "lead": f"{draw.randint(0, 3)}tick"}
 
 
 def motions(spec: CoreSpec, seed: int) -> list[Trace]:
