@@ -7,6 +7,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.products import take_products
+from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.wires.delay import delay
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.electrical import REFUSED, REFUSED_BITS, ElectricalAngle
@@ -166,15 +167,18 @@ class Gates(wiring.Component):
         slope = Signal(signed(bits))
         products = ((velocity.term(self.native_velocity), velocity.number, C(0), slope), (slope, s, C(0), slope))
         done, far = take_products(m, self.native_valid, products, angles.factor_bits, bits)
-        near = signed(half.bit_length() + 1)
-        grows = Signal(near)
-        place = Signal(near)
+        most, _ = saturate(m, slope, half)
+        grows = Signal.like(most)
+        place = Signal.like(most)
+        grown = Signal(signed(len(most) + 1))
+        on, _ = saturate(m, grown, half)
         ahead = Signal(bits)
         with m.If(self.native_valid):
             m.d.sync += s.eq(self.angle_lead + angles.span)
         with m.If(done):
-            m.d.sync += [grows.eq(_held(slope, half)), ahead.eq(far)]
-        m.d.sync += place.eq(Mux(step[0], Mux(step[1], half, -half), _held(place + grows, half)))
+            m.d.sync += [grows.eq(most), ahead.eq(far)]
+        m.d.comb += grown.eq(place + grows)
+        m.d.sync += place.eq(Mux(step[0], Mux(step[1], half, -half), on))
         phase = Signal(bits)
         coming = Signal(bits)
         moved = Signal()
@@ -191,7 +195,3 @@ def _owed(m: Module, angles: Angles, jumps: Value, gap: Value) -> Signal:
     m.d.comb += pay.eq(Mux(jumps, gap, ~(debt >> spread)))
     m.d.sync += debt.eq(debt + pay + (~jumps & ~(debt[-1] & debt[:spread].any())))
     return debt
-
-
-def _held(value: Value, most: int) -> Value:
-    return Mux(value > most, most, Mux(value < -most, -most, value))

@@ -63,7 +63,7 @@ test_refusals = refused(
 
 FAULTS = (
     ("(place == before)", "C(0)", 5),  # a second index that agrees
-    ("-half), _held", "0), _held", 5),  # the edge after a count
+    ("-half), on", "0), on", 5),  # the edge after a count
     ("ahead.eq(far)", "ahead.eq(0)", 2),  # the lead
     ("at.eq(counted)", "at.eq(at)", 0),
     ("shift.eq(difference + offset)", "shift.eq(difference)", 0),
