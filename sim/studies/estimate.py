@@ -117,8 +117,8 @@ class Estimate:
     def of(spec: AnySpec, bus: Bus | None, family: str) -> "Estimate":
         """Return the estimate of a core with its registers on a bus, with a remedy if its clock is out of reach."""
         made = _estimate(spec, bus, family)
-        if made.is_too_slow and (alone := spec.tachometer) is spec:
-            for options, other in _remedies(alone):
+        if made.is_too_slow and isinstance(spec, TachometerSpec):
+            for options, other in _remedies(spec):
                 if not (found := _estimate(other, bus, family)).is_too_slow:
                     return replace(made, remedy=(options, found.clock_hz))
         return made
