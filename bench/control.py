@@ -116,7 +116,7 @@ def assumptions(seeds: int, jobs: int | None) -> Rows:
         conventional = replace(base, gains=replace(base.gains, way=Observer.CONVENTIONAL))
         for name, varied in (*variants(base), ("the conventional observer", conventional)):
             rows.setdefault(name, [name]).append(cell(outcome_of(varied, range(seeds), jobs)))
-    return [("what is changed", "1 ms, k_v = 40", "20 µs, k_v = 80"), *rows.values()]
+    return [("change", "1 ms, k_v = 40", "20 µs, k_v = 80"), *rows.values()]
 
 
 def in_gates(seeds: int, jobs: int | None) -> Rows:

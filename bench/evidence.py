@@ -7,7 +7,7 @@ PAGE, TABLES = MEASURED / "evidence.md", MEASURED / "tables"
 
 
 def results() -> dict[str, str]:
-    """Return what each table shows."""
+    """Return the summary of each table."""
 
     def total(name: str, column: str) -> str:
         rows = [row for row in read_table(TABLES / f"{name}.csv") if ", all" not in row.get("core", "")]

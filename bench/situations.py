@@ -160,7 +160,7 @@ def model_table() -> str:
 
 
 def wins(errors: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """By situation the error of the first column over that of the best tuned one, where that is less."""
+    """Return the error of the first column over that of the best tuned one, by situation, where that is less."""
     ratio = {name: row[0] / min(row[len(OURS) :]) for name, row in errors.items()}
     return {name: over for name, over in sorted(ratio.items(), key=lambda item: -item[1]) if over * _WON > 1}
 

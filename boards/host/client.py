@@ -23,8 +23,8 @@ class Client:
     - `write`: Writes a value to the register at an offset in bytes.
     - `manifest`: What `NAME.json` of a core on a bus says.
 
-    It raises ValueError if the manifest is that of a core without registers; WrongBoard if what answers is not the core
-    of the manifest.
+    It raises ValueError if the manifest is that of a core without registers; WrongBoard if another
+    core answers.
     """
 
     def __init__(self, read: Read, write: Write, manifest: Mapping[str, Any]) -> None:

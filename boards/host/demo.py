@@ -19,8 +19,8 @@ class DemoBoard:
     - `manifest`: What `NAME.json` of the demo says.
     - `timeout`: Seconds in which an answer must come.
 
-    It raises ValueError if the manifest is not that of a demo; NoAnswer if nothing answers; WrongBoard if what answers
-    is not the demo of the manifest.
+    It raises ValueError if the manifest is not that of a demo; NoAnswer if nothing answers; WrongBoard if another
+    demo answers.
     """
 
     def __init__(self, port: Port, manifest: Mapping[str, Any], timeout: float = 0.5) -> None:

@@ -25,8 +25,8 @@ class LoopClient(Client):
 
     - `read`, `write`, `manifest`: See `Client`.
 
-    It raises ValueError if the manifest is that of a core without registers or without a loop; WrongBoard if what
-    answers is not the core of the manifest.
+    It raises ValueError if the manifest is that of a core without registers or without a loop; WrongBoard if
+    another core answers.
     """
 
     def __init__(self, read: Read, write: Write, manifest: Mapping[str, Any]) -> None:
