@@ -118,12 +118,16 @@ def fit(family: str) -> dict[str, list[float]]:
     return {"cells": [round(float(each), 3) for each in weights], "times": [round(each, 3) for each in times]}
 
 
+def before(family: str) -> dict[str, dict[str, float]]:
+    """Return the figures of a family in the table, by core: cores of other families have the same options."""
+    table = (row for row in read_table(TABLE) if row["family"] == FAMILIES[family].title)
+    return {row["core"]: {"cells": float(row["cells"]), "Fmax": float(row["MHz"] or 0)} for row in table}
+
+
 def measured(family: str, only: Sequence[int] | None) -> list[tuple[str, float, float, float, float]]:
     """Return random cores: options, cells packed and estimated, MHz and estimated; those not in `only` stay."""
-    table = (row for row in read_table(TABLE) if row["family"] == FAMILIES[family].title)
-    stays = {row["core"]: {"cells": float(row["cells"]), "Fmax": float(row["MHz"] or 0)} for row in table}
     rows = []
-    for spec, bus, text, figures in drawn(family, "cores", only, stays):
+    for spec, bus, text, figures in drawn(family, "cores", only, before(family)):
         found, (cells, *_), clock = estimate.Estimate.of(spec, bus, family), figures.values(), figures.get("Fmax", 0)
         guess = found.clock_hz / 1e6 if clock or FAMILIES[family].timed else 0
         rows.append((text, cells, float(found.cells), clock, guess))

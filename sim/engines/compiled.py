@@ -111,7 +111,8 @@ class CompiledEngine(ABC):
     def library(self, design: Design) -> Path:
         """Return the compiled design, with the entries of driver.h."""
 
-    def _kept(self, design: Design) -> Path:
+    def kept(self, design: Design) -> Path:
+        """Return the library of a design, which is looked up once."""
         if design.watched is not None:
             return self.library(design)
         key = (design.spec, design.long)
@@ -132,7 +133,7 @@ class CompiledEngine(ABC):
         pins = driven_pins(spec, trace)
         watched = None if vcd is None else Watched(spec)
         design = Design(spec, pins, watched, trace.n_clocks > _LONG)
-        play = Play(self._kept(design), design, trace, window or (0, trace.n_clocks), self.every_clock)
+        play = Play(self.kept(design), design, trace, window or (0, trace.n_clocks), self.every_clock)
         interrupt = None
         with ExitStack() as stack:
             waveform = None

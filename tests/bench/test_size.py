@@ -275,3 +275,10 @@ def test_the_cells_that_commands_know_are_those_of_the_page() -> None:
     assert {name: int(rows[row]) for name, row in size.METHOD_CELLS.items()} == CELLS
     assert {name.removesuffix("-block") for name in CELLS} == set(METHODS)
     assert f" {CELLS['track']} cells of an ECP5" in docs.page("concepts/track.md")
+
+
+def test_a_core_of_two_families_keeps_the_cells_of_each() -> None:
+    page, rows = load("estimate"), docs.table("estimate")
+    for family, title in (("ecp5", "ECP5"), ("gowin", "Gowin GW1N")):
+        cells = {row["core"]: float(row["cells"]) for row in rows if row["family"] == title}
+        assert {core: figures["cells"] for core, figures in page.before(family).items()} == cells

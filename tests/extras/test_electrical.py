@@ -16,6 +16,7 @@ from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import of_texts
 from tachometry.spec.core.extras.electrical import ElectricalAngle
@@ -81,6 +82,22 @@ def wrong_gates(text: str, wrong: str) -> Any:
 def test_wrong_gates_are_seen(text: str, wrong: str, case: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(electrical, "Gates", wrong_gates(text, wrong))
     assert lockstep(CASES[case].spec, CASES[case].trace(), PySim()).n_mismatches
+
+
+def test_a_later_index_keeps_what_was_set() -> None:
+    """An index a turn, and in the second turn a set: gates without it agree no more."""
+    spec, clock = Case("s", f"electrical=7 index=yes {SLOW}").spec, np.arange(0, 4000, 10)
+    place = np.arange(len(clock)) + 50
+    a, b, z, sets = (
+        lines.astype(np.uint8) for lines in (place % 4 > 1, (place + 1) % 4 > 1, place % 100 < 4, place == 220)
+    )
+    more = {"angle_set": sets, "angle_value": np.full(len(clock), 12345)}
+    trace = PinTrace(clock, a, b, 4000, z, more=more).completed(spec)
+    assert lockstep(spec, trace, PySim()).n_mismatches == 0
+    assert len(golden.run(spec, trace).tables["index_valid"].clock) == 4
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(electrical, "Gates", wrong_gates("m.If(rises & ~indexed)", "m.If(rises)"))
+        assert lockstep(spec, trace, PySim()).n_mismatches
 
 
 def is_exact(gates: Any) -> bool:

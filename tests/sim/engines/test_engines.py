@@ -12,8 +12,8 @@ from support.nightly import only
 
 from tachometry.hdl import Tachometer
 from tachometry.sim import build, golden
-from tachometry.sim.engines.compiled import CompiledEngine
-from tachometry.sim.engines.cxxrtl import translate
+from tachometry.sim.engines.compiled import CompiledEngine, Design
+from tachometry.sim.engines.cxxrtl import Cxxrtl, translate
 from tachometry.sim.engines.engine import Engine, Interrupted
 from tachometry.sim.engines.pick import ENGINES, NAMES, pick, present
 from tachometry.sim.engines.pysim import PySim
@@ -131,6 +131,13 @@ def test_the_compiler_is_that_of_cxx_or_the_systems_or_ziglangs(
     found = build.find_compiler()
     assert found is not None
     assert found[1:] == ("-m", "ziglang", "c++")
+
+
+def test_a_long_run_has_a_library_of_its_own() -> None:
+    """In any order: the compiler takes its time for it alone."""
+    designs = [Design(SPEC, list(SPEC.ports.pins), long=long) for long in (False, True)]
+    engine = Cxxrtl()
+    assert len({engine.kept(design) for design in (*designs, *designs)}) == 2
 
 
 def test_every_engine_is_one() -> None:
