@@ -46,8 +46,12 @@ class ElectricalAngle(Extra):
     pole_pairs: int = option(
         REQUIRED, _POLE_PAIRS, name=name, metavar="P", parse=parse_whole, limits=(1, 512), tests=("", "7"), tacit=True
     )
-    offset: int = option(0, _OFFSET, name="electrical-offset", metavar="ANGLE", parse=parse_offset, tests=("", "30deg"))
-    lead: int = option(0, _LEAD, metavar="TIME", parse_at=parse_lead, limits=(0, 65535), tests=("", "1.5tick"))
+    offset: int = option(
+        0, _OFFSET, name="electrical-offset", metavar="ANGLE", parse=parse_offset, tests=("", "30deg"), tacit=True
+    )
+    lead: int = option(
+        0, _LEAD, metavar="TIME", parse_at=parse_lead, limits=(0, 65535), tests=("", "1.5tick"), tacit=True
+    )
 
     def angles(self, spec: Numbers) -> Angles:
         """Return the formats of the angles of a core."""
