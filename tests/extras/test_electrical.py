@@ -15,6 +15,7 @@ from tachometry.hdl.extras import electrical
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.sim.engines.pysim import PySim
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.lockstep import lockstep
@@ -84,20 +85,32 @@ def test_wrong_gates_are_seen(text: str, wrong: str, case: int, monkeypatch: pyt
     assert lockstep(CASES[case].spec, CASES[case].trace(), PySim()).n_mismatches
 
 
-def test_a_later_index_keeps_what_was_set() -> None:
-    """An index a turn, and in the second turn a set: gates without it agree no more."""
-    spec, clock = Case("s", f"electrical=7 index=yes {SLOW}").spec, np.arange(0, 4000, 10)
-    place = np.arange(len(clock)) + 50
-    a, b, z, sets = (
-        lines.astype(np.uint8) for lines in (place % 4 > 1, (place + 1) % 4 > 1, place % 100 < 4, place == 220)
-    )
-    more = {"angle_set": sets, "angle_value": np.full(len(clock), 12345)}
-    trace = PinTrace(clock, a, b, 4000, z, more=more).completed(spec)
+def turning(words: str, sets: Any, home: int = 0) -> tuple[Any, PinTrace]:
+    """Return a core and four turns, with an index in clock 523 and each 1000 later; the angle is set in these clocks.
+
+    `home` is high in clock 600, and from a clock on.
+    """
+    spec, clock = Case("s", f"electrical=7 index=yes {words} {SLOW}").spec, np.arange(4000)
+    place, again = clock // 10 + 50, (home > 0) & ((clock == 600) | (clock >= home))
+    lines = (place % 4 > 1, (place + 1) % 4 > 1, place % 100 < 4, np.isin(clock, sets), again)
+    a, b, z, is_set, homes = (line.astype(np.uint8) for line in lines)
+    more = {"angle_set": is_set, "angle_value": np.full(4000, 12345)} | ({"home": homes} if home else {})
+    return spec, PinTrace(clock, a, b, 4000, z, more=more).completed(spec)
+
+
+def test_a_later_index_keeps_what_was_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    spec, trace = turning("", [1700])
+    assert golden.run(spec, trace).tables["index_valid"].clock.tolist() == [524, 1524, 2524, 3524]
     assert lockstep(spec, trace, PySim()).n_mismatches == 0
-    assert len(golden.run(spec, trace).tables["index_valid"].clock) == 4
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(electrical, "Gates", wrong_gates("m.If(rises & ~indexed)", "m.If(rises)"))
-        assert lockstep(spec, trace, PySim()).n_mismatches
+    monkeypatch.setattr(electrical, "Gates", wrong_gates("m.If(rises & ~indexed)", "m.If(rises)"))
+    assert lockstep(spec, trace, PySim()).n_mismatches
+
+
+@pytest.mark.parametrize("late", range(-3, 3))
+def test_sets_and_homes_about_the_clock_of_an_index(late: int) -> None:
+    sets = [*range(400, 523 + late), *range(1200, 1600)]
+    for words, home in (("", 0), ("index-once=yes", 1520 + late)):
+        assert lockstep(*turning(words, sets, home), Cxxrtl()).n_mismatches == 0
 
 
 def is_exact(gates: Any) -> bool:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.extras import View
-from tachometry.sim.golden.sorted_lookup import Ints, spans
+from tachometry.sim.golden.sorted_lookup import Ints
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
@@ -16,7 +16,7 @@ from tachometry.spec.formats.angles import PLACE_BITS, SHOWN_BITS, SLOPE_BITS, A
 
 _TURN = 1 << SHOWN_BITS
 _NEVER = _GROWS = _FREE = 1 << 62  # no clock, a place that grows on, and a place without an end
-_SET, _INDEX, _HOME = range(3)  # events of a clock, in the order in which they act
+_LONGEST = 1 << 31  # clocks in which every place that has an end comes to it
 
 
 def tables(extra: ElectricalAngle, view: View) -> dict[str, Table]:
@@ -27,17 +27,24 @@ def tables(extra: ElectricalAngle, view: View) -> dict[str, Table]:
     offset = _latest([(0, extra.offset), *offsets], "offset")
     phases = (_tracked if view.spec.carrying else _counted)(extra, view, counts)
     found = {"angle_phase": phases, "angle_offset": offset, REFUSED: Table(np.array(refused, np.int64), {})}
-    return found | {"angle_difference": _differences(extra.angles(view.spec), view, phases, offset)}
+    return found | _sets(view)
 
 
 def shown(
     extra: ElectricalAngle, spec: TachometerSpec, found: Mapping[str, Table], clock: Ints, cleared: int
 ) -> dict[str, NDArray[Any]]:
     """Return the angle, whether it is valid, and how many indices were refused; a program does not clear these."""
-    differences, before = found["angle_difference"], clock - 2
-    shift = _at(differences, "difference", before) + _at(found["angle_offset"], "offset", before)
-    angle = (_top(extra.angles(spec), found["angle_phase"], clock - 1) + shift) % _TURN
-    columns = {"angle": np.where(clock > 0, angle, 0), "angle_valid": _at(differences, "valid", clock) > 0}
+    angles, before, phases, offset = extra.angles(spec), clock - 3, found["angle_phase"], found["angle_offset"]
+    # What the angle was set to, or nothing from the first index on.
+    at = _last_set(found, before)
+    there, rows = np.unique(at - 1, return_inverse=True)
+    difference = _at(found["angle_value"], "value", there) - _top(angles, phases, there) - _at(offset, "offset", there)
+    is_set = at > _at(found["angle_first"], "at", before)
+    shift = np.where(is_set, difference[rows], 0) + _at(offset, "offset", before + 1)
+    angle = (_top(angles, phases, clock - 1) + shift) % _TURN
+    marks, homes = (_at(found[f"angle_{name}"], "at", clock - 1) for name in ("index", "home"))
+    valid = np.maximum(_last_set(found, clock - 1), marks) > homes
+    columns = {"angle": np.where(clock > 0, angle, 0), "angle_valid": valid}
     if extra.corrects(spec):
         refused = np.searchsorted(found[REFUSED].clock, clock, side="right")
         columns[REFUSED] = np.minimum(refused, (1 << REFUSED_BITS) - 1)
@@ -143,27 +150,40 @@ def _owing(angles: Angles, rows: list[list[int]]) -> Table:
 
 def _top(angles: Angles, phases: Table, clock: Ints) -> Ints:
     """Return the phase in each of these clocks, as it is shown; 0 before the first."""
-    rows, found, most = phases["rows"].tolist(), list[int](), _FREE if angles.tracks else angles.count[0] >> 1
-    for at, row in zip(clock.tolist(), np.searchsorted(phases.clock, clock, side="right").tolist(), strict=True):
-        first, base, slope, place, debt = rows[row - 1] if row else (at, 0, 0, 0, 0)
-        grown = max(-most, min(most, place + slope * (at - first)))
-        found.append((base + grown + _paid(debt, at - first, angles.spread) >> angles.bits - SHOWN_BITS) % _TURN)
-    return np.array(found, np.int64)
+    most = _FREE if angles.tracks else angles.count[0] >> 1
+    first, base, slope, place, debt = np.vstack((np.zeros((1, 5), np.int64), phases["rows"]))[
+        np.searchsorted(phases.clock, clock, side="right")
+    ].T
+    clocks = np.minimum(clock - first, _LONGEST)
+    size, left = np.abs(debt), clocks.copy()  # as `_paid`, for all at once
+    while len(owing := np.flatnonzero((left > 0) & (size >> angles.spread > 0))):
+        pay = size[owing] >> angles.spread
+        some = np.minimum((size[owing] - (pay << angles.spread)) // pay + 1, left[owing])
+        size[owing] -= some * pay
+        left[owing] -= some
+    grown = np.clip(place + slope * clocks, -most, most)
+    shown: Ints = (base + grown + np.sign(debt) * size >> angles.bits - SHOWN_BITS) % _TURN
+    return shown
 
 
-def _differences(angles: Angles, view: View, phases: Table, offset: Table) -> Table:
-    """Return by how much the angle was set, or 0 from the first index on, and whether it is valid."""
-    trace, steps, late = view.trace, view.steps, view.spec.latency.tick - 1
+def _sets(view: View) -> dict[str, Table]:
+    """Return the spans in which the angle is set, its values, and of indices and `home` one more than their clocks.
+
+    In one clock a set comes first, then an index, then `home`.
+    """
+    trace, late = view.trace, view.spec.latency.tick - 1
     sets, ends = np.flatnonzero(trace.lines["angle_set"]), np.append(trace.clock, trace.n_clocks) + 1
-    acts = {_SET: spans(ends[sets], ends[sets + 1])[0], _INDEX: steps.index + late, _HOME: steps.arms + late}
-    rows, difference, indexed = [(0, 0, 0)], 0, False
-    for at, kind in sorted((at, kind) for kind, clocks in acts.items() for at in clocks.tolist()):
-        clock = np.array([at])
-        if kind == _SET:
-            value = _written(view.trace, "angle_value", clock, 0) - _top(angles, phases, clock)
-            difference = int((value - _at(offset, "offset", clock))[0]) % _TURN
-        elif kind == _INDEX and not indexed:
-            difference = 0
-        indexed = kind == _INDEX or (indexed and kind != _HOME)
-        rows.append((at + 1, difference, int(kind != _HOME)))
-    return _latest(rows, "difference", "valid")
+    value = _written(trace, "angle_value", trace.clock, 0)
+    marks, homes = view.steps.index + late, view.steps.arms + late
+    # First is that of all, and that behind each `home`.
+    turns = np.searchsorted(homes, marks, side="left")
+    first = marks[np.diff(turns, prepend=-1) > 0]
+    clocks = {"first": first, "index": marks, "home": homes}
+    found = {f"angle_{name}": Table(at, {"at": at + 1}) for name, at in clocks.items()}
+    spans = Table(ends[sets], {"end": ends[sets + 1]})
+    return found | {"angle_sets": spans, "angle_value": Table(trace.clock, {"value": value})}
+
+
+def _last_set(found: Mapping[str, Table], clock: Ints) -> Ints:
+    """Return one more than the last clock in which the angle was set, not after each of these; 0 or less for none."""
+    return np.minimum(_at(found["angle_sets"], "end", clock), clock + 1)
