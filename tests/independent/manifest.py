@@ -48,8 +48,8 @@ WORDS = {
     "track": {**_SHARED, **_TRACK},
 }
 # Named only where they are asked for.
-_TACIT = ("electrical", "electrical_offset", "lead", "health", "health_edges", "health_errors", "over_speed")
-_TACIT += ("position_compare",)
+_HEALTH = ("health", "health_edges", "health_errors")
+_TACIT = (*_HEALTH, "electrical", "electrical_offset", "lead", "over_speed", "position_compare")
 _FLAGS = ("index", "index-reset", "age", "bounds", "paper-exact", "whole-cycles", "health")
 # Entries of the acceleration, and its unit for that of the velocity.
 ACCELERATION = ("width", "frac_bits", "unit", "rad_per_s2_per_lsb")
