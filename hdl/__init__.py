@@ -5,9 +5,10 @@ import warnings
 from amaranth import hdl
 
 from tachometry.hdl.core.core import AnyTachometer, core_of
+from tachometry.hdl.core.peripheral import Peripheral, peripheral
 from tachometry.hdl.core.tachometer import Tachometer
 
-__all__ = ["AnyTachometer", "Tachometer", "core_of"]
+__all__ = ["AnyTachometer", "Peripheral", "Tachometer", "core_of", "peripheral"]
 
 # A core that Amaranth warns of is another one than was described: a constant is cut, for example. So these warnings
 # are errors in every command. Deprecations are not: another version of Python may add them. A box that is never used is
