@@ -11,7 +11,7 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.axes.axis_tick_counts import BLOCK, counts_layout
-from tachometry.hdl.axes.track_turns import SHOWN_AFTER, TrackTurns, turn_layout
+from tachometry.hdl.axes.track_turns import SHOWN_AFTER, TrackTurns, shown_of, turn_layout
 from tachometry.hdl.output.update import shown_layout, update_layout
 from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput
 from tachometry.hdl.wires.delay import delay
@@ -158,7 +158,7 @@ class AxesTrackDatapath(wiring.Component):
                 ticks.position.eq(after.position),
                 ticks.pulse_count.eq(counts[0]),
                 ticks.overflow.eq(counts[1]),
-                *(new[name].eq(found[name]) for name in ("velocity", "acceleration", "velocity_std")),
+                *(new[name].eq(found[name]) for name in shown_of(axis)),
                 new.position_fine.eq(rounded),
                 new.interval.eq(after.elapsed),
                 new.forced.eq(~after.counted),

@@ -6,17 +6,21 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.axes.axis_tick_counts import BLOCK, counts_layout
+from tachometry.hdl.methods.track import delay_of
 from tachometry.hdl.methods.track_machine import TrackMachine
 from tachometry.hdl.output.update import update_layout
 from tachometry.hdl.wires.ports import by_name, drive, only_if
 from tachometry.spec.formats.tracking import PLACE_BITS, WIDTH
+from tachometry.spec.formats.tracking_code import SMOOTH
 from tachometry.spec.methods.axes import AxesSpec
 from tachometry.spec.methods.track_axis import TrackAxis
 
 SHOWN_AFTER = 4  # clocks
 
 
-_FOUND = ("velocity", "acceleration", "velocity_std", "standstill")
+def shown_of(axis: TrackAxis) -> tuple[str, ...]:
+    """Return the names of what an update takes from the machine as it is."""
+    return ("velocity", "acceleration", "velocity_std", *(SMOOTH if axis.smooth else ()))
 
 
 def turn_layout(axis: TrackAxis) -> data.StructLayout:
@@ -31,7 +35,7 @@ def turn_layout(axis: TrackAxis) -> data.StructLayout:
             "moved": signed(axis.form.moved_bits),
             "counted": 1,
             **({"position": signed(axis.position_width)} if axis.front_end.index_resets else {}),
-            **{name: layout[name] for name in _FOUND},
+            **{name: layout[name] for name in (*shown_of(axis), "standstill")},
             "place": signed(WIDTH - PLACE_BITS + axis.position_fine_bits + 1),
         }
     )
@@ -93,7 +97,10 @@ class TrackTurns(wiring.Component):
             self.turn.first.eq(first),
             self.turn.moved.eq(counts.moved),
             self.turn.counted.eq(counts.number.any()),
-            *(self.turn[name].eq(port) for name, port in by_name(machine, _FOUND).items()),
+            *(
+                self.turn[name].eq(delay_of(port, axis.form.time_bits) if name == SMOOTH[1] else port)
+                for name, port in by_name(machine, (*shown_of(axis), "standstill")).items()
+            ),
             self.turn.place.eq(machine.position_fine >> (PLACE_BITS - axis.position_fine_bits - 1)),
         ]
         if position is not None:

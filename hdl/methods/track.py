@@ -12,6 +12,13 @@ from tachometry.hdl.methods.track_machine import TrackMachine
 from tachometry.hdl.wires.ports import follow
 from tachometry.spec import TrackTachometer
 from tachometry.spec.formats.tracking import PLACE_BITS
+from tachometry.spec.formats.tracking_code import SMOOTH_DELAY_BITS
+
+
+def delay_of(shown: Value, time_bits: int) -> Value:
+    """Return the clocks of a delay that the machine shows; one that the port does not hold is its greatest."""
+    clocks = shown[time_bits:]
+    return (clocks | clocks[SMOOTH_DELAY_BITS:].any().replicate(SMOOTH_DELAY_BITS))[:SMOOTH_DELAY_BITS]
 
 
 class TrackMethod(wiring.Component):
@@ -67,6 +74,10 @@ class TrackMethod(wiring.Component):
         new = self.updates.p
         shift = PLACE_BITS - spec.position_fine_bits
         m.d.sync += self.updates.valid.eq(ready)
+        if spec.smooth:
+            delay = delay_of(machine.smooth_delay, spec.form.time_bits)
+            with m.If(ready):
+                m.d.sync += [new.velocity_smooth.eq(machine.velocity_smooth), new.smooth_delay.eq(delay)]
         with m.If(ready):
             m.d.sync += [
                 new.velocity.eq(machine.velocity),

@@ -121,7 +121,7 @@ class TrackMachine(wiring.Component):
                 "kind": In(2),  # of the last count's edge
                 "end": In(2),  # kind of the position at the end
                 "down": In(1),  # the last count went backward
-                **dict.fromkeys(OUTPUTS[1:], Out(signed(WIDTH))),
+                **dict.fromkeys(program.outputs, Out(signed(WIDTH))),
                 "standstill": Out(1),  # of a tick without a count
             }
         )
@@ -319,7 +319,7 @@ class TrackMachine(wiring.Component):
         shows = Signal(3)
         domain = m.d.sync if self._two else m.d.comb
         domain += shows.eq(Mux(self.go, self.now.output, 0))
-        for name, port in by_name(self, filter(None, OUTPUTS)).items():
+        for name, port in by_name(self, self._program.outputs).items():
             with m.If(shows == OUTPUTS.index(name)):
                 m.d.sync += port.eq(~self.made[-1] if name == "standstill" else self.made)
 

@@ -9,7 +9,7 @@ from tachometry.spec.formats.velocity_output import VelocityOutput
 from tachometry.spec.language.port import UPDATE
 
 # The velocities of an update, and which way each is rounded: to the nearest (0), down (−1) or up (1).
-VELOCITIES = {"velocity": 0, **BOUNDS}
+VELOCITIES = {"velocity": 0, "velocity_smooth": 0, **BOUNDS}
 
 
 def update_layout(spec: TachometerSpec) -> data.StructLayout:
@@ -28,6 +28,8 @@ def update_layout(spec: TachometerSpec) -> data.StructLayout:
     if spec.bounds:
         fields |= {name: signed(spec.velocity.bound_width) for name in BOUNDS} | {"bounds_valid": 1}
     fields |= {port.name: signed(port.width) if port.signed else port.width for port in spec.method_ports}
+    if "velocity_smooth" in fields:
+        fields["velocity_smooth"] = fields["velocity"]
     return data.StructLayout(fields)
 
 

@@ -26,6 +26,7 @@ def in_unit(spec: TachometerSpec, updates: Table) -> Table:
 
     velocity, overflow = scaled(updates.velocity)
     bounds = {name: scaled(updates[name], towards)[0] for name, towards in BOUNDS.items() if spec.bounds}
+    bounds |= {name: scaled(updates[name])[0] for name in ("velocity_smooth",) if name in updates.columns}
     clock = updates.clock + spec.latency.output
     return updates.having(clock=clock, velocity=velocity, velocity_overflow=overflow, **bounds)
 

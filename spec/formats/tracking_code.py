@@ -39,17 +39,13 @@ class Jump(IntEnum):
     END = 6
 
 
+SMOOTH = ("velocity_smooth", "smooth_delay")
+SMOOTH_DELAY_BITS = 32
 INPUTS = ("number", "counts", "places", "times", "last", "moved", "length")
 OFFSETS = ("o0", "o1", "o2", "o3")
 CHOSEN = ("o@last", "o@up", "o@down", "o@m1", "o@m2", "o@m3")  # an offset that the tick chooses
-OUTPUTS = (
-    "",
-    "velocity",
-    "position_fine",
-    "velocity_std",
-    "acceleration",
-    "standstill",
-)  # standstill: not if it is negative
+# Each by its number; standstill: not if it is negative; the last two only of a program with `smooth`.
+OUTPUTS = ("", "velocity", "position_fine", "velocity_std", "acceleration", "standstill", *SMOOTH)
 ADDRESS_BITS = 7
 FIRST_CHOSEN = (1 << ADDRESS_BITS) - 8  # address of what the tick chooses
 FIRST_OFFSET = FIRST_CHOSEN - (1 << ADDRESS_BITS - 1)  # another bit, so that few cells choose
@@ -165,17 +161,18 @@ class Code:
 
 
 @cache
-def assembled(listing: str = LISTING, apart: int = 2, ports: int = 1) -> Code:
+def assembled(listing: str = LISTING, apart: int = 2, ports: int = 1, *, smooth: bool = False) -> Code:
     """Return the instructions of a listing, with some that do nothing where a word would be read too early.
 
     The one that reads a word is `apart` instructions behind one that stores it, or more. Each reads `ports` words.
     """
     code: list[Instruction] = []
     labels: dict[str, int] = {}
+    wanted = {"block": ports > 1, "serial": ports == 1, "smooth": smooth}
     for line in re.sub("#.*", "", listing).replace(";", "\n").splitlines():
         words = line.split()
-        if words[:1] in (["block"], ["serial"]):
-            words = words[1:] if (words[0] == "block") == (ports > 1) else []
+        if words and words[0] in wanted:
+            words = words[1:] if wanted[words[0]] else []
         if not words:
             continue
         if words[0].endswith(":"):
@@ -266,15 +263,15 @@ def _same(stored: str, read: str) -> bool:
 
 
 @cache
-def _longest(times: Times, output: str = "") -> int:
+def _longest(times: Times, output: str = "", *, smooth: bool = False) -> int:
     """Return the clocks of the longest way to an output or, without one, to the last instruction."""
-    return max(_longest_of(counts, times, output) for counts in range(3))
+    return max(_longest_of(counts, times, output, smooth) for counts in range(3))
 
 
-def _longest_of(counts: int, times: Times, output: str) -> int:
+def _longest_of(counts: int, times: Times, output: str, smooth: bool) -> int:
     """Return them for no count, one, or several; nothing else of how ways exclude each other is known."""
     known = {Jump.ALWAYS: True, Jump.END: True, Jump.EMPTY: counts == 0, Jump.ONE: counts == 1}
-    made = assembled(apart=times.apart, ports=times.ports)
+    made = assembled(apart=times.apart, ports=times.ports, smooth=smooth)
     code, labels = made.instructions, made.labels
     entry: dict[int, tuple[int, int]] = {labels["tick"]: (0, 0)}  # clock, and when the unit has finished
     longest, open_ = 0, {labels["tick"]}
@@ -312,11 +309,17 @@ class Program:
     times: Times  # of the unit
     # clocks from an edge to the port, less those of the program: the velocity is that of the clock in which it is shown
     delay: int
+    smooth: bool = False  # whether it also has the outputs `SMOOTH`
 
     @cached_property
     def code(self) -> Code:
         """The instructions."""
-        return assembled(apart=self.times.apart, ports=self.times.ports)
+        return assembled(apart=self.times.apart, ports=self.times.ports, smooth=self.smooth)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The names of its outputs."""
+        return tuple(name for name in OUTPUTS[1:] if self.smooth or name not in SMOOTH)
 
     @property
     def ahead(self) -> int:
@@ -326,12 +329,12 @@ class Program:
     @cached_property
     def clocks(self) -> int:
         """Clocks from the tick until the last output holds, by the longest way."""
-        return _longest(self.times, "acceleration") + self.times.fetch_clocks
+        return _longest(self.times, "acceleration", smooth=self.smooth) + self.times.fetch_clocks
 
     @cached_property
     def all_clocks(self) -> int:
         """Clocks from a tick until the next may come."""
-        return _longest(self.times) + self.times.fetch_clocks
+        return _longest(self.times, smooth=self.smooth) + self.times.fetch_clocks
 
     @cached_property
     def constants(self) -> dict[str, int]:

@@ -11,6 +11,7 @@ what is begun with the sum`.
     o@m1, o@m2, o@m3       of the last count if n mod 4 ≥ 1, of that before if ≥ 2, of the third if = 3, else 0
     keep          the sign of the sum         log, exp      begin log2|sum|, 2^sum       out name      an output
     gain k        begin: log of the gain of p (0), v (1), a (2)  block, serial  before a line: for that machine only
+    smooth        before a line: for a core with --smooth only
     by            the factor of products      product name  begin: sum·factor/2^shift of that name
     over n        begin: shift right by n     over by       by ⌊log2⌋ of the factor's whole part
 """
@@ -85,11 +86,13 @@ grown:
     t = places - ~
     serial zero s+ left by
     V product place_64
+    smooth since + of_e out smooth_delay
     since = tau; P = P - moved
     t s+ ~ keep log
     block memory = memory max clock
     log_64 + minus_log_n + ~ exp
     edge = raw - moved
+    smooth of_v out velocity_smooth
     e = zero s+ ~ keep log
 heard:
     $counts + slack - one s- e; if neg goto slip
@@ -204,6 +207,10 @@ short:
     a = zero s+ t
     if one goto offsets
 ready:                                  # growth of the memory and noise, for the next event
+    smooth a keep log; smooth log_T - of_slope + ~ exp  # in the middle of the memory
+    smooth of_v = v s- ~; smooth tick by; smooth of_v product shown
+    smooth of_v = ~ min most_shown max least_shown; smooth T over 1
+    smooth of_e = ahead + ~             # of_v and of_e hold its velocity and age for the next tick
     D log
     minus_Ds = zero - D; growth = zero; after = minus_one
     limit = order + ~ + ~
@@ -281,7 +288,7 @@ offsets:
     goto ready
 lone:
     e = c - P keep log
-    edge = raw - moved; since = tau
+    edge = raw - moved; smooth since + of_e out smooth_delay; smooth of_v out velocity_smooth; since = tau
     memory = T + step min most_memory max clock
     P = P - moved
     goto heard
@@ -310,6 +317,7 @@ first:
     goto nothing
 young:
     log_dt = ~
+    smooth zero + zero out smooth_delay; smooth sum out velocity_smooth
     phase + one; if neg goto first
 begin:
     e = c - p keep log
@@ -325,6 +333,7 @@ begin:
     T = ~
     goto show
 same:
+    smooth since + of_e out smooth_delay; smooth of_v out velocity_smooth
     edge = edge - moved; p = p - moved
     goto show
 silent:
@@ -332,6 +341,7 @@ silent:
     quiet = $length + quiet max zero min most
     sum - max_time out standstill + max_time - forget; if pos goto rest
     phase; if neg goto nothing
+    smooth since + of_e out smooth_delay; smooth of_v out velocity_smooth
 show:
     since + ahead by
     as product velocity
@@ -379,6 +389,7 @@ rest:
     phase = minus_two; since = zero; p = zero
 nothing:
     velocity_std = none; least = zero; velocity = zero
+    smooth sum out smooth_delay; smooth sum out velocity_smooth
     p out position_fine
 quiet:
     as = zero

@@ -16,7 +16,7 @@ from tachometry.spec.core.velocity import Velocity
 from tachometry.spec.core.words import Words
 from tachometry.spec.formats.carrying import Carrying
 from tachometry.spec.formats.tracking import MOST_MEMORY, RESULT_BITS, WIDTH, Tracking
-from tachometry.spec.formats.tracking_code import Program
+from tachometry.spec.formats.tracking_code import SMOOTH, SMOOTH_DELAY_BITS, Program
 from tachometry.spec.formats.tracking_units import BLOCK, Serial
 from tachometry.spec.formats.velocity_output import NATIVE, VelocityOutput
 from tachometry.spec.language.option import ParameterError, option
@@ -99,6 +99,12 @@ class TrackTachometer(TachometerSpec):
     position_fine_bits: int = option(
         6, "Fraction bits of position_fine, 1 to 16.", metavar="N", limits=(1, 16), tests=("", "1", "16")
     )
+    smooth: bool = option(
+        False,
+        "Outputs velocity_smooth and smooth_delay. The velocity in the middle of the memory, some ms ago, has a "
+        "quarter of the noise; smooth_delay is how long ago, in clocks. For logs, identification, displays.",
+        tacit=True,
+    )
 
     method = "track"
     facts = Facts(
@@ -165,7 +171,7 @@ class TrackTachometer(TachometerSpec):
         """The program of the datapath from a tick to the update."""
         around = self._around
         delay = around.pin_to_count + around.tick + around.low_pass + around.output
-        serial = Program(self.form, Serial(self.form).times, delay)
+        serial = Program(self.form, Serial(self.form).times, delay, self.smooth)
         fits = serial.all_clocks <= self.tick.room
         return (
             serial
@@ -257,7 +263,21 @@ class TrackTachometer(TachometerSpec):
         position = held(UPDATE, "position_fine", width, signed=True, unit=unit, help=text)
         unit = f"2^{-self.velocity.frac_bits} {self.unit}"
         text = "Standard deviation that the velocity is expected to have, by the noise that was seen."
-        return acceleration, position, held(UPDATE, "velocity_std", self.form.std_bits, unit=unit, help=text)
+        deviation = held(UPDATE, "velocity_std", self.form.std_bits, unit=unit, help=text)
+        if not self.smooth:
+            return acceleration, position, deviation
+        width = self.velocity.width
+        text = "Velocity smooth_delay ago, in the middle of the memory as it was before this period. It is in the "
+        text += "format of velocity; 0 while no speed is known."
+        smooth = held(UPDATE, SMOOTH[0], width, signed=True, unit=unit, help=text)
+        text = "Time from the instant of velocity_smooth to velocity_valid; it stays at its greatest value."
+        age = held(UPDATE, SMOOTH[1], SMOOTH_DELAY_BITS, unit=self.clock_unit, help=text)
+        return acceleration, position, deviation, smooth, age
+
+    @property
+    def clock_unit(self) -> str:
+        """Unit of times in clocks."""
+        return "clocks"
 
 
 def in_loop(spec: TachometerSpec, velocity_gain: Fraction) -> TachometerSpec:

@@ -30,8 +30,12 @@ class TrackAxis(OneAxis, TrackTachometer):
     def program(self) -> Program:
         """The program of a turn, on the block unit if nothing else is asked for."""
         times = Serial(self.form).times if self.multiplier == "serial" else BLOCK
-        made = Program(self.form, times, 0)
+        made = Program(self.form, times, 0, self.smooth)
         return replace(made, delay=self.ahead - made.clocks)
+
+    @property
+    def clock_unit(self) -> str:
+        return f"{self.slots} clocks"
 
     @cached_property
     def plan(self) -> Plan:

@@ -12,7 +12,7 @@ from tachometry.sim.golden.methods.track_recursion import Recursion, log2
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TrackTachometer, of_texts
 from tachometry.spec.formats.tracking import CHANCE_BITS, GAIN_STEPS, GAINS, LOG_BITS, PLACE_BITS, WIDTH
-from tachometry.spec.formats.tracking_code import OUTPUTS, Instruction, Jump, Left, Program
+from tachometry.spec.formats.tracking_code import Instruction, Jump, Left, Program
 from tachometry.spec.formats.tracking_units import Start
 
 
@@ -62,7 +62,7 @@ class Interpreter:
             self.met[place] += 1
             place += 1
             if one.jump == Jump.END:
-                return tuple(shown[name] for name in OUTPUTS[1:])
+                return tuple(shown[name] for name in self.program.outputs)
             taken = {
                 Jump.NEVER: False,
                 Jump.ALWAYS: True,

@@ -1,5 +1,6 @@
 // The recursion of track.py, line by line. `Constants` stand before this text. The state, in which tables are,
 // belongs to the caller.
+enum { COLUMNS = 7 };
 static inline int bits_of(int64_t x) { return x ? 64 - __builtin_clzll((uint64_t)x) : 0; }
 static inline int64_t sign_of(int64_t x) { return x < 0 ? -1 : 1; }
 
@@ -15,6 +16,7 @@ struct Recursion : Tables {
   int64_t certain, slack = 0, lost = 0;
   bool standstill = false;
   int64_t log_share, offsets[4] = {0, 0, 0, 0}, grows = 1, log_growth = 0, log_limit, trouble = 0, chance, moved = 0, velocity_std = 0;
+  int64_t middle = 0, age = 0, held = 0, held_age = 0;
   int64_t *row = nullptr;
 
   Recursion(const Constants &k, const Tables &tables) : Tables(tables), k(k) {
@@ -63,7 +65,7 @@ struct Recursion : Tables {
     int64_t deviation = power(round(std::max(more + log_share, slips) + log_limit, 1) + velocity_std - log_memory, 1);
     row[2] = std::min(std::max(deviation, least), k.most_std);
     row[3] = product(shown_a, k.slope, k.acceleration);
-    row[4] = standstill;
+    row[4] = standstill, row[5] = held, row[6] = held_age;
   }
 
   void tick(int64_t number, int64_t times, int64_t places, int64_t last, int64_t moved_, int kind, bool down, int end, int64_t length) {
@@ -72,6 +74,7 @@ struct Recursion : Tables {
     since = std::min(since + (length << t), k.most_since);
     quiet = std::min(quiet + (length << t), k.most);
     moved = moved_ * k.count;
+    held = phase == 2 ? middle : 0, held_age = phase == 2 ? since + age : 0;
     standstill = !number && quiet >= k.max_time;
     if (!number) return silence(end);
     quiet = last << t;
@@ -160,6 +163,8 @@ struct Recursion : Tables {
     ready();
   }
   void ready() {
+    int64_t velocity = product(v - power(log2(a) + log_memory - k.of_slope, sign_of(a)), k.tick, k.shown);
+    middle = std::max(-k.most_shown, std::min(velocity, k.most_shown)), age = k.ahead + round(memory, 1);
     log_limit = 2 * log2(noise) + k.order;
     sure = noise;
     int64_t lagging = log_share + log_limit - k.order_lag;
@@ -207,7 +212,7 @@ struct Recursion : Tables {
     emit(velocity, z, least);
   }
   void nothing() {
-    shown_a = 0, velocity_std = k.none;
+    shown_a = held = held_age = 0, velocity_std = k.none;
     emit(0, p, 0);
   }
 };
@@ -221,7 +226,7 @@ CALLED void begin(Recursion *state, const Constants *constants, const Tables *ta
 CALLED void track(Recursion *state, int64_t ticks, const int64_t *windows, int64_t *rows) {
   for (int64_t i = 0; i < ticks; i++) {
     auto of = [&](int column) { return windows[column * ticks + i]; };
-    state->row = rows + 5 * i;
+    state->row = rows + COLUMNS * i;
     state->tick(of(0), of(1), of(2), of(3), of(4), (int)of(5), of(6) != 0, (int)of(7), of(8));
   }
 }

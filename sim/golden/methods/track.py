@@ -16,6 +16,7 @@ from tachometry.sim.signals.run import Table
 from tachometry.spec import TrackTachometer
 from tachometry.spec.formats import tracking
 from tachometry.spec.formats.tracking import LOGS, PLACE_BITS, POWERS, Tracking
+from tachometry.spec.formats.tracking_code import SMOOTH, SMOOTH_DELAY_BITS
 
 
 @dataclass(frozen=True)
@@ -82,16 +83,17 @@ class Windows:
         yield from zip(*(column.tolist() for column in vars(self).values()), strict=True)
 
 
-# What is shown in each tick, shape (n, 5), of windows that come after those of the call before.
+# What is shown in each tick, shape (n, COLUMNS), of windows that come after those of the call before.
 Rows = Callable[[Windows], NDArray[np.int64]]
 Begin = Callable[[Tracking, int], Rows]
+COLUMNS = 7  # those of `track_recursion.Row`, and in track.h
 _PIECE = 1 << 16  # ticks at a time, for which memory is needed beside that of the columns
 
 
 def rows(form: Tracking, lead: int) -> Rows:
     """Return the Python model after a reset."""
-    state = Recursion(form, lead)
-    return lambda windows: np.array([state.tick(*row) for row in windows.rows()], dtype=np.int64).reshape(-1, 5)
+    state = Recursion(form, lead, smooth=True)
+    return lambda windows: np.array([state.tick(*row) for row in windows.rows()], dtype=np.int64).reshape(-1, COLUMNS)
 
 
 def constants_of(form: Tracking, lead: int) -> dict[str, int]:
@@ -126,7 +128,7 @@ def compiled(names: tuple[str, ...]) -> Begin | None:
 
         def shown(windows: Windows) -> NDArray[np.int64]:
             columns = np.array([*vars(windows).values()], dtype=np.int64)
-            found = np.empty((columns.shape[1], 5), dtype=np.int64)
+            found = np.empty((columns.shape[1], COLUMNS), dtype=np.int64)
             begun, given, taken = (ctypes.c_void_p(array.ctypes.data) for array in (state, columns, found))
             library.track(begun, ctypes.c_int64(len(found)), given, taken)
             return found
@@ -148,7 +150,8 @@ class Model:
         shown = (compiled(tuple(constants_of(spec.form, spec.program.ahead))) or rows)(spec.form, spec.program.ahead)
         unused, shift = 64 - spec.position_width - spec.position_fine_bits, PLACE_BITS - spec.position_fine_bits
         n, most = len(ticks), spec.timing.max_ticks
-        names = ("velocity", "interval", "forced", "acceleration", "velocity_std", "position_fine", "standstill")
+        names = ["velocity", "interval", "forced", "acceleration", "velocity_std", "position_fine", "standstill"]
+        names += SMOOTH if spec.smooth else ()
         flags = ("forced", "standstill")
         columns = {name: np.empty(n, dtype=bool if name in flags else np.int64) for name in names}
         begin, reached, latest = -1, 0, -most
@@ -157,14 +160,16 @@ class Model:
             last = ticks.clock[piece] - spec.latency.tick
             windows = Windows.of(steps, last, spec.form.most_number, begin, reached)
             begin, reached = int(last[-1]), reached + int(windows.moved.sum())
-            velocity, place, velocity_std, acceleration, standstill = shown(windows).T
+            velocity, place, velocity_std, acceleration, standstill, smooth, delay = shown(windows).T
             fine = (ticks.position[piece] << spec.position_fine_bits) + ((place + (1 << shift - 1)) >> shift)
             counted = windows.number > 0
             number = np.arange(first, first + len(last))
             before = np.maximum.accumulate(np.append(latest, np.where(counted, number, latest)))
             latest = int(before[-1])
             interval = np.minimum(number - before[:-1], most)
-            values = (velocity, interval, ~counted, acceleration, velocity_std, fine << unused >> unused, standstill)
-            for name, value in zip(names, values, strict=True):
+            delay = np.minimum(delay >> spec.form.time_bits, (1 << SMOOTH_DELAY_BITS) - 1)
+            fine = fine << unused >> unused
+            values = (velocity, interval, ~counted, acceleration, velocity_std, fine, standstill, smooth, delay)
+            for name, value in zip(names, values, strict=False):
                 columns[name][piece] = value
         return Table(ticks.clock + spec.latency.datapath, {"cause": ticks.clock, **columns})

@@ -16,8 +16,9 @@ from tachometry.spec.formats.tracking import (
 )
 
 REST, ONE, TRACKS = range(3)
-# Velocity, place at the end of the tick, deviation to be expected, acceleration, whether the shaft stands still.
-Row = tuple[int, int, int, int, int]
+# Velocity, place at the end of the tick, deviation to be expected, acceleration, whether the shaft stands still; with
+# `smooth` velocity and age of the middle of the memory as it was before the tick.
+Row = tuple[int, ...]
 _HALF = 1 << CHANCE_BITS - 1
 
 
@@ -40,8 +41,8 @@ class Recursion:
     The velocity that is shown is `lead` clocks ahead of the end of the tick.
     """
 
-    def __init__(self, form: Tracking, lead: int) -> None:
-        self._form = form
+    def __init__(self, form: Tracking, lead: int, *, smooth: bool = False) -> None:
+        self._form, self._smooth = form, smooth
         self._k = k = form.constants
         self._lead = lead << form.time_bits
         self._gains = form.gains
@@ -58,6 +59,7 @@ class Recursion:
         self.grows, self.log_growth = 1, 0
         self.log_limit, self.trouble = 2 * log2(self.noise) + k["order"], -k["log_9_4"]
         self._chance, self.velocity_std = _HALF, 0
+        self.middle, self.held = (0, 0), (0, 0)  # velocity and age at `since`; those that are shown
 
     # The arithmetic.
 
@@ -98,6 +100,8 @@ class Recursion:
         self._chance = _HALF
         self.since = min(self.since + (length << bits), k["most_since"])
         self.quiet = min(self.quiet + (length << bits), k["most"])
+        velocity, age = self.middle
+        self.held = (velocity, self.since + age) if self.phase == TRACKS else (0, 0)
         self._moved = moved << PLACE_BITS
         self.standstill = not number and self.quiet >= k["max_time"]
         if number:
@@ -226,6 +230,11 @@ class Recursion:
     def _ready(self) -> None:
         """Find what the next event takes of this one: growth of the memory, noise."""
         k = self._k
+        if self._smooth:
+            back = self._power(log2(self.a) + self.log_memory - k["of_slope"], -1 if self.a < 0 else 1)
+            velocity = self._product(self.v - back, k["tick"], "shown")
+            most = k["most_shown"]
+            self.middle = max(-most, min(velocity, most)), self._lead + self._round(self.memory, 1)
         self.log_limit = 2 * log2(self.noise) + k["order"]
         self.sure = self.certain = self.noise
         lagging, times = self.log_share + self.log_limit - k["order_lag"], 4
@@ -309,7 +318,7 @@ class Recursion:
 
     def _nothing(self) -> Row:
         """Show no velocity."""
-        self.shown_a, self.velocity_std = 0, self._k["none"]
+        self.shown_a, self.velocity_std, self.held = 0, self._k["none"], (0, 0)
         return self._emit(0, self.p, 0)
 
     def _emit(self, velocity: int, place: int | None = None, least: int = 1) -> Row:
@@ -324,4 +333,5 @@ class Recursion:
             min(max(self._power(noise + self.velocity_std - self.log_memory), least), k["most_std"]),
             self._product(self.shown_a, k["slope"], "acceleration"),
             int(self.standstill),
+            *(self.held if self._smooth else ()),
         )

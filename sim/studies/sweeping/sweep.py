@@ -276,7 +276,7 @@ def _core(spec: TachometerSpec) -> Row:
 
 def _of(spec: TachometerSpec, field: str, unit: str) -> Any:
     """Return what an option of a core is, in the unit of its column."""
-    value = spec.parameters[field]
+    value = spec.parameters.get(field, getattr(spec, field))  # tacit ones are missing at their defaults
     return float(getattr(spec, field)) if unit == "rad/s" else _seconds(spec, value) if unit == "clocks" else value
 
 

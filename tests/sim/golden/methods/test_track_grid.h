@@ -8,7 +8,7 @@ CALLED void search(const Constants *constants, const Tables *tables, int64_t cel
   for (int64_t cell = 0; cell < cells; cell++, clocks += most) {
     Recursion state = begun;
     const int64_t way = backward[cell] ? -1 : 1;
-    int64_t row[5], counts = 0, latest = -1, before = 0;
+    int64_t row[COLUMNS], counts = 0, latest = -1, before = 0;
     double quotient = 0, *worst = found + 2 * cell;
     state.row = row, worst[0] = worst[1] = 0;
     for (int64_t tick = 0; tick < ticks; tick++) {
