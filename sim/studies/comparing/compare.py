@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.comparing import baselines
 from tachometry.spec import TachometerSpec
+from tachometry.spec.formats.tracking_code import SMOOTH
 
 TrueSpeed = Callable[[FloatArray], FloatArray]
 Instants = list[FloatArray]  # seconds: those at which each curve is read
@@ -38,6 +39,14 @@ class Curve:
     estimate: baselines.Estimate
     measurement_time: FloatArray
     reads: FloatArray
+    ages: FloatArray | None = None  # shape (n,), seconds: of each velocity when it is new; None: it is that of its time
+
+    def instants_of(self, instants: FloatArray) -> FloatArray:
+        """Return the instants (s) that the velocities held at some instants belong to."""
+        if self.ages is None:
+            return instants
+        which = np.searchsorted(self.estimate.time, instants, side="right") - 1
+        return np.maximum((self.estimate.time - self.ages)[which], 0.0)
 
 
 @dataclass(frozen=True)
@@ -62,9 +71,9 @@ class Score:
 
     - `mean_time`, `worst_time`, seconds: Measurement time.
     - `rms`, `max`, rad/s: Error of the held velocity.
-    - `delay`, seconds: Shift of the true speed that comes closest. None where it says nothing: the true speed is
-      constant, or the curve would be early, or hardly any of the error goes with the shift, or an offset might be its
-      cause as well.
+    - `delay`, seconds: Mean age of `velocity_smooth`; else shift of the true speed that comes closest. None where it
+      says nothing: the true speed is constant, or the curve would be early, or hardly any of the error goes with the
+      shift, or an offset might be its cause as well.
     """
 
     name: str
@@ -78,8 +87,14 @@ class Score:
 
 
 def core_curve(name: str, spec: TachometerSpec, trace: PinTrace) -> Curve:
-    """Return what a core shows, by its golden model, which the hardware equals bit for bit."""
-    return run_curve(name, spec, golden.run(spec, trace), trace)
+    """Return what a core shows, by its golden model, which the hardware equals bit for bit; with --smooth that."""
+    run = golden.run(spec, trace)
+    curve, updates = run_curve(name, spec, run, trace), run.updates
+    if SMOOTH[0] not in updates.columns:
+        return curve
+    smooth = baselines.Estimate(curve.estimate.time, updates.velocity_smooth * spec.velocity.rad_per_s_per_lsb)
+    ages = updates.smooth_delay / spec.timing.clock_hz
+    return replace(curve, what=f"{curve.what}, velocity_smooth at its time", estimate=smooth, ages=ages)
 
 
 def read_times(spec: TachometerSpec, trace: PinTrace) -> FloatArray:
@@ -121,11 +136,13 @@ def score(curve: Curve, duration: float, instants: FloatArray, true_speed: TrueS
     times = curve.measurement_time
     rms = worst = delay = None
     if true_speed is not None and len(instants):
-        held, truth = curve.estimate.at(instants), true_speed(instants)
+        held, truth = curve.estimate.at(instants), true_speed(curve.instants_of(instants))
         error = held - truth
         rms, worst = float(np.sqrt(np.mean(error * error))), float(np.max(np.abs(error)))
         reach = min(_LONGEST_DELAY, (instants[-1] - instants[0]) / 4)
-        if np.ptp(truth) > _ALIKE * np.max(np.abs(truth)):
+        if curve.ages is not None:
+            delay = float(np.mean(instants - curve.instants_of(instants)))
+        elif np.ptp(truth) > _ALIKE * np.max(np.abs(truth)):
             with suppress(ValueError):  # a motion that looks alike at several shifts
                 delay = baselines.delay_seconds(instants, held, truth, reach)
                 if not _says_something(error, held - true_speed(np.maximum(instants - delay, 0)), delay):
