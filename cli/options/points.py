@@ -105,12 +105,12 @@ class _Maker:
     """Makes points; what many of them share is made once."""
 
     def __init__(self, run: tuple[float, str | None, float]) -> None:
-        self._run = run
+        self._run, self._core = run, tuple(core_click_options())
         self._spec, self._values, self._motion = cache(_spec), cache(_encoder_values), cache(parse_motion)
 
     def point(self, name: str, method: str, given: Mapping[str, str], texts: Mapping[str, Text]) -> Point:
         """Return the point of a method, with texts of some of its options and of names in the motion."""
-        core = {key: texts[key] for key in core_click_options() if key in texts} | dict(given)
+        core = {key: texts[key] for key in self._core if key in texts} | dict(given)
         spec = self._spec(method, tuple(core.items()))
         faults = {key: text for key in _FAULTS if (text := texts.get(key)) is not None}
         encoder = VirtualEncoder.of_core(spec, **self._values(tuple(faults.items())))

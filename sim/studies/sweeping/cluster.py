@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from tachometry.sim.studies.sweeping.sweep import Point, Row
 
 _PATIENCE = 10.0  # seconds until a scheduler has answered
-_AT_ONCE = 1000  # tasks that are sent to the scheduler together
-_MOST = 50  # points of a task: Dask takes five times as long for a task as a short point does
+_AT_ONCE = 50  # tasks that are sent to the scheduler together: more than some MB are warned of
+_MOST = 100  # points of a task: Dask takes five times as long for a task as a short point does
 _TASKS = 100  # of a sweep, at least: workers end together, and little is lost with one
 # Dask has its workers give all memory back at once, which takes longer than a point itself: they keep so many bytes.
 _LOCAL: dict[str, Any] = {
@@ -134,27 +134,22 @@ def rows(client: Client, points: Mapping[str, Point | LoopPoint], study: str = "
     """
     from distributed import KilledWorker, as_completed
 
-    def run(packed: list[tuple[str, bytes]]) -> list[Row | Exception]:
+    def run(code: str, packed: bytes) -> list[Row | Exception]:
         # It travels as it is: a scheduler and workers need not know it.
         from importlib import import_module
 
-        run_packed = import_module(f"tachometry.sim.studies.{study}").run_packed
-        found: list[Row | Exception] = []
-        for code, point in packed:
-            try:
-                found.append(run_packed(code, point))
-            except (ValueError, OSError) as error:
-                found.append(error)
-        return found
+        return [*import_module(f"tachometry.sim.studies.{study}").run_packed(code, packed)]
 
-    packed = {digest: (point.code, pickle.dumps(point)) for digest, point in points.items()}
     size = min(max(len(points) // _TASKS, 1), _MOST)
     digests = [*points]
     tasks = {digests[first]: digests[first : first + size] for first in range(0, len(digests), size)}
     # Keys of one kind: what the scheduler does for a task grows with the number of kinds.
     keys = [("point", first) for first in tasks]
-    groups = [[packed[digest] for digest in group] for group in tasks.values()]
-    futures = client.map(run, groups, key=keys, batch_size=_AT_ONCE, pure=False)
+    # Points of a task go together: what they share is sent once, and what follows from a core is computed once.
+    packed = [pickle.dumps([points[digest] for digest in group]) for group in tasks.values()]
+    codes = [points[group[0]].code for group in tasks.values()]
+    futures = client.map(run, codes, packed, key=keys, batch_size=_AT_ONCE, pure=False)
+    del packed
     # Nothing else may hold futures: a worker keeps the rows of one that is held, and where it dies, runs it again.
     arrived = as_completed(futures, with_results=True, raise_errors=False)
     del futures

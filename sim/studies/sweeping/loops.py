@@ -3,6 +3,7 @@
 import hashlib
 import pickle
 import platform
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -52,19 +53,21 @@ def _code() -> str:
     return hashlib.sha256(code_digest(hardware=True).encode() + b"".join(own)).hexdigest()
 
 
-def run_packed(code: str, packed: bytes) -> Row:
-    """Return the row of a pickled point, on any machine with the same code: the figures of `FIGURES`, and `point`.
+def run_packed(code: str, packed: bytes) -> Iterator[Row | Exception]:
+    """Yield the rows of pickled points, on any machine with the same code: the figures of `FIGURES`, and `point`.
 
-    It raises OtherCode if the code here is not that which is meant.
+    The error of a point takes the place of its row. It raises OtherCode if the code here is another.
     """
     if code != _code():
         raise OtherCode(f"{platform.node()} has another one")
-    point: LoopPoint = pickle.loads(packed)
-    try:
-        outcomes = [point.setting.outcome(log) for log in control.each_seed(point.setting, point.seeds, jobs=1)]
-    except ValueError as error:
-        raise ParameterError.longer(error, f" (method {point.method}, motion {point.text})") from None
-    return {"point": point.digest} | row_of(mean(outcomes))
+    for point in pickle.loads(packed):
+        try:
+            outcomes = [point.setting.outcome(log) for log in control.each_seed(point.setting, point.seeds, jobs=1)]
+            yield {"point": point.digest} | row_of(mean(outcomes))
+        except ValueError as error:
+            yield ParameterError.longer(error, f" (method {point.method}, motion {point.text})")
+        except OSError as error:
+            yield error
 
 
 def row_of(outcome: Outcome) -> dict[str, Any]:

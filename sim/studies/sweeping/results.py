@@ -111,14 +111,14 @@ class Results:
         """Write the file, if there are rows that are not in it; OSError if it cannot be written."""
         if self._saved:
             return
+        begun = time.monotonic()
         self._table = _joined([self._table, pa.Table.from_pylist(self._new, schema=self._schema)])
         self._new = []
         if self._path is not None:
-            begun = time.monotonic()
             self._write()
             self._saved = True
             self._begin_journal()
-            self._due = time.monotonic() + max(_PATIENCE, _SHARE * (time.monotonic() - begun))
+        self._due = time.monotonic() + max(_PATIENCE, _SHARE * (time.monotonic() - begun))
         self._saved = True
 
     def _write(self) -> None:

@@ -211,18 +211,20 @@ def _sources(place: Path) -> list[Path]:
     return sorted(path for path in place.rglob("*") if path.suffix in (".py", ".h"))
 
 
-def run_packed(code: str, packed: bytes) -> Row:
-    """Return `run_point` of a pickled point, on any machine with the same code.
+def run_packed(code: str, packed: bytes) -> Iterator[Row | Exception]:
+    """Yield `run_point` of pickled points, on any machine with the same code, or the error of a point.
 
-    It raises OtherCode if the code here is not that which is meant, and ValueError as `run_point`, with the point.
+    It raises OtherCode if the code here is another.
     """
     if code not in (code_digest(), code_digest(hardware=True)):
         raise OtherCode(f"{platform.node()} has another one")
-    point = pickle.loads(packed)
-    try:
-        return run_point(point)
-    except ValueError as error:
-        raise ParameterError.longer(error, f" (method {point.method}, motion {point.text})") from None
+    for point in pickle.loads(packed):
+        try:
+            yield run_point(point)
+        except ValueError as error:
+            yield ParameterError.longer(error, f" (method {point.method}, motion {point.text})")
+        except OSError as error:
+            yield error
 
 
 def run_point(point: Point) -> Row:
