@@ -108,8 +108,9 @@ def _add_others(texts: dict[str, str], draw: _Draw, method: str, sensor: str) ->
 
 def _add_last(texts: dict[str, str], draw: _Draw) -> None:
     """Add options with random numbers of their own, so that the others of a seed stay."""
-    if draw.often(0.05) and texts.get("sensor") != "hall":
+    if draw.often(0.05):
         texts |= {"electrical": str(draw.log(1, 512)), "lead": f"{draw.randint(0, 3)}tick"}
+        texts |= {"electrical": texts["ppr"]} if texts.get("sensor") == "hall" else {}
 
 
 def motions(spec: CoreSpec, seed: int) -> list[Trace]:

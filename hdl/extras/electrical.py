@@ -2,13 +2,14 @@
 
 from typing import Self
 
-from amaranth import C, Const, Module, Mux, Signal, Value, signed
+from amaranth import Array, C, Cat, Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.products import take_products
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import by_name
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.electrical import REFUSED, REFUSED_BITS, ElectricalAngle
 from tachometry.spec.formats.angles import LEAD_BITS, PLACE_BITS, SHOWN_BITS, SLOPE_BITS, Angles
@@ -45,8 +46,11 @@ class Gates(wiring.Component):
         """Return the gates of this core."""
         taken = [one for one in spec.method_ports if spec.carrying and one.name in ("acceleration", "position_fine")]
         inputs = {"native_velocity": spec.velocity.native, **{f"native_{one.name}": one.width for one in taken}}
-        inputs |= {"index_rises": 1} if spec.index else {}
-        inputs |= {"home_rises": 1} if spec.front_end.index_once else {}
+        if extra.angles(spec).cycle:
+            inputs |= dict.fromkeys(("ready", "level_a", "level_b", "level_c"), 1)
+        else:
+            inputs |= {"index_rises": 1} if spec.index else {}
+            inputs |= {"home_rises": 1} if spec.front_end.index_once else {}
         return cls(extra, extra.angles(spec), spec.latency.tick, inputs, corrects=extra.corrects(spec))
 
     def elaborate(self, platform: object) -> Module:
@@ -56,14 +60,18 @@ class Gates(wiring.Component):
         sets = Signal()
         members = self.signature.members
         rises = self.index_rises if "index_rises" in members else C(0)
-        counted, zeroes = self._count(m, step, rises, indexed)
+        known = Signal(init=not self._angles.cycle)
+        counted, moves = self._read(m, known) if self._angles.cycle else self._count(m, step, rises, indexed)
         m.d.sync += sets.eq(self.angle_set)
-        with m.If(sets | rises):
+        if self._angles.tracks:
+            begun, phase = self._tracked(m, counted)
+        else:
+            begun, phase = known, self._counted(m, step, counted, moves, known)
+        with m.If(sets | rises | (known & begun if self._angles.cycle else 0)):
             m.d.sync += [self.angle_valid.eq(1), indexed.eq(indexed | rises)]
         if "home_rises" in members:
             with m.If(self.home_rises):
                 m.d.sync += [indexed.eq(0), self.angle_valid.eq(0)]
-        phase = self._tracked(m, counted) if self._angles.tracks else self._counted(m, step, counted, zeroes)
         # What the angle was set to, or nothing from the first index on.
         difference = Signal(SHOWN_BITS)
         shift = Signal(SHOWN_BITS)
@@ -114,8 +122,24 @@ class Gates(wiring.Component):
             m.d.sync += rest.eq(Mux(back, Mux(down < 0, down + counts, down), Mux(up >= counts, up - counts, up)))
         return sum_, zeroes
 
-    def _tracked(self, m: Module, counted: Value) -> Value:
-        """Return a phase that grows by its slope in each clock, and begins anew after each update.
+    def _read(self, m: Module, known: Signal) -> tuple[Signal, Signal]:
+        """Return the angle of the latest state of the halls, and whether it changes in the next clock."""
+        ready, level = delay(m, self.ready, Cat(by_name(self, "abc", "level_{}").values()), clocks=self._latency - 1)
+        states = self._angles.states
+        state = Signal.like(level)
+        moves = Signal()
+        angle = Signal(self._angles.bits)
+        m.d.comb += [
+            moves.eq(ready & level.matches(*self._angles.cycle) & (level != state)),
+            angle.eq(Array(states.get(number, 0) for number in range(8))[state]),
+        ]
+        m.d.sync += known.eq(state.any())
+        with m.If(moves):
+            m.d.sync += state.eq(level)
+        return angle, moves
+
+    def _tracked(self, m: Module, counted: Value) -> tuple[Signal, Value]:
+        """Return whether an update has come, and a phase that grows by its slope in each clock, anew after each update.
 
         The first phase owes nothing.
         """
@@ -157,10 +181,13 @@ class Gates(wiring.Component):
             m.d.sync += s.eq(self.angle_lead + angles.span)
         with m.If(done):
             m.d.sync += grows.eq(now)
-        return (phase + debt)[:bits]
+        return begun, (phase + debt)[:bits]
 
-    def _counted(self, m: Module, step: Value, counted: Value, zeroes: Value) -> Value:
-        """Return a phase that is at an edge after a count, and grows with the velocity, to the next edge at most."""
+    def _counted(self, m: Module, step: Value, counted: Value, moves: Value, known: Value) -> Value:
+        """Return a phase that is at an edge after a count, and grows with the velocity, to the next edge at most.
+
+        It owes nothing until its angle is known.
+        """
         angles, bits, half = self._angles, self._angles.bits, self._angles.count[0] >> 1
         velocity, *_ = angles.factors
         s = Signal(angles.factor_bits)
@@ -183,8 +210,8 @@ class Gates(wiring.Component):
         coming = Signal(bits)
         moved = Signal()
         m.d.comb += coming.eq(counted + place + ahead)
-        m.d.sync += [phase.eq(coming), moved.eq(done | step[0] | zeroes)]
-        return (phase + _owed(m, angles, moved, (phase - coming)[:bits]))[:bits]
+        m.d.sync += [phase.eq(coming), moved.eq(done | step[0] | moves)]
+        return (phase + _owed(m, angles, moved, Mux(known, phase - coming, 0)[:bits]))[:bits]
 
 
 def _owed(m: Module, angles: Angles, jumps: Value, gap: Value) -> Signal:

@@ -138,6 +138,8 @@ class Steps:
     values: NDArray[np.int64] = field(default_factory=_none)
     arms: NDArray[np.int64] = field(default_factory=_none)  # clocks in which the next index is let through
     wheel: Teeth | None = None  # of a wheel with missing teeth, the teeth
+    # clocks from which levels of the lines of the sensor are seen, and these; only the last of a clock lasts
+    levels: tuple[NDArray[np.int64], ...] = ()
     # of each line of an extra the clocks from which its level is seen, and the levels; the first is no edge
     pins: Mapping[str, tuple[NDArray[np.int64], NDArray[np.uint8]]] = field(default_factory=dict)
 
@@ -201,7 +203,8 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
         at_pin, level = conditioned(name)
         asked[name] = at_pin[1:][level[1:] > level[:-1]] + spec.latency.pin_to_count
     swallowed = np.sort(np.concatenate(returned)) + 3
-    found = Steps(at[1:], step[1:], at[wrong], rises, swallowed, changed, wide, missed, rises, pins=pins)
+    read = (at, packed([level ^ np.uint8(name in encoder.inverted) for name, level in lines.items()]).astype(np.int64))
+    found = Steps(at[1:], step[1:], at[wrong], rises, swallowed, changed, wide, missed, rises, pins=pins, levels=read)
     return found.asked(spec, asked["preset"], np.full(len(asked["preset"]), spec.preset or 0), asked["home"])
 
 

@@ -55,6 +55,7 @@ class Angles:
     tracks: int
     position_fine_bits: int
     slope: Fraction  # in counts per clock²
+    cycle: tuple[int, ...] = ()  # levels of halls, in the order of the counts
 
     @property
     def bits(self) -> int:
@@ -95,7 +96,15 @@ class Angles:
         values = (lsb[0] * per_count, lsb[1] * per_count, (lsb[2] or 1) * per_count * (1 << SLOPE_BITS))
         return tuple(Factor.of(value, self.factor_bits) for value in values)
 
+    @property
+    def states(self) -> dict[int, int]:
+        """The angle at each of the levels of halls."""
+        return {levels: self.of(place) for place, levels in enumerate(self.cycle)}
+
     def of(self, counts: int) -> int:
-        """Return the angle of counts since the zero, and half of an LSB of what is shown, so that this is rounded."""
-        turn = counts * self.pole_pairs % self.counts
-        return ((turn << self.bits) // self.counts + (1 << self.bits - SHOWN_BITS - 1)) % (1 << self.bits)
+        """Return the angle of counts since the zero, and half of an LSB of what is shown, so that this is rounded.
+
+        With halls, the zero is an edge, and the angle the middle of a sixth.
+        """
+        turn = (2 * counts + bool(self.cycle)) * self.pole_pairs << self.bits
+        return (turn // (2 * self.counts) + (1 << self.bits - SHOWN_BITS - 1)) % (1 << self.bits)

@@ -21,13 +21,15 @@ _LONGEST = 1 << 31  # clocks in which every place that has an end comes to it
 
 def tables(extra: ElectricalAngle, view: View) -> dict[str, Table]:
     """Return phases, refused indices, and from each clock on the values of registers that are added to a phase."""
-    counts, refused = _counts(extra, view)
+    states = extra.angles(view.spec).states
+    counts, refused = (_states(states, view), []) if states else _counts(extra, view)
     updates = view.tables["measured"].clock
     offsets = zip(updates + 1, _written(view.trace, "angle_offset", updates, extra.offset), strict=True)
     offset = _latest([(0, extra.offset), *offsets], "offset")
     phases = (_tracked if view.spec.carrying else _counted)(extra, view, counts)
     found = {"angle_phase": phases, "angle_offset": offset, REFUSED: Table(np.array(refused, np.int64), {})}
-    return found | _sets(view)
+    known = np.maximum(counts.clock[1:2] + 1, phases.clock[:1]) if states else None
+    return found | _sets(view, known)
 
 
 def shown(
@@ -88,6 +90,19 @@ def _counts(extra: ElectricalAngle, view: View) -> tuple[Table, list[int]]:
     return _latest(rows, "angle", "step"), refused
 
 
+def _states(states: Mapping[int, int], view: View) -> Table:
+    """Return the angle of the latest state of the halls from each clock on, with the step in it."""
+    at, levels = view.steps.levels
+    seen = np.append(np.diff(at) > 0, True) & np.isin(levels, [*states])
+    at, levels = at[seen], levels[seen]
+    moves = np.append(True, np.diff(levels) != 0)[: len(at)]
+    at, angle = at[moves], [states[level] for level in levels[moves].tolist()]
+    step = np.append(0, view.steps.step)[np.searchsorted(view.steps.clock, at, side="right")]
+    step *= np.isin(at, view.steps.clock)
+    rows = zip((at + view.spec.latency.tick).tolist(), angle, step.tolist(), strict=True)
+    return _latest([(0, 0, 0), *rows], "angle", "step")
+
+
 def _tracked(extra: ElectricalAngle, view: View, counts: Table) -> Table:
     """Return the phases of updates of method track."""
     updates, ticks, angles = view.tables["measured"], view.tables["tick"], extra.angles(view.spec)
@@ -123,7 +138,8 @@ def _counted(extra: ElectricalAngle, view: View, counts: Table) -> Table:
     place[np.searchsorted(clock, counts.clock)] = np.where(counts["step"], -counts["step"] * half, _GROWS)
     place[0] = 0
     base, slope = _at(counts, "angle", clock) + np.array(ahead)[latest], np.array(slopes)[latest]
-    return _owing(angles, np.column_stack((clock + 1, base, slope, place, 0 * clock)).tolist())
+    rows = np.column_stack((clock + 1, base, slope, place, 0 * clock)).tolist()
+    return _owing(angles, rows, int(counts.clock[:2][-1]) + 1 if angles.cycle else 0)
 
 
 def _paid(debt: int, clocks: int, spread: int) -> int:
@@ -135,15 +151,16 @@ def _paid(debt: int, clocks: int, spread: int) -> int:
     return -size if debt < 0 else size
 
 
-def _owing(angles: Angles, rows: list[list[int]]) -> Table:
-    """Return rows of clock, base, slope, place and debt, with places that grow on, and with what is owed."""
+def _owing(angles: Angles, rows: list[list[int]], since: int = 0) -> Table:
+    """Return rows of clock, base, slope, place and debt, with places that grow on, and debts after `since`."""
     most, lag = (_FREE, 0) if angles.tracks else (angles.count[0] >> 1, 1)
     for was, row in zip(rows, rows[1:]):  # noqa: B905, RUF007 - of one less
         clocks = row[0] - was[0]
         if row[3] == _GROWS:
             row[3] = max(-most, min(most, was[3] + was[2] * clocks))
         before = was[1] + max(-most, min(most, was[3] + was[2] * (clocks - lag)))
-        row[4] = wrapped(_paid(was[4], clocks - 1, angles.spread) + before - row[1] - row[3], angles.bits)
+        gap = before - row[1] - row[3] if row[0] > since else 0
+        row[4] = wrapped(_paid(was[4], clocks - 1, angles.spread) + gap, angles.bits)
     found = np.array(rows, np.int64).reshape(-1, 5)
     return Table(found[:, 0], {"rows": found})
 
@@ -166,10 +183,11 @@ def _top(angles: Angles, phases: Table, clock: Ints) -> Ints:
     return shown
 
 
-def _sets(view: View) -> dict[str, Table]:
+def _sets(view: View, known: Ints | None) -> dict[str, Table]:
     """Return the spans in which the angle is set, its values, and of indices and `home` one more than their clocks.
 
-    In one clock a set comes first, then an index, then `home`.
+    In one clock a set comes first, then an index, then `home`. With halls, the clock from
+    which their angle is `known` takes the place of indices.
     """
     trace, late = view.trace, view.spec.latency.tick - 1
     sets, ends = np.flatnonzero(trace.lines["angle_set"]), np.append(trace.clock, trace.n_clocks) + 1
@@ -178,6 +196,8 @@ def _sets(view: View) -> dict[str, Table]:
     # First is that of all, and that behind each `home`.
     turns = np.searchsorted(homes, marks, side="left")
     first = marks[np.diff(turns, prepend=-1) > 0]
+    if known is not None:
+        first, marks, homes = known[:0], known, known[:0]
     clocks = {"first": first, "index": marks, "home": homes}
     found = {f"angle_{name}": Table(at, {"at": at + 1}) for name, at in clocks.items()}
     spans = Table(ends[sets], {"end": ends[sets + 1]})

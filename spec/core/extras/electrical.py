@@ -8,6 +8,7 @@ from typing import Any
 from tachometry.spec.core.extras.extra import Extra
 from tachometry.spec.core.front_end import Pin
 from tachometry.spec.core.numbers import Numbers
+from tachometry.spec.core.sensors import packed_levels
 from tachometry.spec.formats.angles import LEAD_BITS, SHOWN_BITS, Angles
 from tachometry.spec.language.field import Draft, Field
 from tachometry.spec.language.option import REQUIRED, ParameterError, option, parse_whole
@@ -18,7 +19,7 @@ REFUSED = "angle_refused"
 REFUSED_BITS = 16  # of the number of refused indices, which stays at its end
 _UNIT = f"2^-{SHOWN_BITS} electrical turns"
 _POLE_PAIRS = """Electrical angle of a motor with P pole pairs, 1 to 512. Outputs angle, in 2^-16 electrical turns and \
-new in every clock, and angle_valid. It is 0 at the index, or what angle_set sets it to."""
+new in every clock, and angle_valid. It is 0 at the index, at the rise of A of halls, or what angle_set sets it to."""
 _OFFSET = "Electrical angle that is added, as 12.3deg. Or a number of 2^-16 turns. ANGLE_OFFSET begins with it."
 _LEAD = """Time from the angle at the port to its use, as 1.5tick. Or 75us, or 300clk; below 65536 clocks. The angle \
 is that of the motor so much later. Register ANGLE_LEAD begins with it."""
@@ -58,14 +59,16 @@ class ElectricalAngle(Extra):
         counts, tick, bits = spec.encoder.counts_per_rev, spec.timing.tick_cycles, spec.velocity.native_frac_bits
         late, carrying, tracks = spec.latency.pin_to_count + spec.latency.tick, spec.carrying, spec.latency.datapath
         of_track = (tracks, carrying.position_fine_bits, carrying.slope) if carrying else (0, 0, Fraction(0))
-        return Angles(counts, self.pole_pairs, tick, spec.tick.longest, bits, late + of_track[0], *of_track)
+        halls = [packed_levels(state) for state in spec.encoder.kind.cycle if len(state) == 3]
+        late_of = (late + of_track[0], *of_track, tuple(halls[:: -1 if spec.encoder.reverse else 1]))
+        return Angles(counts, self.pole_pairs, tick, spec.tick.longest, bits, *late_of)
 
     def missing(self) -> Mapping[str, str]:
         return {"axes": "does not work with --axes", "loop": "does not work with --loop"}
 
     def check(self, spec: Numbers) -> None:
-        if spec.encoder.sensor == "hall":
-            raise ParameterError(self.name, "does not work with --sensor hall: take --position-modulo rev/P")
+        if spec.encoder.sensor == "hall" and self.pole_pairs != (pairs := spec.encoder.pulses_per_rev):
+            raise ParameterError(self.name, f"must be {pairs}, the pole pairs of the halls, not {self.pole_pairs}")
         most = (spec.encoder.counts_per_rev - 1) // 2
         if self.pole_pairs > most:
             raise ParameterError(self.name, f"must be at most {most} with so few counts per revolution")
@@ -77,7 +80,7 @@ class ElectricalAngle(Extra):
 
     def corrects(self, spec: Numbers) -> bool:
         """Return whether an index behind the first may show lost counts."""
-        return spec.index is not None and not spec.index.reset and not spec.index.once
+        return spec.index is not None and not (spec.index.reset or spec.index.once or spec.encoder.sensor == "hall")
 
     def pins(self, spec: Numbers) -> Iterable[Pin]:
         text = "The angle is angle_value now, in the clock of a current vector that has aligned the motor."
@@ -88,7 +91,7 @@ class ElectricalAngle(Extra):
     def ports(self, spec: Numbers) -> Iterable[Port]:
         text = "Electrical angle, ANGLE_LEAD clocks after this one. It also changes between ticks, in every clock."
         yield held(TICK, "angle", SHOWN_BITS, unit=_UNIT, help=text)
-        text = "The angle is that of the motor: an index was taken, or it was set. It also changes between ticks."
+        text = "The angle is that of the motor: by an index, by halls, or set. It also changes between ticks."
         yield held(TICK, "angle_valid", help=text)
         if self.corrects(spec):
             text = "Refused indices: the angle was off by more than 1/16 turn. It also changes between ticks, to 65535."
