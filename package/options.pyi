@@ -68,6 +68,7 @@ class CoreOptions(TypedDict, total=False):
     reciprocal: Value | None
     reverse: bool | None
     sensor: Value | None
+    sincos: bool | None
     smooth: bool | None
     stream: Value | None
     synchronised: bool | None

@@ -8,11 +8,13 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.products import take_products
 from tachometry.hdl.arithmetic.saturate import saturate
+from tachometry.hdl.arithmetic.sine_cosine import SineCosine
 from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import by_name
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.electrical import REFUSED, REFUSED_BITS, ElectricalAngle
 from tachometry.spec.formats.angles import LEAD_BITS, PLACE_BITS, SHOWN_BITS, SLOPE_BITS, Angles
+from tachometry.spec.formats.sine import AHEAD_BITS
 
 
 class Gates(wiring.Component):
@@ -38,6 +40,7 @@ class Gates(wiring.Component):
                 "angle": Out(SHOWN_BITS),
                 "angle_valid": Out(1),
                 **({REFUSED: Out(REFUSED_BITS)} if corrects else {}),
+                **(dict.fromkeys(("angle_sin", "angle_cos"), Out(signed(SHOWN_BITS))) if extra.sincos else {}),
             }
         )
 
@@ -64,9 +67,9 @@ class Gates(wiring.Component):
         counted, moves = self._read(m, known) if self._angles.cycle else self._count(m, step, rises, indexed)
         m.d.sync += sets.eq(self.angle_set)
         if self._angles.tracks:
-            begun, phase = self._tracked(m, counted)
+            begun, phase, slope = self._tracked(m, counted)
         else:
-            begun, phase = known, self._counted(m, step, counted, moves, known)
+            begun, (phase, slope) = known, self._counted(m, step, counted, moves, known)
         with m.If(sets | rises | (known & begun if self._angles.cycle else 0)):
             m.d.sync += [self.angle_valid.eq(1), indexed.eq(indexed | rises)]
         if "home_rises" in members:
@@ -82,7 +85,15 @@ class Gates(wiring.Component):
             m.d.sync += difference.eq(0)
         with m.Elif(sets):
             m.d.sync += difference.eq(self.angle_value - phase[-SHOWN_BITS:] - offset)
-        m.d.sync += [shift.eq(difference + offset), self.angle.eq(phase[-SHOWN_BITS:] + shift)]
+        coming = (phase[-SHOWN_BITS:] + shift)[:SHOWN_BITS]
+        m.d.sync += [shift.eq(difference + offset), self.angle.eq(coming)]
+        if "angle_sin" in members:
+            m.submodules.sine_cosine = box = SineCosine()
+            m.d.comb += [
+                box.angle.eq(coming + (slope >> self._angles.bits - SHOWN_BITS - AHEAD_BITS)),
+                self.angle_sin.eq(box.sin),
+                self.angle_cos.eq(box.cos),
+            ]
         return m
 
     def _count(self, m: Module, step: Value, rises: Value, indexed: Value) -> tuple[Signal, Signal]:
@@ -129,19 +140,16 @@ class Gates(wiring.Component):
         state = Signal.like(level)
         moves = Signal()
         angle = Signal(self._angles.bits)
-        m.d.comb += [
-            moves.eq(ready & level.matches(*self._angles.cycle) & (level != state)),
-            angle.eq(Array(states.get(number, 0) for number in range(8))[state]),
-        ]
+        m.d.comb += moves.eq(ready & level.matches(*states) & (level != state))
         m.d.sync += known.eq(state.any())
         with m.If(moves):
-            m.d.sync += state.eq(level)
+            m.d.sync += [state.eq(level), angle.eq(Array(states.get(number, 0) for number in range(8))[level])]
         return angle, moves
 
-    def _tracked(self, m: Module, counted: Value) -> tuple[Signal, Value]:
-        """Return whether an update has come, and a phase that grows by its slope in each clock, anew after each update.
+    def _tracked(self, m: Module, counted: Value) -> tuple[Signal, Value, Signal]:
+        """Return whether an update has come, a phase that grows by its slope in each clock, and this slope.
 
-        The first phase owes nothing.
+        It begins anew after each update. The first phase owes nothing.
         """
         angles = self._angles
         bits, factor_bits, half = angles.bits, angles.factor_bits, angles.tick >> 1
@@ -181,10 +189,10 @@ class Gates(wiring.Component):
             m.d.sync += s.eq(self.angle_lead + angles.span)
         with m.If(done):
             m.d.sync += grows.eq(now)
-        return begun, (phase + debt)[:bits]
+        return begun, (phase + debt)[:bits], grows
 
-    def _counted(self, m: Module, step: Value, counted: Value, moves: Value, known: Value) -> Value:
-        """Return a phase that is at an edge after a count, and grows with the velocity, to the next edge at most.
+    def _counted(self, m: Module, step: Value, counted: Value, moves: Value, known: Value) -> tuple[Value, Signal]:
+        """Return a phase and its slope: it is at an edge after a count, and grows to the next edge at most.
 
         It owes nothing until its angle is known.
         """
@@ -197,21 +205,23 @@ class Gates(wiring.Component):
         most, _ = saturate(m, slope, half)
         grows = Signal.like(most)
         place = Signal.like(most)
-        grown = Signal(signed(len(most) + 1))
-        on, _ = saturate(m, grown, half)
+        room = Signal(signed(len(most) + 1), init=half)  # to the next edge from before it by a slope
+        beyond = Signal(signed(len(most) + 2))
+        on = Mux(beyond[-1] == grows[-1], Mux(grows[-1], -half, half), place + grows)
         ahead = Signal(bits)
         with m.If(self.native_valid):
             m.d.sync += s.eq(self.angle_lead + angles.span)
         with m.If(done):
-            m.d.sync += [grows.eq(most), ahead.eq(far)]
-        m.d.comb += grown.eq(place + grows)
+            m.d.sync += [grows.eq(most), room.eq(Mux(most[-1], -half, half) - most), ahead.eq(far)]
+        m.d.comb += beyond.eq(place - room)
         m.d.sync += place.eq(Mux(step[0], Mux(step[1], half, -half), on))
         phase = Signal(bits)
         coming = Signal(bits)
         moved = Signal()
         m.d.comb += coming.eq(counted + place + ahead)
         m.d.sync += [phase.eq(coming), moved.eq(done | step[0] | moves)]
-        return (phase + _owed(m, angles, moved, Mux(known, phase - coming, 0)[:bits]))[:bits]
+        debt = _owed(m, angles, moved, Mux(known, phase - coming, 0)[:bits])
+        return (phase + debt)[:bits], grows
 
 
 def _owed(m: Module, angles: Angles, jumps: Value, gap: Value) -> Signal:

@@ -49,7 +49,7 @@ WORDS = {
 }
 # Named only where they are asked for.
 _HEALTH = ("health", "health_edges", "health_errors")
-_TACIT = (*_HEALTH, "electrical", "electrical_offset", "lead", "over_speed", "position_compare")
+_TACIT = (*_HEALTH, "electrical", "electrical_offset", "lead", "over_speed", "position_compare", "sincos")
 _FLAGS = ("index", "index-reset", "age", "bounds", "paper-exact", "whole-cycles", "health")
 # Entries of the acceleration, and its unit for that of the velocity.
 ACCELERATION = ("width", "frac_bits", "unit", "rad_per_s2_per_lsb")

@@ -13,6 +13,7 @@ from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.electrical import REFUSED, REFUSED_BITS, ElectricalAngle
 from tachometry.spec.formats.angles import PLACE_BITS, SHOWN_BITS, SLOPE_BITS, Angles, Factor, wrapped
+from tachometry.spec.formats.sine import AHEAD_BITS, GUARD_BITS, START, STEPS, TURNS, WIDTH
 
 _TURN = 1 << SHOWN_BITS
 _NEVER = _GROWS = _FREE = 1 << 62  # no clock, a place that grows on, and a place without an end
@@ -36,21 +37,47 @@ def shown(
     extra: ElectricalAngle, spec: TachometerSpec, found: Mapping[str, Table], clock: Ints, cleared: int
 ) -> dict[str, NDArray[Any]]:
     """Return the angle, whether it is valid, and how many indices were refused; a program does not clear these."""
-    angles, before, phases, offset = extra.angles(spec), clock - 3, found["angle_phase"], found["angle_offset"]
+    angles = extra.angles(spec)
+    marks, homes = (_at(found[f"angle_{name}"], "at", clock - 1) for name in ("index", "home"))
+    valid = np.maximum(_last_set(found, clock - 1), marks) > homes
+    columns = {"angle": _angle(angles, found, clock), "angle_valid": valid}
+    if extra.corrects(spec):
+        refused = np.searchsorted(found[REFUSED].clock, clock, side="right")
+        columns[REFUSED] = np.minimum(refused, (1 << REFUSED_BITS) - 1)
+    if extra.sincos:
+        taken = (clock - 1) // STEPS * STEPS - STEPS
+        phases = found["angle_phase"]
+        row = np.searchsorted(phases.clock, taken + (not angles.tracks), side="right")
+        slope = np.append(0, phases["rows"][:, 2])[row] >> angles.bits - SHOWN_BITS - AHEAD_BITS
+        both = sine_cosine((_angle(angles, found, taken + 1) + slope) % _TURN)
+        columns |= {name: np.where(taken < 0, 0, of) for name, of in zip(("angle_sin", "angle_cos"), both, strict=True)}
+    return columns
+
+
+def sine_cosine(angle: Ints) -> tuple[Ints, Ints]:
+    """Return sine and cosine of angles in 2^-16 turns, in 1/ONE."""
+    quadrant, rest = np.divmod((angle << WIDTH - SHOWN_BITS) + (1 << WIDTH - 3), 1 << WIDTH - 2)
+    rest -= 1 << WIDTH - 3
+    x, y = np.full(len(angle), START), np.zeros(len(angle), np.int64)
+    for step, turn in enumerate(TURNS):
+        way = np.where(rest < 0, -1, 1)
+        x, y, rest = x - way * (y >> step), y + way * (x >> step), rest - way * turn
+    x, y = (word + (1 << GUARD_BITS - 1) >> GUARD_BITS for word in (x, y))
+    vector = (x + 1j * y) * np.array([1, 1j, -1, -1j])[quadrant % 4]  # exact
+    return vector.imag.astype(np.int64), vector.real.astype(np.int64)
+
+
+def _angle(angles: Angles, found: Mapping[str, Table], clock: Ints) -> Ints:
+    """Return the angle at the port."""
+    before, phases, offset = clock - 3, found["angle_phase"], found["angle_offset"]
     # What the angle was set to, or nothing from the first index on.
     at = _last_set(found, before)
     there, rows = np.unique(at - 1, return_inverse=True)
     difference = _at(found["angle_value"], "value", there) - _top(angles, phases, there) - _at(offset, "offset", there)
     is_set = at > _at(found["angle_first"], "at", before)
     shift = np.where(is_set, difference[rows], 0) + _at(offset, "offset", before + 1)
-    angle = (_top(angles, phases, clock - 1) + shift) % _TURN
-    marks, homes = (_at(found[f"angle_{name}"], "at", clock - 1) for name in ("index", "home"))
-    valid = np.maximum(_last_set(found, clock - 1), marks) > homes
-    columns = {"angle": np.where(clock > 0, angle, 0), "angle_valid": valid}
-    if extra.corrects(spec):
-        refused = np.searchsorted(found[REFUSED].clock, clock, side="right")
-        columns[REFUSED] = np.minimum(refused, (1 << REFUSED_BITS) - 1)
-    return columns
+    angle: Ints = np.where(clock > 0, (_top(angles, phases, clock - 1) + shift) % _TURN, 0)
+    return angle
 
 
 def _latest(rows: Sequence[tuple[int, ...]], *names: str) -> Table:

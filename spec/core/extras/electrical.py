@@ -10,6 +10,7 @@ from tachometry.spec.core.front_end import Pin
 from tachometry.spec.core.numbers import Numbers
 from tachometry.spec.core.sensors import packed_levels
 from tachometry.spec.formats.angles import LEAD_BITS, SHOWN_BITS, Angles
+from tachometry.spec.formats.sine import ONE, STEPS
 from tachometry.spec.language.field import Draft, Field
 from tachometry.spec.language.option import REQUIRED, ParameterError, option, parse_whole
 from tachometry.spec.language.port import TICK, Port, held, pin
@@ -23,6 +24,8 @@ new in every clock, and angle_valid. It is 0 at the index, at the rise of A of h
 _OFFSET = "Electrical angle that is added, as 12.3deg. Or a number of 2^-16 turns. ANGLE_OFFSET begins with it."
 _LEAD = """Time from the angle at the port to its use, as 1.5tick. Or 75us, or 300clk; below 65536 clocks. The angle \
 is that of the motor so much later. Register ANGLE_LEAD begins with it."""
+_SINCOS = """Outputs angle_sin and angle_cos, from -32767 to 32767. They are new every 16 clocks, by CORDIC, and are \
+those of the angle 16 clocks ahead, which is then that of --lead."""
 
 
 def parse_offset(what: str, text: str) -> int:
@@ -53,6 +56,8 @@ class ElectricalAngle(Extra):
     lead: int = option(
         0, _LEAD, metavar="TIME", parse_at=parse_lead, limits=(0, 65535), tests=("", "1.5tick"), tacit=True
     )
+
+    sincos: bool = option(False, _SINCOS, tests=("", "yes"), tacit=True)
 
     def angles(self, spec: Numbers) -> Angles:
         """Return the formats of the angles of a core."""
@@ -96,6 +101,9 @@ class ElectricalAngle(Extra):
         if self.corrects(spec):
             text = "Refused indices: the angle was off by more than 1/16 turn. It also changes between ticks, to 65535."
             yield held(TICK, REFUSED, REFUSED_BITS, unit="indices", help=text)
+        for name, function in {"angle_sin": "Sine", "angle_cos": "Cosine"}.items() if self.sincos else ():
+            text = f"{function} of the angle. It also changes between ticks, every {STEPS} clocks."
+            yield held(TICK, name, SHOWN_BITS, signed=True, unit=f"1/{ONE}", help=text)
 
     def registers(self, spec: Numbers) -> Iterable[Draft]:
         offset = Field("offset", SHOWN_BITS, unit=_UNIT, writable=True, reset=self.offset, port="angle_offset")

@@ -1,0 +1,12 @@
+"""Sine and cosine by CORDIC (Volder 1959): in each step, a vector is turned by the arc tangent of 2^-step."""
+
+import math
+
+AHEAD_BITS = 4
+STEPS = 1 << AHEAD_BITS  # one a clock; so many clocks from an angle at its port to its sine
+WIDTH = 20  # bits of a word, and of a turn
+GUARD_BITS = 3  # of a word, below those of the result
+ONE = 32767  # the greatest sine
+TURNS = tuple(round(math.atan(2.0**-step) / (2 * math.pi) * (1 << WIDTH)) for step in range(STEPS))
+# All steps together stretch this to ONE, which no result exceeds.
+START = round((ONE << GUARD_BITS) * math.prod(math.cos(math.atan(2.0**-step)) for step in range(STEPS))) - 1
