@@ -136,16 +136,36 @@ def _tracked(extra: ElectricalAngle, view: View, counts: Table) -> Table:
     bits, late, (of_velocity, of_fine, of_acceleration) = angles.factor_bits, angles.late, angles.factors
     place = ticks["position"][np.searchsorted(ticks.clock, updates["cause"])] << angles.position_fine_bits
     lead = _written(view.trace, "angle_lead", updates.clock, extra.lead)
-    of_ticks = _at(counts, "angle", updates["cause"]), updates["position_fine"] - place, lead
+    between = [
+        wrapped(of, angles.position_fine_bits + PLACE_BITS) for of in (updates["position_fine"] - place).tolist()
+    ]
+    of_ticks = _at(counts, "angle", updates["cause"]), _settled(angles, updates, between), lead
     columns = np.column_stack((updates.clock, *of_ticks, updates["velocity"], updates["acceleration"])).tolist()
     rows = list[list[int]]()
     for clock, at, between, ahead, velocity, acceleration in columns:
         s, slope = angles.span + ahead, of_velocity.times(velocity)
         curve = of_acceleration.times(acceleration) << bits - SLOPE_BITS
         mean, now = (slope + Factor(t - late, bits, 0).times(curve) for t in (s >> 1, s + (angles.tick >> 1)))
-        start = at + of_fine.times(wrapped(between, angles.position_fine_bits + PLACE_BITS)) + mean * s
+        start = at + of_fine.times(between) + mean * s
         rows.append([clock + angles.clocks, wrapped(start, angles.bits), wrapped(now, angles.bits), 0, 0])
     return _owing(angles, rows)
+
+
+def _settled(angles: Angles, updates: Table, between: list[int]) -> list[int]:
+    """Return places between counts; those that wait for a count go to the middle as the velocity falls."""
+    half = 1 << angles.position_fine_bits - 1
+    sign, waits, limit, mark, settled = 0, False, half, 0, list[int]()
+    velocities = (updates["velocity"].astype(np.int64) >> angles.speed_shift).tolist()
+    for velocity, silent, place in zip(velocities, updates["forced"].tolist(), between, strict=True):
+        size = max(velocity, ~velocity)
+        if silent:
+            slow = size <= mark
+            waits |= place ^ sign >= half - (half >> 2) and (slow or limit < half)
+            limit, mark = limit >> slow, mark >> slow
+        else:
+            sign, waits, limit, mark = -1 if velocity < 0 else 0, False, half, size >> 1
+        settled.append(min(place ^ sign, limit) ^ sign if waits else place)
+    return settled
 
 
 def _counted(extra: ElectricalAngle, view: View, counts: Table) -> Table:
