@@ -90,6 +90,7 @@ def measured(spec: TachometerSpec, plans: Plans, late: str = "") -> list[tuple[s
         ("worst error", f"{error} at a constant {at}, measured in {time}, with a real disc"),
         ("real disc", f"{_REAL}; an ideal one has {speed_text(spec, ideal, 3)} there"),
         ("delay", _delay(spec, plans, late)),
+        *((name, text.format(speed=speed_text(spec, high))) for name, text in plans.of_extras),
     ]
 
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tachometry.sim.signals.files import rows_of, write_csv
 from tachometry.sim.signals.shown import Shown
+from tachometry.sim.studies.extras import expected_rows
 from tachometry.sim.theory.performance import PERFORMANCES, disc_counts, disc_error, unknown
 from tachometry.sim.theory.tsuji import unit_velocity
 from tachometry.spec import METHODS, ParameterError, TachometerSpec, TrackTachometer
@@ -149,6 +150,11 @@ class Plans:
         ends = plan_at(self.spec, slowest / 2).forced[0]
         low = max(self.low, slowest * (1 + disc_counts(self.spec))) if ends else self.low
         return low, float(measured[-1]) if len(measured) else self.high
+
+    @property
+    def of_extras(self) -> list[tuple[str, str]]:
+        """Names and texts of the errors that extras have at the greatest speed, for which `{speed}` stands."""
+        return expected_rows(self.spec, self.range[1])
 
     @cached_property
     def worst(self) -> Plan | None:

@@ -3,6 +3,7 @@
 import inspect
 import math
 import random
+import re
 from fractions import Fraction
 from typing import Any
 
@@ -19,6 +20,7 @@ from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.sim.engines.pysim import PySim
 from tachometry.sim.golden.extras import electrical as golden_angle
 from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.studies.extras import expected_rows
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import of_texts
 from tachometry.spec.core.extras.electrical import ElectricalAngle
@@ -180,6 +182,19 @@ def test_the_angle_is_that_of_the_motor_at_its_use(method: str, motion: str, rms
     error = errors(method, motion, words, 400, disc)
     assert np.std(error) < rms
     assert np.abs(error - np.median(error)).max() < worst
+
+
+@pytest.mark.parametrize(
+    ("method", "more", "least", "most"),
+    [("track", {}, 0.001, 0.01), ("mt", {}, 0.02, 0.15), ("mt", {"lead": "0clk"}, 0.005, 0.07)],
+)
+def test_plans_have_the_error_at_the_lead(method: str, more: dict[str, str], least: float, most: float) -> None:
+    texts = {"lines": "1000", "clock": "48MHz", "tick": "100us", "max-speed": "6000rpm", "lead": "1.5tick", **more}
+    spec = of_texts(method, {**texts, "electrical": "7"})
+    ((name, text),) = expected_rows(spec, 600.0)
+    rms, worst = map(float, re.findall(r"[\d.]+(?= degrees|, )", text)[:2])
+    assert (name, least < rms < most, rms < worst < 6 * rms) == ("angle error", True, True), text
+    assert expected_rows(of_texts(method, texts | {"lead": None}), 600.0) == []
 
 
 def test_a_stop_leaves_the_angle_in_the_middle_of_a_count(monkeypatch: pytest.MonkeyPatch) -> None:
