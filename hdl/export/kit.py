@@ -91,7 +91,7 @@ def _turned(encoder: Encoder, turns: tuple[int, int]) -> tuple[dict[str, str], i
             "a": "1'b1" if encoder.sensor == "step-dir" else "forward",
             "b": "forward" if encoder.sensor == "step-dir" else "!forward",
         }
-        counts = moved
+        counts = moved * encoder.decoding
     return levels, counts
 
 

@@ -174,7 +174,9 @@ def gated_index(
     return times[changed], level[changed]
 
 
-def pulsed(time: FloatArray, step: NDArray[np.int64], duration: float, *, directed: bool) -> tuple[FloatArray, Levels]:
+def pulsed(
+    time: FloatArray, step: NDArray[np.int64], duration: float, *, directed: bool, both_edges: bool = False
+) -> tuple[FloatArray, Levels]:
     """Return times and levels of pulses, each of which lasts for half the time to the next one.
 
     - `time`, shape (n + 1,), seconds: The start, and the times of the steps.
@@ -182,11 +184,13 @@ def pulsed(time: FloatArray, step: NDArray[np.int64], duration: float, *, direct
     - `duration`, seconds
     - `directed`: Pulses are on line A, and B is high for those forward, from the end of the pulse before; else they are
       on A for those forward and on B for those backward.
+    - `both_edges`: Each edge of A is a step, with `directed`; the direction still changes between them.
     """
     begin, end = time[1:], (time[1:] + np.append(time[2:], duration)) / 2
     if directed:
         direction = np.append(np.where(step > 0, 2, 0), 2 * int(len(step) and step[-1] > 0))
-        rise, fall, first = direction[:-1] | 1, direction[1:], direction[0]
+        high = np.arange(1, len(step) + 1) & 1 if both_edges else 1
+        rise, fall, first = direction[:-1] | high, direction[1:] | high * both_edges, direction[0]
     else:
         rise, fall, first = np.where(step > 0, 1, 2), np.zeros_like(step), np.int64(0)
     times = np.append(time[0], np.stack([begin, end], axis=1).ravel())

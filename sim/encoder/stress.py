@@ -25,7 +25,7 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     gaps, turns = [], []
     sensor = spec.encoder.kind
     steps = not sensor.cycle  # each is a pulse
-    per_period = 1 if steps else 6 if sensor.name == "hall" else 4  # edges
+    per_period = spec.encoder.decoding if steps else 6 if sensor.name == "hall" else 4  # edges
     least = (1.0 + steps) * (1 + spec.filter_clocks)
     for speed in _SPEEDS:
         gap = max(least, cycles * spec.encoder.decoding / per_period / speed)
@@ -42,7 +42,8 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     turn = np.concatenate(turns)
     edge, counts = clock[1:], np.cumsum(turn) * spec.encoder.decoding / per_period
     if steps:
-        at, level = pulsed(clock.astype(np.float64), turn, float(clock[-1] + 2), directed=sensor.name == "step-dir")
+        form = {"directed": sensor.name == "step-dir", "both_edges": spec.encoder.decoding == 2}
+        at, level = pulsed(clock.astype(np.float64), turn, float(clock[-1] + 2), **form)
         clock = at.astype(np.int64)
         level[rng.random(len(level)) < 0.05] = 3  # both lines rise
     else:

@@ -100,6 +100,7 @@ class VirtualEncoder(EncoderOptions):
     - `reverse`: It is mounted the other way round, so its lines are those of a shaft that turns backward.
     - `invert`: Lines that are low where others are high, with commas between.
     - `missing_teeth`: Of pulses, see `Encoder`: the last teeth of a turn are not there.
+    - `both_edges`: Of steps: each edge of A is one, and there are two in each of `pulses_per_rev` periods.
     - `complemented`: Lines whose complements are there as well, named `a_n` for `a`.
 
     It raises ValueError if a parameter is out of range.
@@ -113,12 +114,14 @@ class VirtualEncoder(EncoderOptions):
     reverse: bool = False
     invert: str | None = None
     missing_teeth: str | None = None
+    both_edges: bool = False
     complemented: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, encoder: Encoder, **values: Any) -> "VirtualEncoder":
         """Return the encoder that a core is made for, with these values of its other parameters."""
         own = {name: getattr(encoder, name) for name in ("sensor", "reverse", "invert", "missing_teeth")}
+        own["both_edges"] = encoder.sensor == "step-dir" and encoder.decoding == 2
         if encoder.missing:  # its gap is the index
             values["index"] = False
         return cls(encoder.pulses_per_rev, **own, **values)
@@ -157,7 +160,7 @@ class VirtualEncoder(EncoderOptions):
     @property
     def edges_per_rev(self) -> int:
         """Edges of the disc in a turn."""
-        return _EDGES.get(self.sensor, 4) * self.pulses_per_rev
+        return _EDGES.get(self.sensor, 4) * self.pulses_per_rev << self.both_edges
 
     @cached_property
     def disc(self) -> Disc:
@@ -197,7 +200,10 @@ class VirtualEncoder(EncoderOptions):
         n_lost, n_illegal = 0, 0
         turned = -quarter if self.reverse else quarter
         if self.sensor in ("step-dir", "up-down"):
-            times, level = imperfections.pulsed(time, np.diff(turned), duration, directed=self.sensor == "step-dir")
+            directed = self.sensor == "step-dir"
+            times, level = imperfections.pulsed(
+                time, np.diff(turned), duration, directed=directed, both_edges=self.both_edges
+            )
             return self._indexed(times, level, time, turned, duration), 0, 0
         level = _halls()[turned % 6] if self.sensor == "hall" else quadrature(turned)
         if self.sensor == "pulses":

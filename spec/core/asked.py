@@ -74,7 +74,7 @@ class Asked:
     filter_clocks: int = option(
         0,
         "Glitch filter: a level counts once it has held for TIME. Edges are delayed by TIME, which is at "
-        "most 10 ms. In s, ms, us or ns, rounded up to clocks; a plain number is clocks. Edges that are "
+        "most 100 ms. In s, ms, us or ns, rounded up to clocks; a plain number is clocks. Edges that are "
         "filtered out are counted.",
         name="filter",
         metavar="TIME",

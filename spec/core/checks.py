@@ -12,7 +12,7 @@ from tachometry.spec.language.option import ParameterError, check_options
 from tachometry.spec.language.units import PI, format_time, rounded, signed_width
 
 MAX_MODULUS = 1 << 24
-_LONGEST_FILTER = Fraction(10, 1000)  # s; contacts bounce for 2 ms or so
+_LONGEST_FILTER = Fraction(100, 1000)  # s; reed contacts and relays bounce for tens of ms
 
 
 def check(spec: Core) -> None:

@@ -94,8 +94,8 @@ class Encoder:
     decoding: int = option(
         None,
         "Counts per pulse. 4 (or x4) counts every edge, 2 both edges of A, 1 the edges of A while B is "
-        "low. With --sensor pulses 2 (the default) counts every edge, 1 the rises. A step always has 1, a "
-        "period of halls 6.",
+        "low. With --sensor pulses or step-dir 2 counts every edge of A, 1 the rises: the default is 2 of pulses, "
+        "1 of steps. Up/down always has 1, a period of halls 6.",
         parse=_factor,
         shown="4",
         metavar="[4|2|1]",
@@ -104,9 +104,9 @@ class Encoder:
     sensor: str = option(
         "quadrature",
         "Kind of the encoder lines. quadrature: A and B. pulses: A alone, of a tooth wheel, fan or flow "
-        "meter, always forward. step-dir: each rise of A is a step, forward while B is high. up-down: "
-        "each rise of A counts up, each rise of B down. hall: A, B and C of a motor, 120 electrical "
-        "degrees apart.",
+        "meter, always forward. step-dir: each rise of A is a step, with --decoding 2 each edge, forward "
+        "while B is high. up-down: each rise of A counts up, each rise of B down. hall: A, B and C of a "
+        "motor, 120 electrical degrees apart.",
         choices=tuple(SENSORS),
         tests=("", "hall", "pulses", "step-dir", "up-down"),
         tacit=True,

@@ -49,8 +49,8 @@ class Sensor:
             case "pulses":
                 return int(decoding == 2 or after == (1,)), False
             case "step-dir":
-                rises = before[0] < after[0]
-                return (2 * after[1] - 1) * rises, rises and before[1] != after[1]
+                steps = before[0] != after[0] if decoding == 2 else before[0] < after[0]
+                return (2 * after[1] - 1) * steps, steps and before[1] != after[1]
             case "up-down":
                 up, down = (now > then for then, now in zip(before, after, strict=True))
                 return up - down, up and down
@@ -73,11 +73,11 @@ _SENSORS = (
     Sensor(
         "step-dir",
         ("a", "b"),
-        (1,),
+        (1, 2),
         (),
         (
-            "Step line, asynchronous: each rise is a count.",
-            "Direction, asynchronous: high is forward. It must be stable for a clock before the step rises.",
+            "Step line, asynchronous: each rise is a count, with decoding 2 each fall, too.",
+            "Direction, asynchronous: high is forward. It must be stable for a clock before the step.",
         ),
         "the direction changed together with a step, which was counted in the new direction.",
     ),

@@ -31,7 +31,8 @@ def count_of(sensor: str, decoding: int, before: Levels, after: Levels) -> tuple
     if sensor == "pulses":
         return int(rises[0] if decoding == 1 else before != after), False
     if sensor == "step-dir":
-        return (0, False) if not rises[0] else (1 if after[1] else -1, before[1] != after[1])
+        steps = rises[0] if decoding == 1 else before[0] != after[0]
+        return (0, False) if not steps else (1 if after[1] else -1, before[1] != after[1])
     if sensor == "up-down":
         return int(rises[0]) - int(rises[1]), all(rises)
     old, new = middle_of(sensor, before), middle_of(sensor, after)

@@ -24,6 +24,7 @@ BASE = {"ppr": "8", "clock": "1MHz", "tick": "40us", "max-time": "400us"}
 CASES = {
     "pulses": {"decoding": "1", "filter": "2"},
     "step-dir": {"reverse": "yes"},
+    "step-dir both": {"sensor": "step-dir", "decoding": "2", "invert": "a"},
     "up-down": {"invert": "a,b"},
     "hall": {"filter": "2", "invert": "b,z", "index": "yes"},
     "quadrature": {"reverse": "yes", "invert": "a,z", "index": "yes"},
@@ -32,7 +33,7 @@ CASES = {
 
 @pytest.mark.parametrize("sensor", CASES)
 def test_every_step_and_every_error(sensor: str) -> None:
-    spec = of_texts("s", BASE | CASES[sensor] | {"sensor": sensor})
+    spec = of_texts("s", {"sensor": sensor} | BASE | CASES[sensor])
     found = lockstep(spec, stress(spec, 1, 26), PySim())
     assert found.n_mismatches == 0, found.first
     assert bool(len(found.actual.errors)) == (sensor != "pulses" and not (spec.filter_clocks and sensor != "hall"))
@@ -61,7 +62,7 @@ def test_halls_that_are_equal_at_reset_are_one_error(level: int) -> None:
 @pytest.mark.parametrize("sensor", CASES)
 def test_the_virtual_encoder_makes_what_the_core_counts(sensor: str) -> None:
     """Also one that is mounted the other way round, with lines that are inverted."""
-    texts = BASE | CASES[sensor] | {"sensor": sensor, "filter": "0"}
+    texts = {"sensor": sensor} | BASE | CASES[sensor] | {"filter": "0"}
     spec = of_texts("s", texts)
     encoder = VirtualEncoder.of(spec.encoder, index=spec.index is not None, jitter=0.2, seed=3, start_angle_rad=0.013)
     truth = encoder.record(parse_motion("ramp:0:90rad/s:30ms+sine:60rad/s:40Hz:40ms+constant:150rad/s:60ms"))
@@ -80,7 +81,7 @@ def test_faults_of_quadrature_are_refused(fault: str) -> None:
 
 @pytest.mark.parametrize("sensor", CASES)
 def test_exported_verilog_counts_in_icarus(sensor: str, tmp_path: Path) -> None:
-    files = export(of_texts("m", had_by("m", BASE | CASES[sensor] | {"sensor": sensor})), "spindle")
+    files = export(of_texts("m", had_by("m", {"sensor": sensor} | BASE | CASES[sensor])), "spindle")
     for name, text in files.items():
         (tmp_path / name).write_text(text)
     subprocess.run(["iverilog", "-g2012", "-o", "tb", "spindle.v", "spindle_tb.sv"], cwd=tmp_path, check=True)

@@ -123,7 +123,7 @@ def test_two_pulses_at_one_time(rows: str, options: str, tmp_path: Path, capsys:
     ("options", "message"),
     [
         ("--sensor pulses --decoding 4", "--decoding must be 1 or 2 for pulses, not 4"),
-        ("--sensor step-dir --decoding 4", "--decoding must be 1 for step-dir, not 4"),
+        ("--sensor step-dir --decoding 4", "--decoding must be 1 or 2 for step-dir, not 4"),
         ("--sensor pulses --b B", "--b must not be given together with --sensor pulses"),
         ("--sensor pulses --a C", "must be one of A (0), B (1), not 'C'"),
         ("--sensor hall", "channel c of"),

@@ -24,7 +24,7 @@ APART = {
     ),
     # A period of halls has six counts, and only A and B have a state for the index and edges to miss.
     *(frozenset({("sensor", "hall"), ("decoding", value)}) for value in "12"),
-    *(frozenset({("sensor", sensor), ("decoding", "2")}) for sensor in ("step-dir", "up-down")),
+    frozenset({("sensor", "up-down"), ("decoding", "2")}),
     frozenset({("sensor", "hall"), ("whole-cycles", "yes")}),
     *(
         frozenset({("sensor", sensor), (name, value)})

@@ -97,7 +97,7 @@ def spec_of(tick: int = 20, max_ticks: int = 10, **options: Any) -> MTachometer:
 RANGES = [
     ("velocity_width", 8, 64),
     ("position_width", 8, 48),
-    ("filter_clocks", 0, 10_000),
+    ("filter_clocks", 0, 100_000),
     ("frac_bits", 4, 24),
     ("average", 1, 256),
 ]

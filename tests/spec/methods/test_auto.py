@@ -79,7 +79,7 @@ def test_a_manifest_says_that_it_was_chosen(tmp_path: Path) -> None:
         ),
         ({"nix": "1"}, "nix must not be given with method s: there is no such option"),
         ({"tick": "0us"}, "tick must be longer than 0, not 0us"),
-        ({"filter": "11ms"}, "filter_clocks must be from 0 to 480000 clocks, 10ms, .*"),
+        ({"filter": "101ms"}, "filter_clocks must be from 0 to 4800000 clocks, 100ms, .*"),
         ({"max-memory": "1ns"}, "max_memory must be a whole number of clocks, .*"),
     ],
 )
