@@ -7,6 +7,7 @@ class CoreOptions(TypedDict, total=False):
     age: bool | None
     average: Value | None
     axes: Value | None
+    blanking: Value | None
     bound_decay: bool | None
     bounds: bool | None
     cancel: bool | None

@@ -8,6 +8,7 @@ from amaranth.lib import stream, wiring
 
 from tachometry.hdl.arithmetic.idle import Idle, idle_of
 from tachometry.hdl.extras import check_inputs, gates_of, place
+from tachometry.hdl.front_end.blanking import Blanking
 from tachometry.hdl.front_end.conditioner import InputConditioner
 from tachometry.hdl.front_end.decoder import decoder_of
 from tachometry.hdl.front_end.external_tick import ExternalTick
@@ -49,7 +50,8 @@ class Tachometer(wiring.Component):
         self._spec = spec
         super().__init__(members(spec.ports))
         front, latency = spec.front_end, spec.latency.tick
-        self.conditioner = InputConditioner(spec.filter_clocks, (*front.lines, *front.sensed), front.complemented)
+        held = {line: Blanking(spec.blanking_clocks, starts) for line, starts in front.blanked.items()}
+        self.conditioner = InputConditioner(spec.filter_clocks, (*front.lines, *front.sensed), front.complemented, held)
         self.decoder = decoder_of(spec.encoder, front.wheel)
         self.pulse_counter = PulseCounter(
             max(spec.tick.longest, spec.widths.max_pulse_count),

@@ -104,7 +104,7 @@ def _wired(spec: TachometerSpec, levels: dict[str, str]) -> dict[str, str]:
 def _bench(tacho: TachometerSpec) -> dict[str, object]:
     """Return how the smoke test turns an encoder, and the position that must follow."""
     encoder = tacho.encoder
-    hold = max(_hold(tacho), min(2 * (tacho.filter_clocks + 8), tacho.filter_clocks + 300))
+    hold = max(_hold(tacho), min(2 * (tacho.filter_clocks + 8), tacho.filter_clocks + 300), tacho.blanking_clocks)
     turns = _turns(hold)
     levels, expected = _turned(encoder, turns)
     low = {line: f"1'b{int(line in encoder.inverted)}" for line in ("a", "b")}

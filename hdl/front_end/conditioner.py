@@ -1,10 +1,14 @@
 """From asynchronous pins to levels of the clock domain."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 from amaranth import Cat, Module, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, idle_of
+from tachometry.hdl.front_end.blanking import Blanking
 from tachometry.hdl.front_end.glitch_filter import GlitchFilter
 from tachometry.hdl.wires.ports import by_name
 from tachometry.hdl.wires.synchronizer import Synchronizer
@@ -17,14 +21,20 @@ class InputConditioner(wiring.Component):
 
     - `filter_clocks`: Clocks for which a level must hold; 0 for no filter.
     - `complemented`: Those of them that come with their complements.
+    - `blanked`: Boxes behind the filters of lines whose echoes are ignored.
     """
 
     def __init__(
-        self, filter_clocks: int = 0, lines: tuple[str, ...] = ("a", "b"), complemented: tuple[str, ...] = ()
+        self,
+        filter_clocks: int = 0,
+        lines: tuple[str, ...] = ("a", "b"),
+        complemented: tuple[str, ...] = (),
+        blanked: Mapping[str, Blanking] = MappingProxyType({}),
     ) -> None:
         self._filter_clocks = filter_clocks
         self._lines = lines
         self._complemented = complemented
+        self._blanked = blanked
         super().__init__(
             {
                 **{name: In(1) for name in lines},  # asynchronous pins
@@ -42,8 +52,9 @@ class InputConditioner(wiring.Component):
 
     @property
     def idle(self) -> tuple[Idle, ...]:
-        """Counters of the filters, which a simulation may move on."""
-        return idle_of({f"filter_{name}": box for name, box in self._filters.items()})
+        """Counters of the filters and of the blanking, which a simulation may move on."""
+        blanked = {f"blanking_{name}": box for name, box in self._blanked.items()}
+        return idle_of({f"filter_{name}": box for name, box in self._filters.items()} | blanked)
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
@@ -53,6 +64,7 @@ class InputConditioner(wiring.Component):
         swallowed = []
         levels, readies = (by_name(self, self._lines, form) for form in ("level_{}", "ready_{}"))
         complements, equals = (by_name(self, self._complemented, form) for form in ("{}_n", "equal_{}"))
+        levels |= {name: _blank(m, name, box, levels[name], readies[name]) for name, box in self._blanked.items()}
         for name, pin in by_name(self, self._lines).items():
             level = Signal(name=f"synchronised_{name}") if self._filter_clocks else levels[name]
             m.submodules[f"sync_{name}"] = Synchronizer(pin, level)
@@ -81,3 +93,11 @@ class InputConditioner(wiring.Component):
             with m.If(self.clear):
                 m.d.sync += glitches.eq(0)
         return m
+
+
+def _blank(m: Module, name: str, box: Blanking, level: Signal, ready: Signal) -> Signal:
+    """Drive the level of a line from its box, and return the level that the box takes."""
+    m.submodules[f"blanking_{name}"] = box
+    m.d.comb += [level.eq(box.held), box.ready.eq(ready)]
+    taken: Signal = box.level
+    return taken

@@ -1,5 +1,6 @@
 """The golden front end turns sampled levels into steps, pulse numbers and positions."""
 
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -105,6 +106,28 @@ def filter_line(
     return clock[changed], level[changed], clock[glitch + 1]
 
 
+def blanked_line(
+    clock: NDArray[np.int64], level: NDArray[np.uint8], clocks: int, starts: int | None
+) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
+    """Return the change list of a line that is held for `clocks` after each change that is shown.
+
+    - `clock`, `level`, shape (n,): Change list of one line.
+    - `starts`: Level whose changes are held; None for both.
+    """
+    if np.all(np.diff(clock) >= clocks):
+        return clock, level
+    at, levels = clock.tolist(), level.tolist()
+    shown, row, free = levels[0], 0, 0  # the row whose level the line has in clock `free`, from which it is seen
+    held = [(at[0], shown)]
+    while (row := row + (levels[row] == shown)) < len(at):
+        now, shown = max(at[row], free), levels[row]
+        held.append((now, shown))
+        free = now + clocks * (starts in (None, shown))
+        row = bisect_right(at, free) - 1
+    shown_at, shown_level = zip(*held, strict=True)
+    return np.array(shown_at, dtype=np.int64), np.array(shown_level, dtype=np.uint8)
+
+
 def changes(trace: PinTrace, name: str) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
     """Change list of one line: the clocks from which its levels are sampled, and the levels."""
     line, _, bit = name.rpartition("_")
@@ -173,6 +196,8 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
         if spec.filter_clocks:
             clock, level, gone = filter_line(clock, level, spec.filter_clocks)
             returned.append(gone)
+        if name in spec.front_end.blanked:
+            clock, level = blanked_line(clock, level, spec.blanking_clocks, spec.front_end.blanked[name])
         return clock, level
 
     clock, levels = together([conditioned(name) for name in encoder.kind.lines])

@@ -186,6 +186,8 @@ def _texts(method: str, row: Texts) -> Texts:
         texts["min-time"] = longest
     if "max-speed" in texts:
         counts = Fraction(9, 4) if cycles > 2 else Fraction(3, 4)
+        if blanking := texts.get("blanking"):  # two edges of a line in a period
+            counts = min(counts, Fraction(cycles * decoding, 2 * int(blanking)))
         texts["max-speed"] = f"{float(counts * _CLOCK_HZ / (cycles * _PPR * decoding))}rev/s"
     frac_bits, width = texts.pop("frac-bits", ""), texts.pop("velocity-width", "")
     if frac_bits:

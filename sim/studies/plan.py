@@ -86,13 +86,15 @@ def default_range(spec: TachometerSpec) -> tuple[float, float]:
     """Return least and greatest speed, in rad/s, that a plan is of interest for.
 
     From one count in the maximum time to `max_speed`; without it, as everything recurs in each multiple of ω_u, to ten
-    of them. Never beyond one count per clock, nor beyond what a filter lets through, and over a decade at least.
+    of them. Never beyond one count per clock, nor beyond what filter and blanking let through, over a decade at least.
     """
     unit = spec.scale.unit_velocity
     high = _UNITS * unit if spec.max_speed is None else spec.max_speed.rad_per_s
     high = min(high, spec.velocity.greatest_speed)
     if spec.filter_clocks and spec.encoder.sensor == "quadrature":  # a level lasts half a period of its line
         high = min(high, unit * spec.timing.tick_cycles * spec.encoder.decoding / 2 / spec.filter_clocks)
+    if spec.blanking_clocks:
+        high = min(high, unit * spec.timing.tick_cycles * float(spec.front_end.blanked_counts))
     return min(unit / spec.timing.max_ticks, high / 10), high
 
 

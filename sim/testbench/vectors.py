@@ -128,7 +128,7 @@ def usual_motion(spec: TachometerSpec, seed: int = 1, most: int = _MOVING) -> Re
 def _fastest(spec: TachometerSpec) -> float:
     """Return counts per tick that the lines can have: an edge in two clocks, slower with a filter."""
     edges = 12 if spec.encoder.sensor == "hall" else 8
-    return spec.timing.tick_cycles * spec.encoder.decoding / edges / (1 + spec.filter_clocks)
+    return spec.timing.tick_cycles * spec.encoder.decoding / edges / (1 + max(spec.filter_clocks, spec.blanking_clocks))
 
 
 def _tour(spec: TachometerSpec, positions: Sequence[int], longest: int) -> list[str]:

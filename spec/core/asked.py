@@ -82,6 +82,18 @@ class Asked:
         parse_at=parse_filter,
         tests=("", "1", "5"),
     )
+    blanking_clocks: int = option(
+        0,
+        "Ignore edges of a line for TIME after one that counts. It keeps out echoes and bounce without "
+        "delay. In s, ms, us or ns, at most 100 ms, rounded up to clocks; a plain number is clocks. After "
+        "it, the line has the level that it then has.",
+        name="blanking",
+        metavar="TIME",
+        shown="0",
+        parse_at=parse_filter,
+        tests=("", "2", "9"),
+        tacit=True,
+    )
     index: Index | None = option(  # noqa: RUF009
         None, "Index line z: it captures the position in index_position.", part=Index
     )

@@ -20,10 +20,7 @@ def check(spec: Core) -> None:
     check_options(spec)
     _check_ticks(spec)
     _check_velocity(spec)
-    most = max(255, int(spec.timing.clock_hz * _LONGEST_FILTER))
-    if not 0 <= spec.filter_clocks <= most:
-        longest = format_time(Fraction(most) / spec.timing.clock_hz)
-        raise ParameterError("filter_clocks", f"must be from 0 to {most} clocks, {longest}, not {spec.filter_clocks}")
+    _check_lines(spec)
     if "z" in spec.encoder.inverted and "z" not in spec.front_end.lines:
         raise ParameterError("invert", "must not have z without --index, which makes the line z")
     if spec.encoder.missing and spec.bounds:
@@ -36,6 +33,22 @@ def check(spec: Core) -> None:
         _check_edge_error(spec)
     if spec.lowpass is not None:
         _check_lowpass(spec, spec.lowpass)
+
+
+def _check_lines(spec: Core) -> None:
+    most = max(255, int(spec.timing.clock_hz * _LONGEST_FILTER))
+    longest = format_time(Fraction(most) / spec.timing.clock_hz)
+    if not 0 <= spec.filter_clocks <= most:
+        raise ParameterError("filter_clocks", f"must be from 0 to {most} clocks, {longest}, not {spec.filter_clocks}")
+    if (blanked := spec.blanking_clocks) and not 2 <= blanked <= most:
+        raise ParameterError("blanking_clocks", f"must be 0 or from 2 to {most} clocks, {longest}, not {blanked}")
+    if blanked and spec.max_speed is not None:
+        counts = spec.max_speed.counts(spec.encoder.counts_per_rev, spec.tick.seconds(1))
+        if counts > (fastest := spec.front_end.blanked_counts):
+            shortest = format_time(fastest * blanked / counts / spec.timing.clock_hz)
+            raise ParameterError(
+                "blanking_clocks", f"must be at most {shortest}, the time between edges of a line at --max-speed"
+            )
 
 
 def _check_index_state(spec: Core) -> None:

@@ -1,6 +1,7 @@
 """The front end of a core: its lines and other inputs, and what the position is counted within and set by."""
 
 from dataclasses import dataclass
+from fractions import Fraction
 
 from tachometry.spec.core.asked import Asked
 from tachometry.spec.core.sensors import EDGE, USUAL_STATE, Levels
@@ -40,6 +41,21 @@ class FrontEnd:
         """Lines of the sensor, the index and `controls` included."""
         of_index = ("z",) if self.asked.index and not self.asked.encoder.missing else ()  # a gap needs none
         return (*self.asked.encoder.kind.lines, *of_index, *self.controls)
+
+    @property
+    def blanked(self) -> dict[str, int | None]:
+        """Lines that are held for a time after a change, and the level on the pin that starts it; None: both do."""
+        if not self.asked.blanking_clocks:
+            return {}
+        encoder = self.asked.encoder
+        rises = encoder.kind.held(encoder.decoding).items()
+        return {line: int(line not in encoder.inverted) if alone else None for line, alone in rises}
+
+    @property
+    def blanked_counts(self) -> Fraction:
+        """Most counts in a clock, if each edge that starts the blanking comes as it ends."""
+        edges = 1 if None not in self.blanked.values() else 2
+        return Fraction(self.asked.encoder.decoding, edges * self.asked.blanking_clocks)
 
     @property
     def complemented(self) -> tuple[str, ...]:

@@ -39,6 +39,8 @@ class Recovery:
         # A line that must be known anew has to hold still once more.
         held = 1 << max(clocks - 1, 1).bit_length()
         conditioned = 2 + (held + clocks if clocks else 0)
+        if blanked := self.asked.blanking_clocks:  # the time that is left, then the line as it is
+            conditioned += 1 << blanked.bit_length()
         # One clock to decode. The first complete window then begins with the end of another.
         window = 1 + (1 << (longest if longest >= 16 else max(longest - 2, 0)).bit_length())
         return conditioned + 1 + window

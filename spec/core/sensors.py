@@ -32,6 +32,11 @@ class Sensor:
         """Return the levels that follow these forward."""
         return self.cycle[(self.cycle.index(levels) + 1) % len(self.cycle)]
 
+    def held(self, decoding: int) -> dict[str, bool]:
+        """Return the lines whose changes are counted or tell where they are, and whether their rises alone are."""
+        rises = self.name != "quadrature" and decoding == 1
+        return dict.fromkeys(self.lines[:1] if self.name == "step-dir" else self.lines, rises)
+
     @property
     def legal(self) -> tuple[Levels, ...]:
         """Levels that there may be."""

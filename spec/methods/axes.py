@@ -29,6 +29,7 @@ _LEFT_OUT: tuple[tuple[str, Any, str], ...] = (
     ("bounds", False, f"what finds them {_FOR_ONE}"),
     ("preset", None, f"what sets the position {_FOR_ONE}"),
     ("position_modulo", None, f"its counter {_FOR_ONE}"),
+    ("blanking_clocks", 0, f"its timer {_FOR_ONE}"),
     ("lowpass", None, f"the filter {_FOR_ONE}"),
 )
 _STROBES = {

@@ -112,6 +112,7 @@ def test_every_option_does_what_it_says() -> None:
         "cpr",
         "pole-pairs",
         "missing-teeth",
+        "blanking",
         "pwm",
         "health",
         "health-edges",
