@@ -37,6 +37,10 @@ _LOCAL: dict[str, Any] = {
 }
 
 
+class LostScheduler(OSError):
+    """The scheduler of a sweep ended, or its machine cannot be reached."""
+
+
 def require() -> None:
     """Check that the extra is there: distributed, pyarrow and cryptography."""
     for name in ("distributed", "pyarrow", "cryptography"):
@@ -129,8 +133,8 @@ def rows(client: Client, points: Mapping[str, Point | LoopPoint], study: str = "
     """Yield rows of points, by their digests, as they come; Dask schedules them, and again where a worker was lost.
 
     They are run by the function `run_packed` of a module of sim.studies, `study`. At the end it raises ValueError if a
-    point cannot be run, and OSError if a worker lacks what it needs; OSError at once, if one has another version, or
-    the scheduler goes.
+    point cannot be run, and OSError if a worker lacks what it needs; OSError at once, if one has another version, and
+    LostScheduler if the scheduler goes.
     """
     from distributed import KilledWorker, as_completed
 
@@ -161,7 +165,7 @@ def rows(client: Client, points: Mapping[str, Point | LoopPoint], study: str = "
             continue
         error = found[1] if future.status == "error" else found
         if future.status == "cancelled":
-            raise OSError(f"the scheduler has gone: {error}")
+            raise LostScheduler("lost the connection to the scheduler")
         if isinstance(error, ImportError):
             raise OSError(f"workers must have the same version of tachometry as this machine: {error}")
         lost = 1

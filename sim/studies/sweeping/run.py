@@ -58,10 +58,13 @@ def run_sweep(
                     for row in rows:
                         kept.add(row)
                         n_done += 1
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, cluster.LostScheduler) as error:
             n_kept = len(grid.points) - len(missing) + n_done
             where = f", kept in {results}" if results is not None and n_kept else ""
-            raise KeyboardInterrupt(f"after {n_kept} of {plural(len(grid.points), 'point')}{where}") from None
+            how_far = f"after {n_kept} of {plural(len(grid.points), 'point')}{where}"
+            if isinstance(error, KeyboardInterrupt):
+                raise KeyboardInterrupt(how_far) from None
+            raise OSError(f"{error} {how_far}: the same command goes on from there") from None
         return SweepResult(grid, kept.columns(*columns), len(missing), time.monotonic() - begun)
 
 
