@@ -260,8 +260,9 @@ class ModuleWriter(Scope):
     def paths(self) -> Iterator[tuple[str, str]]:
         """Yield the paths of signals and memories as Amaranth names them, with their paths in the text."""
         for value, names in self.called.items():
-            if self.home.get(value[-1], ("", 0, 0))[1:] == (len(value) - 1, len(value)):
-                yield from ((name, self.home[value[0]][0]) for name in names)
+            name, *_ = self.home.get(value[0], ("",))
+            if all(self.home.get(net) == (name, at, len(value)) for at, net in enumerate(value)):
+                yield from ((called, name) for called in names)
         yield from ((self.circuit.cells[cell].name, name) for cell, name in self.memories.items())
         for inner, name, own in self.instances:
             yield from ((f"{name}.{old}", f"{own}.{new}") for old, new in inner.paths())

@@ -32,7 +32,7 @@ KINDS = {
     "m": ("method=m ppr=500", "none"),
     "m averaged": ("method=m ppr=500 average=16", "none"),
     "t": ("method=t ppr=500", "none"),
-    "mt": ("method=mt ppr=500", "none"),
+    "mt": ("method=mt cpr=16 clock=48MHz tick=10us max-time=50ms max-speed=6000rpm unit=rpm timer=tick", "none"),
     "rairan": ("method=rairan ppr=500", "none"),
     "track serial": ("method=track ppr=500 multiplier=serial", "none"),
     "track block": ("method=track ppr=500 multiplier=block", "none"),
