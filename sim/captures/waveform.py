@@ -1,5 +1,6 @@
 """Variables of a waveform, whatever file it is in, become the lines of a recording."""
 
+from array import array
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -79,7 +80,9 @@ class Changes:
         self._value = {variable.code: "x" for variable, _ in of}
         self._last: list[int | None] = [None] * len(of)
         self._gap, self._gaps = [False] * len(of), 0
-        self._times, self._rows = list[int | Fraction](), list[int]()
+        # Of 9 bytes a change; a time that 64 bits do not hold makes them a list.
+        self._times: array[int] | list[int | Fraction] = array("q")
+        self._rows = bytearray()
         self._begin: int | Fraction | None = None
         self._now: int | Fraction = 0
         self._changed = False
@@ -117,7 +120,10 @@ class Changes:
         self._last = [last if level is None else level for level, last in zip(levels, self._last, strict=True)]
         row = sum(level << line for line, level in enumerate(self._last) if level is not None)
         if None not in self._last and (not self._rows or row != self._rows[-1]):
-            self._times.append(self._now)
+            try:
+                self._times.append(self._now)  # type: ignore[arg-type]
+            except (OverflowError, TypeError):
+                self._times = [*self._times, self._now]
             self._rows.append(row)
             check_edges(self._path, len(self._rows))
 
@@ -146,9 +152,10 @@ class Changes:
             told.append(f"begins at {at:.9g} s of the waveform, where all lines have been 0 or 1")
         if self._gaps:
             told.append(f"{plural(self._gaps, 'change')} to x or z: the level before holds there")
-        seconds = np.array([float((time - first) * unit.numerator / unit.denominator) for time in self._times])
+        exact = (float((time - first) * unit.numerator / unit.denominator) for time in self._times)
+        seconds = np.fromiter(exact, np.float64, len(self._times))
         duration = float((self._now - first) * unit.numerator / unit.denominator)
-        recording = Recording.of_level(seconds, np.array(self._rows, dtype=np.uint8), duration, self._lines)
+        recording = Recording.of_level(seconds, np.frombuffer(self._rows, dtype=np.uint8), duration, self._lines)
         return named(recording, self._names, self._chosen, told)
 
 

@@ -1,6 +1,8 @@
 """Waveforms as captures."""
 
 import re
+import tracemalloc
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,7 @@ from support.captures import assert_same
 from tachometry.sim.captures import vcd
 from tachometry.sim.captures.file import CaptureError
 from tachometry.sim.captures.read import read_capture
+from tachometry.sim.captures.waveform import Changes, Variable
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines.pysim import PySim
@@ -172,3 +175,22 @@ def test_of_many_variables_those_are_shown_that_are_near(tmp_path: Path) -> None
     path = write(tmp_path / "w.vcd", HEAD.replace("$scope module deep", many + "$scope module deep") + BODY)
     with pytest.raises(CaptureError, match=r"signal_37 \(39\) and \d+ more, not 'signal_19O'; near it are .*signal_19"):
         read_capture(path, "signal_19O")
+
+
+@pytest.mark.parametrize("late", [10**4, 10**19, Fraction(3, 2)], ids=str)
+def test_a_change_takes_some_bytes(late: Fraction | int) -> None:
+    """Its time is exact, also beyond 64 bits and with a fraction."""
+    n, step = 20_000, 10_000
+    changes = Changes(Path("c.vcd"), [Variable(name, 1, name.encode(), 0, 0) for name in "ab"], None, None, {})
+    tracemalloc.start()
+    for k in range(n):
+        changes.at(step * k)
+        changes.change(b"a", "01"[k % 2])
+        changes.change(b"b", "0")
+    used = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    assert 9 * (n - 1) < used < 14 * n
+    changes.at(step * n + late)
+    changes.change(b"b", "1")
+    time = changes.recording(Fraction(1, 10**9)).time
+    assert time.tolist() == [*(step * k / 1e9 for k in range(n)), float((step * n + late) / Fraction(10**9))]
