@@ -156,13 +156,13 @@ def errors(method: str, motion: str, words: dict[str, str], first: int, disc: Vi
     return (error + 180) % 360 - 180
 
 
-@pytest.mark.parametrize(("method", "rms"), [("mt", 0.03), ("track", 0.4)])
-def test_halls_have_their_angle_at_once(method: str, rms: float) -> None:
+@pytest.mark.parametrize(("method", "bits", "rms"), [("mt", None, 0.03), ("track", "6", 0.4), ("track", "14", 0.03)])
+def test_halls_have_their_angle_at_once(method: str, bits: str | None, rms: float) -> None:
     """It is 0 where A rises, and right from the first updates with counts on."""
-    halls = {"pole-pairs": "7", "sensor": "hall"}
+    halls = {"pole-pairs": "7", "sensor": "hall"} | ({} if bits is None else {"position-fine-bits": bits})
     assert np.sqrt(np.mean(errors(method, "constant:100rad/s:150ms", halls | {"sincos": "yes"}, 600) ** 2)) < rms
     assert np.sqrt(np.mean(errors(method, "constant:100rad/s:150ms", halls, 600) ** 2)) < rms
-    assert abs(errors("mt", "constant:1rad/s:150ms", halls, 0)[5:100]).max() < 31
+    assert abs(errors(method, "constant:1rad/s:150ms", halls, 0)[5:100]).max() < 31
 
 
 @pytest.mark.parametrize(
