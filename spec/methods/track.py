@@ -19,7 +19,7 @@ from tachometry.spec.formats.tracking import MOST_MEMORY, RESULT_BITS, WIDTH, Tr
 from tachometry.spec.formats.tracking_code import SMOOTH, SMOOTH_DELAY_BITS, Program
 from tachometry.spec.formats.tracking_units import BLOCK, Serial
 from tachometry.spec.formats.velocity_output import NATIVE, VelocityOutput
-from tachometry.spec.language.option import ParameterError, option
+from tachometry.spec.language.option import ParameterError, option, parse_whole
 from tachometry.spec.language.port import UPDATE, Port, held
 from tachometry.spec.language.units import format_time, next_written_time, short_time, written_time
 
@@ -97,7 +97,13 @@ class TrackTachometer(TachometerSpec):
         tests=("", "block"),
     )
     position_fine_bits: int = option(
-        6, "Fraction bits of position_fine, 1 to 16.", metavar="N", limits=(1, 16), tests=("", "1", "16")
+        None,
+        "Fraction bits of position_fine, 1 to 16. Some extras need more than 6, and then have them.",
+        metavar="N",
+        parse=parse_whole,
+        limits=(1, 16),
+        shown="6",
+        tests=("", "1", "16"),
     )
     smooth: bool = option(
         False,
@@ -228,6 +234,9 @@ class TrackTachometer(TachometerSpec):
         if self.max_memory is not None and not shortest <= self.max_memory <= longest:
             least, given = (format_time(self.tick.seconds(clocks)) for clocks in (shortest, self.max_memory))
             raise ParameterError("max_memory", f"must be from {least}, a tick, to {MOST_MEMORY}s, not {given}")
+        if self.position_fine_bits is None:
+            needed = max((extra.least_fine_bits(self) for extra in self.extras), default=0)
+            object.__setattr__(self, "position_fine_bits", min(max(6, needed), 16))
         super().__post_init__()
         if self.bounds:
             raise ParameterError("bounds", f"must not be given with method {self.method}: no window encloses its speed")

@@ -156,7 +156,7 @@ def errors(method: str, motion: str, words: dict[str, str], first: int, disc: Vi
     return (error + 180) % 360 - 180
 
 
-@pytest.mark.parametrize(("method", "bits", "rms"), [("mt", None, 0.03), ("track", "6", 0.4), ("track", "14", 0.03)])
+@pytest.mark.parametrize(("method", "bits", "rms"), [("mt", None, 0.03), ("track", "6", 0.4), ("track", None, 0.03)])
 def test_halls_have_their_angle_at_once(method: str, bits: str | None, rms: float) -> None:
     """It is 0 where A rises, and right from the first updates with counts on."""
     halls = {"pole-pairs": "7", "sensor": "hall"} | ({} if bits is None else {"position-fine-bits": bits})
@@ -212,6 +212,15 @@ def test_a_stop_leaves_the_angle_in_the_middle_of_a_count(monkeypatch: pytest.Mo
     assert worst() < 0.4
     monkeypatch.setattr(golden_angle, "_settled", lambda angles, updates, between: between)
     assert worst() > 0.5
+
+
+@pytest.mark.parametrize(
+    ("encoder", "bits"), [("lines=1000", 7), ("lines=128", 10), ("lines=9000", 6), ("sensor=hall pole-pairs=7", 14)]
+)
+def test_a_step_of_the_fine_position_is_less_than_one_of_the_angle(encoder: str, bits: int) -> None:
+    words = dict(word.split("=") for word in encoder.split())
+    spec = of_texts("track", {"clock": "48MHz", "tick": "100us", "electrical": "7", **words})
+    assert spec.options["position-fine-bits"] == str(bits)
 
 
 @pytest.mark.parametrize(("counts", "pole_pairs"), [(97, 18), (10, 3), (20_000, 21), (20_000, 18)])

@@ -68,6 +68,9 @@ class ElectricalAngle(Extra):
         late_of = (late + of_track[0], *of_track, tuple(halls[:: -1 if spec.encoder.reverse else 1]))
         return Angles(counts, self.pole_pairs, tick, spec.tick.longest, bits, *late_of)
 
+    def least_fine_bits(self, spec: Numbers) -> int:
+        return ((self.pole_pairs << SHOWN_BITS) // spec.encoder.counts_per_rev).bit_length()
+
     def missing(self) -> Mapping[str, str]:
         return {"axes": "does not work with --axes", "loop": "does not work with --loop"}
 

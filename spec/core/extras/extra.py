@@ -51,6 +51,10 @@ class Extra:
         """Return its outputs."""
         return ()
 
+    def least_fine_bits(self, spec: Numbers) -> int:
+        """Return fraction bits that it needs of a fine position."""
+        return 0
+
     def registers(self, spec: Numbers) -> Iterable[Draft]:
         """Return registers that a program writes; a field sets the input of its gates that has the name of its port."""
         return ()
