@@ -66,6 +66,7 @@ class CoreOptions(TypedDict, total=False):
     preset: Value | None
     probe: Value | None
     pwm: Value | None
+    ratio: Value | None
     reciprocal: Value | None
     reverse: bool | None
     sensor: Value | None

@@ -147,7 +147,7 @@ def _setting(
         raise ValueError(f"--from must be from 0 to 2ms before the end of --motion, not {loop.start}")
     if task.load is not None and not begin + 0.002 <= task.load.begin < duration:
         raise ValueError(f"--load must begin 2ms or more after --from, and within --motion, not {loop.load}")
-    encoder = VirtualEncoder(spec.encoder.pulses_per_rev, **faults)
+    encoder = VirtualEncoder(spec.encoder.pulses_per_rev, ratio=spec.encoder.ratio, **faults)
     if loop.measured_acceleration and "acceleration" not in spec.method_entries:
         raise ParameterError("measured_acceleration", f"must not be given with method {spec.method}, which has none")
     law = Law(tachometer=spec, **read_options(Law, texts, vars(spec.timing)))

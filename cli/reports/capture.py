@@ -80,7 +80,7 @@ def _do(names: tuple[str, ...]) -> str:
 def _index(axis: Axis) -> list[str]:
     """Return whether the index comes at another distance than once a turn; to and fro over one index is no distance."""
     encoder, distances = axis.spec.encoder, np.abs(axis.index_distances)
-    turn, lines = encoder.counts_per_rev, encoder.pulses_per_rev
+    turn, lines = encoder.encoder_counts, encoder.pulses_per_rev
     distances = distances[distances > min(encoder.decoding, turn / 2)]
     if not len(distances) or abs((apart := float(np.median(distances))) - turn) <= max(1, turn / 100):
         return []
@@ -96,7 +96,7 @@ def _index(axis: Axis) -> list[str]:
 def _index_place(axis: Axis) -> list[str]:
     """Return whether the index is at other counts forward than backward, as where it is wide or low."""
     near = np.abs(axis.index_distances)
-    near = near[(near > 0) & (near <= 2 * axis.spec.encoder.decoding) & (near < axis.spec.encoder.counts_per_rev / 2)]
+    near = near[(near > 0) & (near <= 2 * axis.spec.encoder.decoding) & (near < axis.spec.encoder.encoder_counts / 2)]
     recording = axis.recording
     if not len(near) or recording.z is None:
         return []

@@ -24,7 +24,9 @@ def core_rows(spec: TachometerSpec, bus: Bus | None = None) -> list[tuple[str, s
 def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
     """Return rows of the table: a name and its value."""
     encoder, timing = spec.encoder, spec.timing
-    counts = f"{encoder.pulses_per_rev} pulses per revolution x{encoder.decoding}: {encoder.counts_per_rev} counts"
+    counts = f"{encoder.pulses_per_rev} pulses per revolution x{encoder.decoding}: {encoder.encoder_counts} counts"
+    if encoder.ratio is not None:
+        counts += f", {encoder.ratio} turns for one of the shaft: {encoder.counts_per_rev} counts"
     fastest = spec.velocity.greatest_speed
     per_tick = fastest / spec.scale.unit_velocity
     greatest = f"{speed_text(spec, fastest)} ({per_tick:.6g} count{'s' * (per_tick != 1)} per tick)"

@@ -66,7 +66,7 @@ def _window_means(spec: RairanTachometer, encoding: Encoding, at: _Estimates) ->
     last = counted[np.maximum(np.searchsorted(counted, end, side="left") - 1, 0)]
     begin = np.where(at.n1 > 1, end - dt, last)
     moved = encoding.motion.angle(end / clock_hz) - encoding.motion.angle(begin / clock_hz)
-    return moved * spec.encoder.counts_per_rev / _TURN / (np.maximum(end - begin, 1) / dt)
+    return moved * spec.encoder.encoder_counts / _TURN / (np.maximum(end - begin, 1) / dt)
 
 
 def fig5(lab: Lab) -> Result:

@@ -45,7 +45,8 @@ def _scales(spec: AnySpec) -> dict[str, str]:
     """Return the scales of outputs, to be copied into a program, by their names."""
     velocity, counts = spec.tachometer.velocity, spec.tachometer.encoder.counts_per_rev
     lsb = f"{velocity.rad_per_s_per_lsb!r} rad/s"
-    return {"velocity": f"2^-{velocity.frac_bits} {spec.tachometer.unit} = {lsb}", "position": f"2*pi/{counts} rad"}
+    turn = counts if isinstance(counts, int) else f"({counts})"
+    return {"velocity": f"2^-{velocity.frac_bits} {spec.tachometer.unit} = {lsb}", "position": f"2*pi/{turn} rad"}
 
 
 def _help(port: Port) -> str:

@@ -77,7 +77,7 @@ class Gates(wiring.Component):
         front, turn = spec.front_end, None
         if front.index_watched:
             presets = spec.preset is not None
-            turn = Turn(spec.encoder.counts_per_rev, spec.position_width, front.index_resets, presets)
+            turn = Turn(spec.encoder.encoder_counts, spec.position_width, front.index_resets, presets)
         complements = {pin.of: pin.holds for pin in extra.pins(spec)}
         misses = front.index_state is not None
         return cls(spec.timing.clock_hz, extra.edges, extra.errors, turn, complements, misses)

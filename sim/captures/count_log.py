@@ -38,8 +38,9 @@ class ShaftLog:
         return Source({line: self.name}, float(self.time[-1]), total, still, notes=self.notes)
 
     def edges(self, encoder: Encoder, per_rev: int) -> NDArray[np.float64]:
-        """Return the places in edges of a disc that has so many in a revolution."""
-        return self.place * (per_rev / (2 * math.pi if self.angles else encoder.counts_per_rev))
+        """Return the places, of the shaft if they are angles, in edges of a disc that has so many in a revolution."""
+        rad = 2 * math.pi / float(encoder.turns)
+        return self.place * (per_rev / (rad if self.angles else encoder.encoder_counts))
 
     def recording(self, encoder: Encoder) -> Recording:
         """Return the lines of an encoder in quadrature whose shaft turns evenly between two rows."""

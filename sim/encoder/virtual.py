@@ -5,6 +5,7 @@ The truth is computed from the shaft's angle, never from the lines, so that it c
 
 import math
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cache, cached_property
 from typing import Any
 
@@ -101,6 +102,7 @@ class VirtualEncoder(EncoderOptions):
     - `invert`: Lines that are low where others are high, with commas between.
     - `missing_teeth`: Of pulses, see `Encoder`: the last teeth of a turn are not there.
     - `both_edges`: Of steps: each edge of A is one, and there are two in each of `pulses_per_rev` periods.
+    - `ratio`: Turns of the disc for one of the shaft, see `Encoder`.
     - `complemented`: Lines whose complements are there as well, named `a_n` for `a`.
 
     It raises ValueError if a parameter is out of range.
@@ -115,12 +117,13 @@ class VirtualEncoder(EncoderOptions):
     invert: str | None = None
     missing_teeth: str | None = None
     both_edges: bool = False
+    ratio: str | None = None
     complemented: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, encoder: Encoder, **values: Any) -> "VirtualEncoder":
         """Return the encoder that a core is made for, with these values of its other parameters."""
-        own = {name: getattr(encoder, name) for name in ("sensor", "reverse", "invert", "missing_teeth")}
+        own = {name: getattr(encoder, name) for name in ("sensor", "reverse", "invert", "missing_teeth", "ratio")}
         own["both_edges"] = encoder.sensor == "step-dir" and encoder.decoding == 2
         if encoder.missing:  # its gap is the index
             values["index"] = False
@@ -175,7 +178,7 @@ class VirtualEncoder(EncoderOptions):
         if self.phase_error_deg or self.duty_error_deg:
             displaced = imperfections.displaced_edges(self.phase_error_deg, self.duty_error_deg)
             offset = offset + np.tile(displaced, max(len(offset) // 4, 1))
-        return Disc(2 * math.pi / n_edges, offset)
+        return Disc(2 * math.pi / n_edges / float(Fraction(self.ratio or 1)), offset)
 
     def record(self, motion: Motion) -> "Encoding":
         """Let the shaft move; ValueError if that could be more than `MAX_EDGES` edges, with those before the start."""

@@ -196,7 +196,7 @@ class LoopSimulation:
         loop = _LOOP(
             motor=_MOTOR(**{field.name: getattr(motor, field.name) for field in fields(Motor)}),
             encoder=_ENCODER(
-                2 * np.pi / (4 * spec.encoder.pulses_per_rev),
+                2 * np.pi / float(4 * spec.encoder.pulses_per_rev * spec.encoder.turns),
                 offset.ctypes.data,
                 len(offset),
                 jitter.ctypes.data,

@@ -73,7 +73,7 @@ def plan_at(spec: TachometerSpec, speed: ArrayLike | None = None) -> Plan:
     found = PERFORMANCES.get(spec.method, unknown)(spec, speed)
     return Plan(
         speed=speed,
-        counts_per_tick=speed / unit_velocity(spec.encoder.counts_per_rev, tick_seconds),
+        counts_per_tick=speed / unit_velocity(float(spec.encoder.counts_per_rev), tick_seconds),
         interval=found.time / tick_seconds,
         measurement_time=found.time,
         resolution=found.resolution,

@@ -41,7 +41,7 @@ class Performance:
     forced: NDArray[np.bool_]  # shape (n,): the maximum time ends the measurement
 
 
-def m_performance(speed: Floats, n: int, counts_per_rev: int, tick_seconds: float) -> Performance:
+def m_performance(speed: Floats, n: int, counts_per_rev: float, tick_seconds: float) -> Performance:
     """Return M method, mean of n ticks: eqs. (7) and (8)."""
     like = np.ones_like(speed)
     return Performance(
@@ -51,7 +51,9 @@ def m_performance(speed: Floats, n: int, counts_per_rev: int, tick_seconds: floa
     )
 
 
-def t_performance(speed: Floats, counts_per_rev: int, tick_seconds: float, max_ticks: int | None = None) -> Performance:
+def t_performance(
+    speed: Floats, counts_per_rev: float, tick_seconds: float, max_ticks: int | None = None
+) -> Performance:
     """Return T method: eqs. (10) to (12); above one count per tick it cannot measure."""
     m_s = tsuji.tsuji_eq12_interval(speed, counts_per_rev, tick_seconds)
     measured = m_s >= 1
@@ -68,7 +70,7 @@ def t_performance(speed: Floats, counts_per_rev: int, tick_seconds: float, max_t
 def mt_performance(
     speed: Floats,
     m_c: int,
-    counts_per_rev: int,
+    counts_per_rev: float,
     tick_seconds: float,
     max_ticks: int | None = None,
     cycle_counts: int = 1,
@@ -90,7 +92,9 @@ def mt_performance(
     )
 
 
-def s_performance(speed: Floats, counts_per_rev: int, tick_seconds: float, max_ticks: int | None = None) -> Performance:
+def s_performance(
+    speed: Floats, counts_per_rev: float, tick_seconds: float, max_ticks: int | None = None
+) -> Performance:
     """Return S method with eq. (21): eqs. (18) to (20); where it is forced the error is at most ω_u/max_ticks."""
     m_s, forced = _limited(tsuji.tsuji_eq20_interval(speed, counts_per_rev, tick_seconds), max_ticks)
     return Performance(
@@ -107,7 +111,7 @@ def s_performance(speed: Floats, counts_per_rev: int, tick_seconds: float, max_t
 
 
 def rairan_performance(
-    speed: Floats, estimate: str, counts_per_rev: int, dt_seconds: float, max_dt: int | None = None
+    speed: Floats, estimate: str, counts_per_rev: float, dt_seconds: float, max_dt: int | None = None
 ) -> Performance:
     """Return Rairán 2013: Q_V is the greatest error of the estimate n1, n2 or n3 in its interval, T_m the time of Table
     1.
@@ -133,7 +137,7 @@ def _limited(m_s: Floats, max_ticks: int | None) -> tuple[Floats, NDArray[np.boo
 
 
 def _or_forced(
-    resolution: Floats, forced: NDArray[np.bool_], max_ticks: int | None, counts_per_rev: int, tick_seconds: float
+    resolution: Floats, forced: NDArray[np.bool_], max_ticks: int | None, counts_per_rev: float, tick_seconds: float
 ) -> Floats:
     if max_ticks is None:
         return resolution
@@ -147,7 +151,7 @@ def _of_s(spec: STachometer, speed: Floats) -> Performance:
     in the window after a forced one, in which eq. (21) weights the only alteration by one half and eq. (17) by one, the
     error is at most ω_u/max_ticks with eq. (21), ω_u/(kept + 1) with eq. (17).
     """
-    counts, tick_seconds = spec.encoder.counts_per_rev, float(spec.timing.tick_seconds)
+    counts, tick_seconds = float(spec.encoder.counts_per_rev), float(spec.timing.tick_seconds)
     found = s_performance(speed, counts, tick_seconds, spec.timing.max_ticks)
     if spec.cancel:
         return found
@@ -156,12 +160,12 @@ def _of_s(spec: STachometer, speed: Floats) -> Performance:
 
 
 def _of_m(spec: MTachometer, speed: Floats) -> Performance:
-    return m_performance(speed, spec.average, spec.encoder.counts_per_rev, float(spec.timing.tick_seconds))
+    return m_performance(speed, spec.average, float(spec.encoder.counts_per_rev), float(spec.timing.tick_seconds))
 
 
 def _of_t(spec: TTachometer, speed: Floats) -> Performance:
     timer_seconds = float(spec.timing.tick_seconds) / spec.form.timer_periods
-    return t_performance(speed, spec.encoder.counts_per_rev, timer_seconds, spec.form.max_periods)
+    return t_performance(speed, float(spec.encoder.counts_per_rev), timer_seconds, spec.form.max_periods)
 
 
 def _of_mt(spec: MTTachometer, speed: Floats) -> Performance:
@@ -169,7 +173,7 @@ def _of_mt(spec: MTTachometer, speed: Floats) -> Performance:
     return mt_performance(
         speed,
         spec.form.min_periods,
-        spec.encoder.counts_per_rev,
+        float(spec.encoder.counts_per_rev),
         timer_seconds,
         spec.form.max_periods,
         spec.form.cycle_counts,
@@ -178,7 +182,11 @@ def _of_mt(spec: MTTachometer, speed: Floats) -> Performance:
 
 def _of_rairan(spec: RairanTachometer, speed: Floats) -> Performance:
     """Return Rairán's method, also with an adaptive dt that has grown from shorter ones."""
-    counts, tick_seconds, longest = spec.encoder.counts_per_rev, float(spec.timing.tick_seconds), spec.timing.max_ticks
+    counts, tick_seconds, longest = (
+        float(spec.encoder.counts_per_rev),
+        float(spec.timing.tick_seconds),
+        spec.timing.max_ticks,
+    )
     if spec.adaptive is None:
         return rairan_performance(speed, spec.estimate, counts, tick_seconds, longest)
     shift = _steady_shift(spec, speed / spec.scale.unit_velocity)
@@ -199,7 +207,7 @@ def _steady_shift(spec: RairanTachometer, ratio: Floats) -> NDArray[np.int64]:
 
 def _of_track(spec: TrackTachometer, speed: Floats) -> Performance:
     """Return the tracking method when its memory has grown: an edge is known to half a clock, and T_m is the memory."""
-    timing, counts = spec.timing, spec.encoder.counts_per_rev
+    timing, counts = spec.timing, float(spec.encoder.counts_per_rev)
     tick_seconds = float(timing.tick_seconds)
     memory = float(spec.form.memory_seconds)
     ratio = speed / spec.scale.unit_velocity
@@ -254,7 +262,7 @@ def disc_error(spec: TachometerSpec, speed: Floats, found: Performance) -> Float
     it may be at some. With windows from count to count the time is wrong: of c counts c - d are measured. The tracking
     method learns the phase, and its least squares take the mean of the rest.
     """
-    counts, off = spec.encoder.counts_per_rev, disc_counts(spec)
+    counts, off = float(spec.encoder.counts_per_rev), disc_counts(spec)
     pitch = 2 * math.pi / counts
     if isinstance(spec, TrackTachometer):
         spread = math.hypot(REAL_DISC["nonuniformity"] / math.sqrt(3), REAL_DISC["jitter"]) * spec.encoder.decoding / 4

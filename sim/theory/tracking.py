@@ -58,7 +58,7 @@ def share(counts_per_tick: Floats, tick_seconds: float, max_memory: float = MOST
 def errors(
     speed: Floats,
     edge_error: Floats | float,
-    counts_per_rev: int,
+    counts_per_rev: float,
     tick_seconds: float,
     max_memory: float = MOST_MEMORY_SECONDS,
 ) -> tuple[Floats, Floats]:

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 from tachometry.spec.core.sensors import SENSORS, Sensor
@@ -49,6 +50,14 @@ def _inverted(what: str, text: str) -> str:
     if len(names) < len(listed):
         raise ParameterError(what, f"must have each line once, not {text!r}")
     return ",".join(name for name in _INVERTIBLE if name in names)
+
+
+def _ratio(what: str, text: str) -> str | None:
+    match = re.fullmatch(r"0*([1-9]\d{0,7})(?:/0*([1-9]\d{0,7})|\.(\d{1,7}))?", text.replace(" ", ""), re.ASCII)
+    if match is None:
+        raise ParameterError(what, f"must be turns of the encoder for one of the shaft, as 7/4 or 1.75, not {text!r}")
+    ratio = Fraction(int(match[1]), int(match[2] or 1)) + Fraction(f"0.{match[3] or 0}")
+    return None if ratio == 1 else str(ratio)
 
 
 def _wheel(what: str, text: str) -> str:
@@ -120,6 +129,16 @@ class Encoder:
         tests=("", "a"),
         tacit=True,
     )
+    ratio: str | None = option(
+        None,
+        "Turns of the encoder for one turn of the shaft, as 10/9 or 1.75. Speeds, angles and plans are the "
+        "shaft's; --ppr, positions in counts and the index are the encoder's.",
+        shown="1",
+        metavar="N/M",
+        parse=_ratio,
+        tests=(),
+        tacit=True,
+    )
     missing_teeth: str | None = option(
         None,
         "Teeth of a crank wheel and those missing, as 60-2 or 36-1. It needs --sensor pulses and --ppr N. "
@@ -137,10 +156,15 @@ class Encoder:
         if self.decoding is None:
             object.__setattr__(self, "decoding", 1 if self.missing_teeth else self.kind.decodings[0])
         self._check_decoding()
-        if not 1 <= self.counts_per_rev <= _MOST:
+        if not 1 <= self.encoder_counts <= _MOST:
             raise ParameterError(
                 "pulses_per_rev",
                 f"must be from 1 to {_MOST // self.decoding} with x{self.decoding} decoding, not {self.pulses_per_rev}",
+            )
+        if self.ratio is not None and not 1 <= self.counts_per_rev <= _MOST:
+            raise ParameterError(
+                "ratio",
+                f"must make from 1 to {_MOST} counts in a turn of the shaft, not {float(self.counts_per_rev):.6g}",
             )
         if wrong := sorted(self.inverted - {*self.kind.lines, "z"}):
             lines = ", ".join((*self.kind.lines, "z"))
@@ -187,6 +211,17 @@ class Encoder:
         return self.sensor == "quadrature" and not self.reverse and not self.invert
 
     @property
-    def counts_per_rev(self) -> int:
-        """P, counts per revolution after decoding."""
+    def encoder_counts(self) -> int:
+        """Counts per revolution of the encoder after decoding."""
         return self.pulses_per_rev * self.decoding
+
+    @property
+    def turns(self) -> Fraction:
+        """Revolutions of the encoder in one of the shaft."""
+        return Fraction(self.ratio or 1)
+
+    @property
+    def counts_per_rev(self) -> Fraction | int:
+        """P, counts per revolution of the shaft after decoding; an int if it is whole."""
+        counts = self.encoder_counts * self.turns
+        return int(counts) if counts.denominator == 1 else counts

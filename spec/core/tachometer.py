@@ -57,7 +57,7 @@ class TachometerSpec(Core):
             "tick_cycles": self.timing.tick_cycles,
             "max_ticks": self.timing.max_ticks,
             "standstill_after_ticks": times.standstill_after_ticks,
-            "counts_per_rev": self.encoder.counts_per_rev,
+            "counts_per_rev": counts if isinstance(counts := self.encoder.counts_per_rev, int) else float(counts),
             "decoding": self.encoder.decoding,
             "velocity": {
                 "width": self.velocity.width,

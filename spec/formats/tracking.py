@@ -46,7 +46,7 @@ def fixed_log(value: float) -> int:
     return round(value * (1 << LOG_BITS))
 
 
-def greatest_acceleration(counts_per_rev: int) -> float:
+def greatest_acceleration(counts_per_rev: Fraction | int) -> float:
     """Return in rad/s² what fits the word of the acceleration: less if counts are finer, for the sake of the LSB."""
     return 110_000 / math.sqrt(max(counts_per_rev / 2000, 1))
 
@@ -61,7 +61,7 @@ class Tracking:
     longest_tick: int
     external: bool  # whether ticks come from outside, and differ in length
     max_count: int  # most counts of a tick
-    counts_per_rev: int
+    counts_per_rev: Fraction | int
     max_memory: Fraction | None  # seconds: what memory does not grow beyond; None: 4 s
     max_time: int  # clocks of silence after which 0 is shown
     velocity_out: int  # fraction bits of the velocity in counts per tick that is shown

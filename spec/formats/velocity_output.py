@@ -25,7 +25,7 @@ def parse_lsb(what: str, text: str) -> int:
     raise ParameterError(what, f"must be a power of two such as 2^-10 or 0.0625, not {text!r}")
 
 
-def per_count(unit: str, counts_per_rev: int, tick_seconds: Fraction) -> Fraction:
+def per_count(unit: str, counts_per_rev: Fraction | int, tick_seconds: Fraction) -> Fraction:
     """Return one count per tick in `unit`."""
     return Fraction(1) if unit == NATIVE else _PER_REV_PER_SECOND[unit] / (counts_per_rev * tick_seconds)
 

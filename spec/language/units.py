@@ -282,13 +282,13 @@ class Speed:
         """The speed in rad/s."""
         return float(self.value * SPEED[self.unit].exact)
 
-    def counts(self, counts_per_rev: int, tick_seconds: Fraction) -> Fraction:
+    def counts(self, counts_per_rev: Fraction | int, tick_seconds: Fraction) -> Fraction:
         """Return speed / ω_u, counts per tick, with ω_u = 2π/(P·T_s)."""
         size, pi = SPEED[self.unit]
         turns = size / (2 * PI) if pi is None else size * pi / 2
         return self.value * turns * counts_per_rev * tick_seconds
 
-    def ceil_counts(self, counts_per_rev: int, tick_seconds: Fraction) -> int:
+    def ceil_counts(self, counts_per_rev: Fraction | int, tick_seconds: Fraction) -> int:
         """Return the most counts that one tick can hold at this speed."""
         return math.ceil(self.counts(counts_per_rev, tick_seconds))
 

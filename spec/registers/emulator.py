@@ -68,4 +68,4 @@ def fastest(spec: TachometerSpec) -> float:
 
 def _periods(spec: TachometerSpec, radians: float) -> float:
     """Return periods of a line in an angle of the shaft."""
-    return radians / (2 * math.pi) * spec.encoder.pulses_per_rev
+    return radians / (2 * math.pi) * spec.encoder.pulses_per_rev * spec.encoder.turns

@@ -14,6 +14,7 @@ from reference.settings import Settings
 _SHARED = {
     "pulses_per_rev": "ppr",
     "decoding": "decoding",
+    "ratio": "ratio",
     "clock_hz": "clock",
     "tick_cycles": "tick",
     "max_ticks": "max-time",
@@ -49,7 +50,7 @@ WORDS = {
 }
 # Named only where they are asked for.
 _HEALTH = ("health", "health_edges", "health_errors")
-_TACIT = (*_HEALTH, "electrical", "electrical_offset", "lead", "over_speed", "position_compare", "sincos")
+_TACIT = (*_HEALTH, "electrical", "electrical_offset", "lead", "over_speed", "position_compare", "ratio", "sincos")
 _FLAGS = ("index", "index-reset", "age", "bounds", "paper-exact", "whole-cycles", "health")
 # Entries of the acceleration, and its unit for that of the velocity.
 ACCELERATION = ("width", "frac_bits", "unit", "rad_per_s2_per_lsb")
@@ -90,6 +91,7 @@ def parameter(settings: Settings, name: str, shown: object) -> object:
         "timer": "tick" if settings.lattice else "clock",
         "unit": settings.unit,
         "decoding": settings.decoding,
+        "ratio": settings.words.get("ratio"),
         "average": settings.average,
         "estimate": settings.estimate,
         "reciprocal_source": settings.words.get("reciprocal", "serial"),
@@ -259,7 +261,7 @@ class Expected:
             "tick_cycles": lambda: settings.tick,
             "max_ticks": lambda: settings.max_ticks,
             "standstill_after_ticks": lambda: settings.max_ticks + (settings.method != "track"),
-            "counts_per_rev": lambda: settings.counts_per_turn,
+            "counts_per_rev": lambda: float(settings.counts_per_turn * settings.turns),
             "decoding": lambda: settings.decoding,
             "velocity.width": lambda: next(p["width"] for p in manifest["ports"] if p["name"] == "velocity"),
             "velocity.frac_bits": lambda: settings.frac_bits,

@@ -84,6 +84,11 @@ class Settings:
         """P."""
         return self.ppr * self.decoding
 
+    @property
+    def turns(self) -> Fraction:
+        """Turns of the encoder in one of the shaft."""
+        return Fraction(self.words.get("ratio", "1"))
+
     @cached_property
     def tick_seconds(self) -> Fraction:
         """T_s."""
@@ -114,7 +119,8 @@ class Settings:
 
     def per_count(self, unit: str) -> Fraction:
         """Return one count per tick in a unit: 1/(P·T_s) turns per second."""
-        return Fraction(1) if unit == "count/tick" else PER_TURN[unit] / (self.counts_per_turn * self.tick_seconds)
+        counts = self.counts_per_turn * self.turns * self.tick_seconds
+        return Fraction(1) if unit == "count/tick" else PER_TURN[unit] / counts
 
     @cached_property
     def max_speed(self) -> tuple[Fraction, str] | None:
@@ -131,7 +137,7 @@ class Settings:
         if self.max_speed is None:
             return self.longest_tick
         value, unit = self.max_speed
-        turns = value / PER_TURN[unit]
+        turns = value / PER_TURN[unit] * self.turns
         return min(
             self.longest_tick, math.ceil(turns * self.counts_per_turn * Fraction(self.longest_tick, self.clock_hz))
         )

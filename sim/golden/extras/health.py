@@ -44,7 +44,7 @@ def _index(spec: TachometerSpec, steps: Steps, index: Table) -> tuple[Ints, Ints
     position = index["index_position"]
     way = position[1:] - (0 if spec.front_end.index_resets else position[:-1])
     size = 1 << spec.position_width
-    turn = np.where(back[1:], -spec.encoder.counts_per_rev, spec.encoder.counts_per_rev)
+    turn = np.where(back[1:], -spec.encoder.encoder_counts, spec.encoder.encoder_counts)
     off = (way - turn + size // 2) % size - size // 2
     presets = places(steps.presets, steps.index[: len(index)], "right")  # a turn with one of them is not checked
     wrong = (presets[1:] == presets[:-1]) & (back[1:] == back[:-1]) & (way % size != 0) & (off != 0)

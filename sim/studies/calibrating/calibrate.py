@@ -47,7 +47,7 @@ def calibrate(
     ripple of the torque may be in the map. It raises ValueError if no run is long enough, or one does not show how the
     disc lies in it.
     """
-    encoder, n = spec.encoder, spec.encoder.counts_per_rev
+    encoder, n = spec.encoder, spec.encoder.encoder_counts
     if n < _FEWEST:
         raise ValueError(f"--ppr must make at least {_FEWEST} counts a turn, not {n}")
     runs: list[Run] = []

@@ -37,7 +37,7 @@ def runs_of(recording: Recording, spec: TachometerSpec, number: int = 0) -> tupl
     """
     if recording.source is not None and {"count", "angle"} & recording.source.lines.keys():
         raise ValueError("must have the edges of the lines: --count and --angle show no disc")
-    encoder, n = spec.encoder, spec.encoder.counts_per_rev
+    encoder, n = spec.encoder, spec.encoder.encoder_counts
     step, wrong = counted(encoder, recording.lines)
     position, row = np.cumsum(step), np.flatnonzero(step)
     cycle = encoder.kind.cycle if encoder.sensor == "quadrature" and encoder.decoding == 4 else ()

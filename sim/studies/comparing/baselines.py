@@ -9,6 +9,7 @@ of ODrive and of moteus. The models are at rest at time 0, at count 0.
 
 import math
 from dataclasses import dataclass, field
+from fractions import Fraction
 from itertools import accumulate
 from typing import NamedTuple
 
@@ -34,7 +35,7 @@ class Steps:
     time: FloatArray  # shape (n,), seconds, from 0 to `duration`, not decreasing
     step: IntArray  # shape (n,), +1 or -1
     duration: float  # seconds: length of the recording
-    counts_per_rev: int
+    counts_per_rev: Fraction | int
     reads: FloatArray = field(default_factory=lambda: np.empty(0))  # shape (n,), seconds: when a loop reads the speed
     clock_s: float = 1e-7  # seconds: unit of timestamps
 
@@ -48,7 +49,7 @@ class Steps:
             raise ValueError(f"counts_per_rev must be at least 1, not {self.counts_per_rev}")
 
     @staticmethod
-    def of_recording(recording: Recording, counts_per_rev: int, decoding: int = 4) -> "Steps":
+    def of_recording(recording: Recording, counts_per_rev: Fraction | int, decoding: int = 4) -> "Steps":
         """Return what an ideal decoder counts; a change of both lines at once counts as none."""
         return Steps.of_sensor(recording, Encoder(counts_per_rev // decoding, decoding))
 

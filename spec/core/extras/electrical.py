@@ -61,7 +61,7 @@ class ElectricalAngle(Extra):
 
     def angles(self, spec: Numbers) -> Angles:
         """Return the formats of the angles of a core."""
-        counts, tick, bits = spec.encoder.counts_per_rev, spec.timing.tick_cycles, spec.velocity.native_frac_bits
+        counts, tick, bits = spec.encoder.encoder_counts, spec.timing.tick_cycles, spec.velocity.native_frac_bits
         late, carrying, tracks = spec.latency.pin_to_count + spec.latency.tick, spec.carrying, spec.latency.datapath
         of_track = (tracks, carrying.position_fine_bits, carrying.slope) if carrying else (0, 0, Fraction(0))
         halls = [packed_levels(state) for state in spec.encoder.kind.cycle if len(state) == 3]
@@ -77,7 +77,9 @@ class ElectricalAngle(Extra):
     def check(self, spec: Numbers) -> None:
         if spec.encoder.sensor == "hall" and self.pole_pairs != (pairs := spec.encoder.pulses_per_rev):
             raise ParameterError(self.name, f"must be {pairs}, the pole pairs of the halls, not {self.pole_pairs}")
-        most = (spec.encoder.counts_per_rev - 1) // 2
+        if spec.encoder.ratio is not None:
+            raise ParameterError(self.name, "does not work with --ratio: its index is not that of the motor")
+        most = (spec.encoder.encoder_counts - 1) // 2
         if self.pole_pairs > most:
             raise ParameterError(self.name, f"must be at most {most} with so few counts per revolution")
         angles = self.angles(spec)

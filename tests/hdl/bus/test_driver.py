@@ -502,7 +502,7 @@ def test_the_compiler_reads_the_numbers_of_the_map(tmp_path: Path) -> None:
         "CLOCK_HZ": spec.timing.clock_hz,
         "TICK_CYCLES": spec.timing.tick_cycles,
         "MAX_TICKS": spec.timing.max_ticks,
-        "COUNTS_PER_REV": spec.encoder.counts_per_rev,
+        "COUNTS_PER_REV": spec.encoder.encoder_counts,
         "INTERVAL_UNIT_CYCLES": spec.times.interval_unit,
         "UNIT_PER_LSB": 2.0**-spec.velocity.frac_bits,
         "RAD_PER_S_PER_LSB": spec.velocity.rad_per_s_per_lsb,

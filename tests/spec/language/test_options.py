@@ -113,6 +113,7 @@ def test_every_option_does_what_it_says() -> None:
         "pole-pairs",
         "missing-teeth",
         "blanking",
+        "ratio",
         "pwm",
         "health",
         "health-edges",
