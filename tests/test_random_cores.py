@@ -130,7 +130,7 @@ def motions(spec: CoreSpec, seed: int) -> list[Trace]:
 
 
 # Cores that are played in a second: every method and sensor, and number 205, a constant of which was too wide.
-SEEDS = (3, 6, 12, 13, 20, 26, 28, 31, 42, 59, 61, 67, 97, 205)
+SEEDS = (3, 8, 12, 13, 20, 26, 28, 31, 42, 59, 61, 67, 97, 205)
 MANY, PARTS = 2000, 8
 
 
