@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import re
-import textwrap
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import zip_longest
@@ -17,13 +16,11 @@ from amaranth.lib import wiring
 
 from tachometry.hdl.export.expressions import Body, Scope, merge, number, plain, span
 from tachometry.hdl.export.netlist import Circuit, runs
-from tachometry.hdl.export.render import ascii_of, comment
+from tachometry.hdl.export.render import ascii_of, comment, first_sentence, wrapped
 from tachometry.hdl.wires.commented_memory import CommentedMemory
 from tachometry.spec.language.port import Port
 
-_COLUMNS = 118
 _COMBINATIONAL = (nir.Operator, nir.Part, nir.AssignmentList, nir.AsyncReadPort)
-_SENTENCE = re.compile(r"(?<=[.;])(?<!Sec\.)(?<!eqs\.)(?<!eq\.)(?<!Fig\.)(?<!p\.)\s")
 Path = tuple[str, ...]  # of a module: names of instances, the outermost first
 
 
@@ -120,22 +117,16 @@ class ModuleWriter(Scope):
         choices = {cell: self.folded(cell) for cell in self.all_of(nir.FlipFlop)}
         wires = [*self._wires({*choices.values()})]
         clocked = [*map(self._read_or_write, self.all_of(nir.SyncWritePort, nir.SyncReadPort)), *self._clocked(choices)]
-        ends = [
-            f"assign {port.name} = {self.text(port.value)};"
-            for port in self.ports
-            if port.way == "output" and port.name not in self.driven
-        ]
+        copies = [port for port in self.ports if port.way == "output" and port.name not in self.driven]
+        ends = [f"assign {port.name} = {self.text(port.value)};" for port in copies]
         written = {word for lines in (wires, *clocked) for line in lines for word in re.findall(r"[A-Z]\w+", line)}
-        constants = [
-            f"localparam {span(width)}{name} = {value};"
-            for name, (width, value) in self.constants.items()
-            if name in written
-        ]
+        read = [(name, *made) for name, made in self.constants.items() if name in written]
+        constants = [f"localparam {span(width)}{name} = {value};" for name, width, value in read]
         memories = [[*self._contents(cell)] for cell in self.memories]
         boxes = [[*self._instance(*instance)] for instance in self.instances]
         blocks = [[*constants, *self.declared], *memories, wires, *clocked, *boxes, ends]
         body = [f"    {line}" if line else "" for block in blocks if block for line in ("", *block)][1:]
-        return [*self._port_lines(), ");", *(part for line in body for part in _wrapped(line)), "endmodule"]
+        return [*self._port_lines(), ");", *(part for line in body for part in wrapped(line)), "endmodule"]
 
     def _add_instance(self, writer: ModuleWriter, name: str) -> None:
         """Name an instance, and declare what it drives."""
@@ -274,27 +265,11 @@ def _attributes(attributes: Mapping[str, Any]) -> str:
     return "".join(f"(* {key} = {text} *) " for key, text in texts.items())
 
 
-def _wrapped(line: str) -> list[str]:
-    """Break a long line, but no comment, and not before a comparison."""
-    if len(line) <= _COLUMNS or "//" in line:
-        return [line]
-    pad = " " * (len(line) - len(line.lstrip()) + 4)
-    bound = re.sub(r" ([=!<>?]=?) ", "~~\\1 ", re.sub(r" ([=!<>]=) ", "~~\\1~~", line))
-    made = textwrap.wrap(bound, _COLUMNS, subsequent_indent=pad, break_long_words=False, break_on_hyphens=False)
-    return [part.replace("~~", " ") for part in made]
-
-
-def _sentence(text: str) -> str:
-    """Return the first sentence of a text."""
-    first = _SENTENCE.split(" ".join(text.split()))[0]
-    return ascii_of(first.rstrip(".;") + "." if first else "")
-
-
 def _comment(port: Port) -> str:
     """Return the comment of a port of the top: its first sentence, unit and strobe."""
     unit = f"; in {port.unit}" if port.unit else ""
     strobe = f"; read with {port.held_by}" if port.held_by not in ("", port.name) else ""
-    return _sentence(port.help).rstrip(".") + ascii_of(unit) + strobe
+    return first_sentence(port.help).rstrip(".") + ascii_of(unit) + strobe
 
 
 def _members(thing: Any) -> Any:
@@ -313,10 +288,7 @@ def _members(thing: Any) -> Any:
 def write(top: wiring.Component, name: str, ports: Iterable[Port] = ()) -> Written:
     """Return a component as Verilog; `ports` gives the order and the comments of the ports of the top.
 
-    Raises
-    ------
-    Unwritten
-        If there is an unknown kind of cell, or an instance of a foreign module.
+    It raises Unwritten for an unknown kind of cell or an instance of a foreign module.
     """
     ways = {wiring.In: _ir.PortDirection.Input, wiring.Out: _ir.PortDirection.Output}
     comments = {port.name: _comment(port) for port in ports}
@@ -357,7 +329,7 @@ def _joined(circuit: Circuit, things: Mapping[Path, Any], comments: Mapping[str,
         while name in names:
             name += "_"
         names[name] = index
-        doc = "" if kind.__module__.startswith(("amaranth", "builtins")) else _sentence(inspect.getdoc(kind) or "")
+        doc = "" if kind.__module__.startswith(("amaranth", "builtins")) else first_sentence(inspect.getdoc(kind) or "")
         text += [*comment(doc).splitlines(), f"module {name} (", *body, ""]
     whole = "\n".join(text)
     for name, index in names.items():

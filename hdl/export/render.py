@@ -1,6 +1,7 @@
 """Fills the holes of the templates in `templates/`; each is named as the file that is made of it."""
 
 import json
+import re
 import textwrap
 from collections.abc import Iterable
 
@@ -8,6 +9,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from tachometry.spec.language.port import Port
 from tachometry.spec.language.provenance import notice, version
+
+_COLUMNS = 118
+_SENTENCE = re.compile(r"(?<=[.;])(?<!Sec\.)(?<!eqs\.)(?<!eq\.)(?<!Fig\.)(?<!p\.)\s")
 
 
 def render(template: str, /, **holes: object) -> str:
@@ -42,6 +46,22 @@ _ASCII = {ord(letter): plain for letter, plain in zip("←⌊⌋−≤≥·²×�
 def ascii_of(text: str) -> str:
     """Return a text in the letters that every reader of Verilog and VHDL takes."""
     return text.translate(_ASCII).encode("ascii", "replace").decode()
+
+
+def wrapped(line: str) -> list[str]:
+    """Break a long line of Verilog, but no comment, and not before a comparison."""
+    if len(line) <= _COLUMNS or "//" in line:
+        return [line]
+    pad = " " * (len(line) - len(line.lstrip()) + 4)
+    bound = re.sub(r" ([=!<>?]=?) ", "~~\\1 ", re.sub(r" ([=!<>]=) ", "~~\\1~~", line))
+    made = textwrap.wrap(bound, _COLUMNS, subsequent_indent=pad, break_long_words=False, break_on_hyphens=False)
+    return [part.replace("~~", " ") for part in made]
+
+
+def first_sentence(text: str) -> str:
+    """Return the first sentence of a text."""
+    first = _SENTENCE.split(" ".join(text.split()))[0]
+    return ascii_of(first.rstrip(".;") + "." if first else "")
 
 
 def _vhdl_name(name: str) -> str:
