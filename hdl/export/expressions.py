@@ -23,6 +23,7 @@ _WORDS |= {"^": "xor", "+": "plus", "-": "minus", "s<": "below", "s>=": "from"}
 _OPPOSITE = {"==": "!=", "!=": "=="}
 _BRACKETS = re.compile(r"[\[({][^\[\](){}]*[\])}]")
 _LONGEST_NAME = 32  # of a name that is made of operands
+_LONGEST_CHAIN = 3  # tests of one value, each with a value that `?:` chooses
 _LONGEST_CHOICE = 2  # assignments of one that is written where it is read
 
 # Assignments of a choice: ("=", first bit, value), or ("if", number of the test, bodies of its cases).
@@ -146,11 +147,10 @@ class Scope:
     def made(self, cell_number: int) -> str:
         """Return the expression of a cell."""
         cell = self.circuit.cells[cell_number]
-        match cell:
-            case nir.AssignmentList():
-                return self._chosen(cell)
-            case nir.AsyncReadPort():
-                return f"{self.memories[cell.memory]}[{self.text(cell.addr)}]"
+        if isinstance(cell, nir.AssignmentList):
+            return self._chosen(cell)
+        if isinstance(cell, nir.AsyncReadPort):
+            return f"{self.memories[cell.memory]}[{self.text(cell.addr)}]"
         if len(cell.inputs) == 1:
             return self._unary(cell.operator, *cell.inputs)
         if cell.operator != "m":
@@ -257,6 +257,12 @@ class Scope:
             if patterns:
                 yield patterns, body
 
+    def compared(self, full: Iterable[tuple[Any, Body]]) -> Any:
+        """Return the value that all cases compare with different numbers; empty if there is none."""
+        levels = [tuple(level) for patterns, _ in full for level in patterns or ()]
+        compared = {nir.Value(net for net, _ in one) for one in levels}
+        return compared.pop() if len(compared) == 1 and len(levels) == len({*levels}) else ()
+
     def condition(self, patterns: Any) -> str:
         """Return whether a value has one of the patterns."""
         made = []
@@ -270,21 +276,22 @@ class Scope:
         ends = ((each.start, each.start + len(each.value)) for each in cell.assignments)
         cuts = sorted({0, len(cell.default)}.union(*ends))
         pieces = [(self.tree(cell, low, high), cell.default[low:high]) for low, high in pairwise(cuts)]
-        return _joined([self._evaluated(tree, self.text(default)) for tree, default in pieces])
+        return _joined([self._evaluated(tree, self.text(default), len(default)) for tree, default in pieces])
 
-    def _evaluated(self, body: Body, now: str) -> str:
-        """Return a value after some assignments; `now` is what it was before."""
+    def _evaluated(self, body: Body, now: str, width: int) -> str:
+        """Return a value after some assignments; `now` is the value before them."""
         for kind, which, what in body:
             if kind == "=":
                 now = self.text(what)
                 continue
-            branches, last = [], now
-            for patterns, inner in self.cases(which, what):
-                then = self._evaluated(inner, now)
-                if patterns is None:
-                    last = then
-                else:
-                    branches.append((self.condition(patterns), then))
+            full = [*self.cases(which, what)]
+            branches = [(self.condition(patterns), self._evaluated(inner, now, width)) for patterns, inner in full]
+            last = branches.pop()[1] if full and full[-1][0] is None else now
+            if self.compared(full):
+                branches = [one for one in branches if one[1] != last]
+                if len(branches) > _LONGEST_CHAIN:  # synthesis takes fewer cells for a sum of products
+                    terms = " | ".join(f"({{{width}{{{test}}}}} & {operand(then)})" for test, then in branches)
+                    branches = [(" | ".join(operand(test) for test, _ in branches), terms)]
             while branches and branches[-1][1] == last:
                 branches.pop()
             for condition, then in reversed(branches):
@@ -304,8 +311,7 @@ class Scope:
             full = [*self.cases(which, what)]
             while full and not full[-1][1]:
                 full.pop()
-            compared = {nir.Value(net for net, _ in one) for patterns, _ in full for one in patterns or ()}
-            if len(full) > 2 and len(compared) == 1 and len(value := compared.pop()) > 1:
+            if len(full) > 2 and len(value := self.compared(full)) > 1:
                 yield f"{pad}case ({self.text(value)})"
                 for patterns, inner in full:
                     levels = [self.literal(value, [level for _, level in one]) for one in patterns or ()]
@@ -334,9 +340,8 @@ class Scope:
                 return f"{names[0]}_wide"
         operator = _operator(cell)
         if operator in _WORDS and all(net.is_const or net in self.home for value in cell.inputs for net in value):
-            texts = [
-                self.literal(cell.inputs[0], value) if value.is_const else self.text(value) for value in cell.inputs
-            ]
+            a = cell.inputs[0]
+            texts = [self.literal(a, value) if value.is_const else self.text(value) for value in cell.inputs]
             bare = (plain(re.sub(r"^\d+'[bdh]", "", text)).strip("_").lower() for text in texts)
             made = f"_{_WORDS[operator]}_".join(bare)
             if len(made) <= _LONGEST_NAME and made[0].isalpha():
@@ -362,11 +367,10 @@ class Scope:
         """Return whether a cell is written where it is read: it has no name, and is read once and as a whole."""
         circuit, whole = self.circuit, self.circuit.whole[cell_number]
         cell, reads = circuit.cells[cell_number], circuit.reads[cell_number]
-        if isinstance(cell, (nir.Part, nir.AsyncReadPort)) or _operator(cell) in ("*", "s>>"):
-            return False
         if isinstance(cell, nir.AssignmentList) and len(cell.assignments) > _LONGEST_CHOICE:
             return False
-        if whole in self.called or not circuit.flow[self.index].keys().isdisjoint(whole):
+        alone = isinstance(cell, (nir.Part, nir.AsyncReadPort)) or _operator(cell) in ("*", "s>>")
+        if alone or whole in self.called or not circuit.flow[self.index].keys().isdisjoint(whole):
             return False
         trivial = _operator(cell) == "~" and len(whole) == 1
         return (len(reads) == 1 or trivial) and {(first, count) for _, first, count in reads} <= {(0, len(whole))}
