@@ -34,14 +34,14 @@ class Family:
 
 FAMILIES = {
     "ecp5": Family("ECP5", size.TARGETS["ECP5"], ECP5, 18, packs=False, timed=True),
-    "ice40hx": Family("iCE40 HX", size.TARGETS["HX8K"], ICE40, 0, packs=True, timed=False),
+    "ice40hx": Family("iCE40 HX", size.TARGETS["HX8K"], ICE40, 0, packs=True, timed=True),
     "ice40up": Family("iCE40 UltraPlus", size.TARGETS["UP5K"], ICE40, 16, packs=True, timed=False),
     "gowin": Family("Gowin GW1N", size.GOWIN, GOWIN, 18, packs=False, timed=False),
 }
 
 
 class Timing(NamedTuple):
-    """Times of a family in ns; `fan` is for each doubling of the inputs that a wire drives."""
+    """Times of a family in ns: `fan` for each doubling of the inputs that a wire drives, `end` to many flip-flops."""
 
     start: float
     wire: float
@@ -53,6 +53,7 @@ class Timing(NamedTuple):
     leave: float
     memory: float
     product: float
+    end: float
 
     def period(self, mapped: Mapped) -> float:
         """Return the time of the longest path."""
@@ -67,6 +68,8 @@ class Timing(NamedTuple):
                     at += self.step if kind == "carry" else self.leave
                 elif kind != "end" or source not in time:
                     at += self.wire + self.fan * log2(1 + takers) + into.get(kind, 0)
+                elif takers > 1:
+                    at += self.end
                 last = max(last, at)
             time[bit] = last + (self.table + self.wide * (inputs > 4) if inputs else 0)
         return time[0]

@@ -14,7 +14,7 @@ from tachometry.sim.studies.size import TARGETS
 from tachometry.spec import AxesSpec, STachometer, of_texts
 from tachometry.spec.registers.buses import bus_of
 
-LEVELS = Timing(0, 0, 0, 1, 0, 0, 0, 0, 100, 0)  # a period is the number of tables on the longest path
+LEVELS = Timing(0, 0, 0, 1, 0, 0, 0, 0, 100, 0, 0)  # a period is the number of tables on the longest path
 CORE = {"ppr": "500", "max-speed": "1000rad/s", "tick": "20us", "max-time": "10ms"}
 
 
@@ -41,6 +41,13 @@ def memory(words: int, width: int, **pins: list[int]) -> dict[str, Any]:
         "parameters": {name: f"{number:b}" for name, number in numbers.items()},
         "connections": {"RD_ADDR": address, "RD_DATA": [*range(100, 100 + width)], "WR_DATA": [], **pins},
     }
+
+
+def test_a_wire_to_many_flip_flops_takes_time() -> None:
+    times = LEVELS._replace(end=10)
+    held = [{"type": "$_DFFE_PP_", "connections": {"D": [2], "E": [64], "Q": [70 + k]}} for k in range(2)]
+    table = gate("$_AND_", 2, 3, 64)
+    assert [times.period(mapped(ICE40, [table, *held[:n]], [71])) for n in (1, 2)] == [1, 11]
 
 
 def test_a_chain_of_gates_becomes_a_tree_of_tables() -> None:
