@@ -25,12 +25,12 @@ from numpy.typing import NDArray
 from tachometry.cli.commands import Refused, refusals
 from tachometry.cli.commands.generate import ASKED, Asked
 from tachometry.cli.options.capture import CAPTURE_OPTIONS
-from tachometry.cli.options.core import Make, core_and_make_options
+from tachometry.cli.options.core import core_click_options
 from tachometry.cli.options.help import needed
 from tachometry.cli.options.methods import Methods, named_methods
 from tachometry.cli.options.motion import OPTIONAL_MOTION_OPTIONS
 from tachometry.cli.options.option import GroupedCommand, Option, options_named
-from tachometry.cli.options.sweep_settings import arguments
+from tachometry.cli.options.sweep_settings import arguments, yes
 from tachometry.cli.reports.compare import shown_scores, shown_time
 from tachometry.cli.reports.core import typed_unit
 from tachometry.sim.encoder.motion import parse_motion
@@ -74,22 +74,15 @@ def _generate(asked: Asked) -> Asked:
 
 
 @click.command("compare", cls=GroupedCommand)
-@core_and_make_options()
 @OPTIONAL_MOTION_OPTIONS
-def _compare(
-    spec: TachometerSpec, make: Make, record: Callable[..., Encoding] | None, tables: list[Path]
-) -> tuple[Methods, Callable[..., Encoding] | None, list[Path]]:
-    return named_methods("all", make), record, tables
+def _moved(record: Callable[..., Encoding] | None, tables: list[Path]) -> Callable[..., Encoding] | None:
+    return None if tables else record
 
 
 @click.command("replay", cls=GroupedCommand)
-@click.argument("capture", type=Path)
-@core_and_make_options()
 @CAPTURE_OPTIONS
-def _replay(
-    spec: TachometerSpec, make: Make, capture: Path, read: Callable[..., Recording]
-) -> tuple[Methods, Recording]:
-    return named_methods("all", make), read(capture, spec)
+def _captured(read: Callable[..., Recording]) -> Callable[..., Recording]:
+    return read
 
 
 def answer(name: str, args: Mapping[str, Any], functions: Mapping[str, Callable[..., Answer]]) -> Answer:
@@ -117,8 +110,8 @@ def answer(name: str, args: Mapping[str, Any], functions: Mapping[str, Callable[
 
 def options() -> Answer:
     """Return what can be asked for: options by groups, and those that most need."""
-    of_core, groups = {**_options_of(_generate)}, dict[str, list[Answer]]()
-    for one in {**_options_of(_replay), **of_core}.values():
+    of_core, groups = _options_of(_generate), dict[str, list[Answer]]()
+    for one in (of_core | _options_of(_captured)).values():
         groups.setdefault(one.group, []).append(_described(one))
     return {
         "groups": [{"title": title, "part": _PARTS.get(title, "core"), "options": of} for title, of in groups.items()],
@@ -162,7 +155,7 @@ def curves(options: Texts) -> Answer:
     The error is the greatest near each speed at constant speed, with a real disc. None: a method cannot measure there.
     """
     core = _core(options)
-    methods = _run(_compare, _alone(options, core), lambda found: found[0])
+    methods = _methods(options, core)
     specs = {name: spec for name, spec in methods.specs.items() if spec is not None} | {core.method: core}
     plans = Plans(core, specs, *default_range(core))
     unit, near = typed_unit(core), np.geomspace(plans.low, plans.high, _POINTS + 1)[:-1]
@@ -203,9 +196,8 @@ def curves(options: Texts) -> Answer:
 def respond(options: Texts, motion: Texts) -> Answer:
     """Return what the golden model of the core, other methods and other projects show of a motion."""
 
-    def of(found: Any) -> Answer:
-        methods, record, tables = found
-        if record is None or tables:
+    def of(record: Callable[..., Encoding] | None) -> Answer:
+        if record is None:
             raise ParameterError(
                 "motion", "must be given here, and must not be a file: drop a capture, or take compare"
             )
@@ -218,10 +210,10 @@ def respond(options: Texts, motion: Texts) -> Answer:
                 f"must be of at most {_MOST} counts and ticks, not {max(edges, ticks):.3g}: take tachometry compare",
             )
         truth = record(core)
-        return _response(core, methods, Source("--motion", truth.recording, truth.true_speed))
+        return _response(options, core, Source("--motion", truth.recording, truth.true_speed))
 
     core = _core(options)
-    return _run(_compare, {**_alone(options, core), **motion}, of)
+    return _run(_moved, motion, of)
 
 
 def replay(options: Texts, capture: Texts, name: str, data: str) -> Answer:
@@ -233,10 +225,9 @@ def replay(options: Texts, capture: Texts, name: str, data: str) -> Answer:
         try:
             file.write_bytes(base64.b64decode(data, validate=True))
             return _run(
-                _replay,
-                {**_alone(options, core), **capture},
-                lambda found: _response(core, found[0], Source("the capture", found[1], None)),
-                str(file),
+                _captured,
+                capture,
+                lambda read: _response(options, core, Source("the capture", read(file, core), None)),
             )
         except ValueError as error:
             raise Refused(f"the capture must come as base64: {error}") from error
@@ -267,7 +258,8 @@ def size(options: Texts) -> Answer:
     return _run(_generate, options, of)
 
 
-def _response(core: TachometerSpec, methods: Methods, source: Source) -> Answer:
+def _response(options: Texts, core: TachometerSpec, source: Source) -> Answer:
+    methods = _methods(options, core)
     rivals = [name for name, one in BASELINES.items() if not one.missing]
     specs = {core.method: core} | methods.specs | {core.method: core} | dict.fromkeys(rivals)
     found = comparison(
@@ -300,17 +292,19 @@ def _core(options: Texts) -> TachometerSpec:
     return _run(_generate, options, lambda asked: asked.spec.tachometer)
 
 
-def _alone(options: Texts, core: TachometerSpec) -> dict[str, str]:
-    """Return options of the same core of one axis alone, with the method and the tick that were taken."""
+def _methods(options: Texts, core: TachometerSpec) -> Methods:
+    """Return the same core of one axis alone with every method, at the tick that was taken."""
     ticks = [about.name for about in options_of(Timing) if about.field == "tick_cycles"]
-    texts = {name: text for name, text in of_one_axis(options).items() if name not in ticks}
-    return texts | {"method": core.method, "tick": core.options["tick"]}
+    alone = of_one_axis(options).items()
+    texts = {name: text for name, text in alone if text and name not in ticks and not methods_with(name)}
+    texts["tick"] = core.options["tick"]
+    with refusals():
+        return named_methods("all", lambda method, own: of_texts(method, {**texts, **own}))
 
 
 def of_one_axis(options: Texts) -> dict[str, str]:
-    """Return those options that are of a core of one axis, without a loop."""
-    known = _options_of(_compare)
-    return {name: text for name, text in options.items() if name in known}
+    """Return those options that are of a core of one axis, without a loop, and not its method."""
+    return {name: text for name, text in options.items() if name in core_click_options()}
 
 
 def _motions(spec: TachometerSpec) -> dict[str, str]:
@@ -333,23 +327,30 @@ def _numbers(values: NDArray[np.float64]) -> list[float | None]:
     return [None if math.isnan(value) else float(f"{value:.6g}") for value in values.tolist()]
 
 
-def _run(command: click.Command, texts: Texts, of: Callable[[Any], Made], *words: str) -> Made:
+def _run(command: click.Command, texts: Texts, of: Callable[[Any], Made]) -> Made:
     """Run a command with these options, and return what `of` makes of its result; `Refused` as on the command line."""
-    with refusals():
+    with refusals(), _defaults(command) as context, options_named():
         known = _options_of(command)
         for name, text in texts.items():
             if name not in known:
                 raise ValueError(f"there is no option --{name} of {command.name}")
             if len(text) > _LONGEST:
                 raise ValueError(f"--{name} must have at most {_LONGEST} characters, not {len(text)}")
-        given = arguments({name: text or None for name, text in texts.items()}, known)
-        with command.make_context(f"tachometry {command.name}", [*given, *words]) as context, options_named():
-            return of(command.invoke(context))
+            if text:
+                value = yes(name, text) if known[name].is_flag else text
+                known[name].handle_parse_result(context, {str(known[name].name): value}, [])
+        return of(command.invoke(context))
+
+
+def _defaults(command: click.Command) -> click.Context:
+    """Return what a command without options has."""
+    context = command.make_context(f"tachometry {command.name}", [], resilient_parsing=True)
+    context.resilient_parsing = False
+    return context
 
 
 def _options_of(command: click.Command) -> dict[str, Option]:
-    with command.make_context(str(command.name), [], resilient_parsing=True) as context:
-        return {_name(one): one for one in command.get_params(context) if isinstance(one, Option)}
+    return {_name(one): one for one in command.get_params(click.Context(command)) if isinstance(one, Option)}
 
 
 def _name(one: click.Option) -> str:

@@ -125,7 +125,7 @@ class Live:
         check(options)  # what is wrong is said as there
         texts = {name: text for name, text in of_one_axis(options).items() if text and name != "clock"}
         with refusals():
-            return target_of(port, CoreTexts(texts.pop("method", AUTO), texts, True), None)
+            return target_of(port, CoreTexts(options.get("method") or AUTO, texts, True), None)
 
 
 class _Watched:

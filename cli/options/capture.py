@@ -111,7 +111,7 @@ def _read(
         recording = read_capture(capture, line_a, second, rate, index, tick, text, third, alone.front_end.complemented)
         return with_last_tick(fitted(recording, alone.encoder), spec)
 
-    if others.get("capture") is None:
+    if others.get("capture", ...) is None:
         refuse_without("--replay", _OPTIONS)
     return dict(read=read, **others)
 
