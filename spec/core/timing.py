@@ -176,7 +176,9 @@ def whole_clocks(what: str, given: str, clock_hz: int) -> int:
 
 def time_or_clocks(what: str, given: str, clock_hz: int) -> Fraction:
     """Return a time such as `40us`, or clocks such as `960clk`, in seconds; ParameterError if it is neither."""
-    if re.fullmatch(r"[\d.]+", number := given.strip(), re.ASCII):
+    if (number := given.strip()) == "0":
+        return Fraction(0)
+    if re.fullmatch(r"[\d.]+", number, re.ASCII):
         raise ParameterError(what, f"must have a unit: type {number}us, or {number}clk for clocks, not {number}")
     value, unit = read_quantity(what, given, {**TIME, CLOCKS: Unit()})
     return value / clock_hz if unit == CLOCKS else value * TIME[unit].exact
