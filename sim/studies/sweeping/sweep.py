@@ -125,7 +125,8 @@ def _column(about: Option) -> str:
 def _content(about: Option) -> tuple[str, str]:
     if about.unit == "clocks":
         return "float", "s"
-    return _KINDS.get(type(about.default), "float"), about.unit or "as the option"
+    kind = "int" if about.limits else _KINDS.get(type(about.default), "float")
+    return kind, about.unit or "as the option"
 
 
 @dataclass(frozen=True)
