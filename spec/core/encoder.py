@@ -131,7 +131,7 @@ class Encoder:
     )
     ratio: str | None = option(
         None,
-        "Turns of the encoder for one turn of the shaft, as 10/9 or 1.75. Speeds, angles and plans are the "
+        "Turns of the encoder in a turn of the shaft, as 10/9 or 1.75. Speeds, angles and plans are the "
         "shaft's; --ppr, positions in counts and the index are the encoder's.",
         shown="1",
         metavar="N/M",
