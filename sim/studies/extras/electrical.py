@@ -7,7 +7,7 @@ import numpy as np
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
-from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.encoder.virtual import MAX_UNEVEN_PULSES, VirtualEncoder
 from tachometry.sim.theory.performance import REAL_DISC
 from tachometry.spec import TachometerSpec
 from tachometry.spec.formats.angles import SHOWN_BITS
@@ -16,11 +16,11 @@ _SETTLES, _SEEN, _MOST = 150, 100, 10_000  # ticks until the velocity is right, 
 
 
 def expected(extra: Any, spec: TachometerSpec, rad_per_s: float) -> tuple[str, str] | None:
-    """Return the row of the error at a constant speed, with a real disc in quadrature; None without ticks of its own.
+    """Return the row of the error at a constant speed, with a real disc in quadrature; None if there can be none.
 
     Where the disc has its zero is not part of the error.
     """
-    if spec.external_tick:
+    if spec.external_tick or spec.encoder.pulses_per_rev > MAX_UNEVEN_PULSES:
         return None
     tick_s, counts = spec.timing.tick_cycles / spec.timing.clock_hz, rad_per_s / spec.scale.unit_velocity
     seen = min(max(_SEEN, math.ceil(_SEEN / counts)), _MOST) + extra.lead // spec.timing.tick_cycles
