@@ -93,7 +93,7 @@ def drawn(
             yield spec, bus, text, stays[text]
         elif at >= first:
             verilog = export(spec, CORE, bus.name if bus else "none")[f"{CORE}.v"]
-            seeds = range(1, 4) if numbers["routed"] > at or (part == "fitted" and numbers["routed"]) else ()
+            seeds = range(1, 4) if at < numbers["routed"] else ()
             yield spec, bus, text, measure_core(spec, target, verilog, tools, ports_on(spec, bus), [*seeds]).figures
 
 

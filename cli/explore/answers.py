@@ -303,7 +303,7 @@ def _methods(options: Texts, core: TachometerSpec) -> Methods:
 
 
 def of_one_axis(options: Texts) -> dict[str, str]:
-    """Return those options that are of a core of one axis, without a loop, and not its method."""
+    """Return the options that describe a core of one axis, without a loop and without its method."""
     return {name: text for name, text in options.items() if name in core_click_options()}
 
 
@@ -343,7 +343,7 @@ def _run(command: click.Command, texts: Texts, of: Callable[[Any], Made]) -> Mad
 
 
 def _defaults(command: click.Command) -> click.Context:
-    """Return what a command without options has."""
+    """Return a context in which each option of a command has its default."""
     context = command.make_context(f"tachometry {command.name}", [], resilient_parsing=True)
     context.resilient_parsing = False
     return context

@@ -195,8 +195,8 @@ class Gates(wiring.Component):
     def _settled(self, m: Module, between: Signal) -> Signal:
         """Return a place between counts; one that waits for a count goes to the middle as the velocity falls.
 
-        It waits if it is 3/8 count ahead when the velocity is half of what it was with the last count. Then half a
-        count is its limit, and half as much each time that the velocity has halved.
+        A place that is 3/8 count ahead begins to wait when the velocity has fallen to half of that at the last count.
+        Half a count is its limit then; the limit halves each time the velocity halves again.
         """
         half = 1 << self._angles.position_fine_bits - 1
         velocity = self.native_velocity >> self._angles.speed_shift

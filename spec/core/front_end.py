@@ -110,7 +110,7 @@ class FrontEnd:
         if self.asked.position_modulo is None:
             return None
         of, _, parts = self.asked.position_modulo.partition("/")
-        return int(self.asked.encoder.counts_per_rev // int(parts or 1)) if of == "rev" else int(of)
+        return self.asked.encoder.counts_per_rev // int(parts or 1) if of == "rev" else int(of)
 
     @property
     def index_state(self) -> Levels | None:

@@ -233,8 +233,8 @@ def _top(angles: Angles, phases: Table, clock: Ints) -> Ints:
 def _sets(view: View, known: Ints | None) -> dict[str, Table]:
     """Return the spans in which the angle is set, its values, and of indices and `home` one more than their clocks.
 
-    In one clock a set comes first, then an index, then `home`. With halls, the clock from
-    which their angle is `known` takes the place of indices.
+    In one clock a set comes first, then an index, then `home`. With halls, the clock from which their angle is `known`
+    takes the place of indices.
     """
     trace, late = view.trace, view.spec.latency.tick - 1
     sets, ends = np.flatnonzero(trace.lines["angle_set"]), np.append(trace.clock, trace.n_clocks) + 1

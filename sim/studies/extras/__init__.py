@@ -1,9 +1,11 @@
 """Errors of extras in plans, a file each, with the function `expected`."""
 
+from collections.abc import Callable
+
 from tachometry.sim.studies.extras import electrical
 from tachometry.spec import TachometerSpec
 
-_EXPECTED = {"electrical": electrical.expected}
+_EXPECTED: dict[str, Callable[..., tuple[str, str] | None]] = {"electrical": electrical.expected}
 
 
 def expected_rows(spec: TachometerSpec, rad_per_s: float) -> list[tuple[str, str]]:

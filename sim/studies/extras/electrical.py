@@ -1,7 +1,6 @@
 """The error of the electrical angle at the instant of its use, by the golden model."""
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -10,12 +9,13 @@ from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import MAX_UNEVEN_PULSES, VirtualEncoder
 from tachometry.sim.theory.performance import REAL_DISC
 from tachometry.spec import TachometerSpec
+from tachometry.spec.core.extras.electrical import ElectricalAngle
 from tachometry.spec.formats.angles import SHOWN_BITS
 
 _SETTLES, _SEEN, _MOST = 150, 100, 10_000  # ticks until the velocity is right, ticks or counts that are seen, and ticks
 
 
-def expected(extra: Any, spec: TachometerSpec, rad_per_s: float) -> tuple[str, str] | None:
+def expected(extra: ElectricalAngle, spec: TachometerSpec, rad_per_s: float) -> tuple[str, str] | None:
     """Return the row of the error at a constant speed, with a real disc in quadrature; None if there can be none.
 
     Where the disc has its zero is not part of the error.

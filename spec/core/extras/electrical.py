@@ -24,8 +24,8 @@ new in every clock, and angle_valid. It is 0 at the index, at the rise of A of h
 _OFFSET = "Electrical angle that is added, as 12.3deg. Or a number of 2^-16 turns. ANGLE_OFFSET begins with it."
 _LEAD = """Time from the angle at the port to its use, as 1.5tick. Or 75us, or 300clk; below 65536 clocks. The angle \
 is that of the motor so much later. Register ANGLE_LEAD begins with it."""
-_SINCOS = """Outputs angle_sin and angle_cos, from -32767 to 32767. They are new every 16 clocks, by CORDIC, and are \
-those of the angle 16 clocks ahead, which is then that of --lead."""
+_SINCOS = """Outputs angle_sin and angle_cos, from -32767 to 32767. CORDIC computes new ones every 16 clocks, for the \
+instant that --lead gives."""
 
 
 def parse_offset(what: str, text: str) -> int:
@@ -64,9 +64,9 @@ class ElectricalAngle(Extra):
         counts, tick, bits = spec.encoder.encoder_counts, spec.timing.tick_cycles, spec.velocity.native_frac_bits
         late, carrying, tracks = spec.latency.pin_to_count + spec.latency.tick, spec.carrying, spec.latency.datapath
         of_track = (tracks, carrying.position_fine_bits, carrying.slope) if carrying else (0, 0, Fraction(0))
-        halls = [packed_levels(state) for state in spec.encoder.kind.cycle if len(state) == 3]
-        late_of = (late + of_track[0], *of_track, tuple(halls[:: -1 if spec.encoder.reverse else 1]))
-        return Angles(counts, self.pole_pairs, tick, spec.tick.longest, bits, *late_of)
+        states = spec.encoder.kind.cycle[:: -1 if spec.encoder.reverse else 1] if spec.encoder.sensor == "hall" else ()
+        halls = tuple(map(packed_levels, states))
+        return Angles(counts, self.pole_pairs, tick, spec.tick.longest, bits, late + of_track[0], *of_track, halls)
 
     def least_fine_bits(self, spec: Numbers) -> int:
         return ((self.pole_pairs << SHOWN_BITS) // spec.encoder.counts_per_rev).bit_length()
