@@ -198,8 +198,9 @@ def test_what_is_no_question(client: TestClient, body: bytes, kind: str, status:
 
 
 def test_curves_are_those_of_plan(client: TestClient) -> None:
-    """The core is in front; a bus, a name and a loop do not change them."""
-    found = asked(client, "curves", options={**CORE, "max-speed": "500rad/s", "bus": "uart", "baud": "100000"})
+    """The core is in front; a bus, a name, a loop and a tick of a PWM do not change them."""
+    others = {"max-speed": "500rad/s", "bus": "uart", "baud": "100000", "tick": "", "pwm": "10kHz"}
+    found = asked(client, "curves", options={**CORE, **others})
     spec = of_texts("s", {**{name: text for name, text in CORE.items() if name != "method"}, "max-speed": "500rad/s"})
     assert found["curves"][0]["own"]
     assert {one["name"] for one in found["curves"]} | found["left_out"].keys() == METHODS.keys()

@@ -96,7 +96,18 @@ def signs(m: Module, box: Box) -> None:
     m.d.sync += box.o.eq(Mux(product < box.b.as_signed(), product >> box.a[8:10], -product))
 
 
-FORMS = [memory, selected, enumeration, falling, signs]
+def choice(m: Module, box: Box, numbers: tuple[int, ...] = (0, 1, 2, 3, 4)) -> None:
+    with m.Switch(box.a[:3]):
+        for number, word in zip(numbers, (box.b, 5, ~box.b, box.b << 1, box.a), strict=True):
+            with m.Case(number):
+                m.d.comb += box.o.eq(word)
+
+
+def repeated(m: Module, box: Box) -> None:
+    choice(m, box, (0, 1, 2, 3, 1))
+
+
+FORMS = [memory, selected, enumeration, falling, signs, choice, repeated]
 LINT = "".join(f"/* verilator lint_off {warning} */\n" for warning in ("PROCASSINIT", "UNUSEDSIGNAL"))
 
 
@@ -115,6 +126,7 @@ def test_comments_and_names_are_written() -> None:
     assert text.startswith("// Two inputs and an output.\nmodule box (\n")
     assert re.findall(r"'h\w+;  // (.*)$", text, re.MULTILINE) == ["first", "third * pi"]
     assert "MODE_RUN: begin" in write(Box(enumeration), "box").text
+    assert write(Box(choice), "box").text.count("{12{") == 5
 
 
 def test_equal_modules_are_written_once() -> None:
