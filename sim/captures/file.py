@@ -1,6 +1,7 @@
 """Every kind of capture shares this: its error, the choice of channels, and files written whole or not at all."""
 
 import difflib
+import functools
 import gzip
 import itertools
 import re
@@ -94,6 +95,23 @@ def writing(path: Path) -> Iterator[Path]:
         raise CaptureError(f"cannot write {path}: {error.strerror or error}") from error
 
 
+def _listed(texts: Sequence[str]) -> str:
+    """Return the names of channels for a message, not too many."""
+    return ", ".join(texts[:_LISTED]) + (f" and {len(texts) - _LISTED} more" if len(texts) > _LISTED else "")
+
+
+def _find(channels: Mapping[int, str], vectors: Mapping[int, str], wanted: Channel | None) -> Line | None:
+    """Return the line of a channel, or None if there is none of this name or number."""
+    if not isinstance(wanted, str):
+        return Line(wanted) if wanted is not None and wanted in channels else None
+    if (number := _named(channels, wanted)) is not None:
+        return Line(number)
+    bit = re.fullmatch(r"(.+?)\[?([0-9]{1,7})\]?", wanted)  # a0 of one axis is a[0] of many in a waveform
+    if bit and (number := _named(vectors, bit[1])) is not None:
+        return Line(number, int(bit[2]))
+    return _find(channels, vectors, int(wanted)) if wanted.isascii() and wanted.isdigit() else None
+
+
 def choose_channels(
     path: Path,
     channels: Mapping[int, str],
@@ -111,41 +129,29 @@ def choose_channels(
     """
     texts = [f"{name} ({number})" for number, name in channels.items()]
     texts += [f"{name}[bit]" for number, name in vectors.items() if number not in channels]
-    listed = ", ".join(texts[:_LISTED]) + (f" and {len(texts) - _LISTED} more" if len(texts) > _LISTED else "")
-    if len(channels) < (1 if b == SAME else 2) and not (vectors and isinstance(a, str) and a.endswith("]")):
-        needed = "one logic channel" if b == SAME else "two logic channels"
+    listed, one_line = _listed(texts), b == SAME
+    if len(channels) < 2 - one_line and not (vectors and str(a).endswith("]")):
+        needed = "one logic channel" if one_line else "two logic channels"
         example = next(iter(vectors.values()), None)
-        hint = f"; lines in one number are --a {example}[0] --b {example}[1]" if example and b != SAME else ""
+        hint = f"; lines in one number are --a {example}[0] --b {example}[1]" if example and not one_line else ""
         raise CaptureError(f"{path} must have at least {needed}, not {listed or 'none'}{hint}")
-
-    def find(wanted: Channel | None) -> Line | None:
-        if not isinstance(wanted, str):
-            return Line(wanted) if wanted is not None and wanted in channels else None
-        if (number := _named(channels, wanted)) is not None:
-            return Line(number)
-        bit = re.fullmatch(r"(.+?)\[?([0-9]{1,7})\]?", wanted)  # a0 of one axis is a[0] of many in a waveform
-        if bit and (number := _named(vectors, bit[1])) is not None:
-            return Line(number, int(bit[2]))
-        return find(int(wanted)) if wanted.isascii() and wanted.isdigit() else None
-
-    one_line = b == SAME
-    named = [find("A"), find("A" if one_line else "B")]
-    defaults = [*channels, *channels, None, None][:2] if None in named else [line and line.number for line in named]
+    find = functools.partial(_find, channels, vectors)
+    named = [line and line.number for line in (find("A"), find("A" if one_line else "B"))]
+    defaults = [*channels, *channels, None, None][:2] if None in named else named
     first, second = (default if given is None else given for default, given in zip(defaults, (a, b), strict=True))
-    wanted = {"a": first, "b": first if one_line else second, **others}
     lines: dict[str, Line] = {}
-    for line, channel in wanted.items():
+    for line, channel in {"a": first, "b": first if one_line else second, **others}.items():
         if (place := find(channel)) is None:
             near = difflib.get_close_matches(str(channel), texts, 3, 0.5) if len(texts) > _LISTED else []
-            close = f"; near it are {', '.join(near)}" if near else ""
+            close = f"; near it are {', '.join(near)}" * bool(near)
             if line.endswith("_n"):
                 raise CaptureError(f"{path} must have a channel {line} with --differential, not only {listed}{close}")
             raise CaptureError(f"channel {line} of {path} must be one of {listed}, not {channel!r}{close}")
         lines[line] = place
     for one, other in itertools.combinations(lines, 2):
         if (place := lines[one]) == lines[other] and not (one_line and other == "b"):
-            name = channels[place.number] if place.bit is None else f"{vectors[place.number]}[{place.bit}]"
-            raise CaptureError(f"channels {one} and {other} of {path} must be two of {listed}, not both {name}")
+            both = channels[place.number] if place.bit is None else f"{vectors[place.number]}[{place.bit}]"
+            raise CaptureError(f"channels {one} and {other} of {path} must be two of {listed}, not both {both}")
     return tuple(lines.values())
 
 

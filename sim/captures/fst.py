@@ -25,6 +25,23 @@ _LONGEST, _MOST_MEMORY, _MOST_NAMES, _MOST_CHANGES = 600.0, 2 << 30, 1 << 24, 1 
 _TOO_MUCH = 3  # exit status of one that would print more
 
 
+def _head(path: Path, samplerate_hz: float | None) -> bytes:
+    """Return the head of a file; it raises CaptureError if it has none, or cannot be read here."""
+    if samplerate_hz is not None:
+        raise OptionError("samplerate", f"must not be given for {path}: a waveform has its times")
+    if importlib.util.find_spec("pywellen") is None:
+        raise CaptureError(
+            f"to read {path}, the extra `fst` must be installed: pip install 'tachometry[fst]'; or convert it with "
+            f"`fst2vcd {path} -o {path.stem}.vcd`, which comes with GTKWave"
+        )
+    check_regular(path)
+    with reading(path), path.open("rb") as file:
+        head = file.read(_HEADER.size)
+    if len(head) < _HEADER.size or head[0] not in (_PLAIN, _PACKED):
+        raise _damaged(path)
+    return head
+
+
 def read_fst(
     path: str | os.PathLike[str],
     a: Channel | None = None,
@@ -39,18 +56,7 @@ def read_fst(
     never is 0 or 1.
     """
     path = Path(path)
-    if samplerate_hz is not None:
-        raise OptionError("samplerate", f"must not be given for {path}: a waveform has its times")
-    if importlib.util.find_spec("pywellen") is None:
-        raise CaptureError(
-            f"to read {path}, the extra `fst` must be installed: pip install 'tachometry[fst]'; or convert it with "
-            f"`fst2vcd {path} -o {path.stem}.vcd`, which comes with GTKWave"
-        )
-    check_regular(path)
-    with reading(path), path.open("rb") as file:
-        head = file.read(_HEADER.size)
-    if len(head) < _HEADER.size or head[0] not in (_PLAIN, _PACKED):
-        raise _damaged(path)
+    head = _head(path, samplerate_hz)
     known: dict[str, Any] = json.loads(_printed(path))
     if not known["unit"]:
         raise CaptureError(f"{path} must have a unit of its times")

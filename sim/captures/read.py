@@ -44,6 +44,25 @@ _EXPORTS = {
 }
 
 
+def _reader(path: Path, text: TextOptions) -> Callable[..., Recording]:
+    """Return the reader of a file; it raises CaptureError if there is none, OptionError if it takes no such option."""
+    kind = kind_of(path)
+    reader = READERS.get(kind) if path.suffix.lower() != ".gz" or kind in PACKED else None
+    if reader is None:
+        how = f": export it {_EXPORTS[kind]}" if kind in _EXPORTS else ""
+        raise CaptureError(
+            f"a capture must be a .sr, .vcd, .fst, .csv, .txt, .tsv or .teeth file, or .csv.gz, not {path}{how}"
+        )
+    if reader is read_csv:
+        return functools.partial(read_csv, options=text)
+    of_times = dict(time=text.time, time_unit=text.unit, threshold=text.threshold)
+    for name, value in (of_times | dict(pulse_times=text.pulse_times, pulse_periods=text.pulse_periods)).items():
+        if value is not None:
+            why = "it has levels" if name == "threshold" else "it has its times"
+            raise OptionError(name, f"must not be given for {path}: {why}")
+    return reader
+
+
 def read_capture(
     path: str | os.PathLike[str],
     a: Channel | None = None,
@@ -55,49 +74,22 @@ def read_capture(
     c: Channel | None = None,
     complemented: Iterable[str] = (),
 ) -> Recording:
-    """Read the encoder lines from a capture; the suffix tells its kind.
+    """Read the encoder lines from a capture, whose kind its suffix gives.
 
-    Parameters
-    ----------
-    path : path
-        A sigrok session `.sr` (see `read_sr`), a text `.csv`, `.txt`, `.tsv` or `.teeth`, or one of these with `.gz`
-        (see `read_csv`), or a waveform `.vcd`, `.vcd.gz` or `.fst` (see `read_vcd` and `read_fst`).
-    a, b : str, int or None
-        Name of the channel, else its number from 0, as in sigrok's D0 to D7. When not given: the channels named A and B
-        (in any case) if there are both, else the first two.
-    samplerate_hz : float or None, Hz
-        Only for a `.sr` or a text that has neither a samplerate nor times.
-    z, tick_in : str, int or None
-        Channels of the index line and of the external tick, likewise; what is not given, the recording has not.
-    text : TextOptions
-        Only for a text, see `read_csv`.
-    c : str, int or None
-        Channel of a third line, likewise.
-    complemented : iterable of str
-        Lines whose complements are channels as well, which are named a_n for a.
+    - `path`: A sigrok session `.sr` (see `read_sr`), a text `.csv`, `.txt`, `.tsv` or `.teeth`, or one of these with
+      `.gz` (see `read_csv`), or a waveform `.vcd`, `.vcd.gz` or `.fst` (see `read_vcd` and `read_fst`).
+    - `a`, `b`: Name of the channel, else its number from 0, as in sigrok's D0 to D7. When not given: the channels named
+      A and B (in any case) if there are both, else the first two.
+    - `samplerate_hz`, Hz: Only for a `.sr` or a text that has neither a samplerate nor times.
+    - `z`, `tick_in`, `c`: Channels of the index line, of the external tick and of a third line, likewise; what is not
+      given, the recording has not.
+    - `text`: Only for a text, see `read_csv`.
+    - `complemented`: Lines whose complements are channels as well, which are named a_n for a.
 
-    Raises
-    ------
-    CaptureError
-        If the suffix is another one, or as the reader of that kind says.
+    It raises CaptureError if the suffix is another one, or as the reader of that kind says.
     """
     path = Path(path)
-    packed = path.suffix.lower() == ".gz"
-    kind = kind_of(path)
-    reader = READERS.get(kind) if not packed or kind in PACKED else None
-    if reader is None:
-        how = f": export it {_EXPORTS[kind]}" if kind in _EXPORTS else ""
-        raise CaptureError(
-            f"a capture must be a .sr, .vcd, .fst, .csv, .txt, .tsv or .teeth file, or .csv.gz, not {path}{how}"
-        )
-    if reader is read_csv:
-        reader = functools.partial(read_csv, options=text)
-    else:
-        of_times = dict(time=text.time, time_unit=text.unit, threshold=text.threshold)
-        for name, value in (of_times | dict(pulse_times=text.pulse_times, pulse_periods=text.pulse_periods)).items():
-            if value is not None:
-                why = "it has levels" if name == "threshold" else "it has its times"
-                raise OptionError(name, f"must not be given for {path}: {why}")
+    reader = _reader(path, text)
     others = {name: channel for name, channel in (("c", c), ("z", z), ("tick_in", tick_in)) if channel is not None}
     others |= {f"{line}_n": f"{line}_n" for line in complemented}
     recording = reader(path, a, b, samplerate_hz, others)

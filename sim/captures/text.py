@@ -36,6 +36,11 @@ from tachometry.spec.language.units import plural
 _FILES = {"--trace": "interval,forced,velocity_raw", "--counts": "tick,pulse_count", "--events": "clock,event"}
 
 
+def _refuse_outputs(path: Path, source: Lines) -> None:
+    for option in (name for name, columns in _FILES.items() if any(columns in line for line in source.head[:1])):
+        raise CaptureError(f"{path} has outputs of a core, from {option}: replay what --save-capture wrote")
+
+
 def read_csv(
     path: str | os.PathLike[str],
     a: Channel | None = None,
@@ -57,16 +62,13 @@ def read_csv(
     in a column. Other arguments are as of `read_sr`. It raises CaptureError for a file or a row that is none of this.
     """
     path = Path(path)
-    rows_are_pulses = options.pulse_times is not None or options.pulse_periods is not None
-    if rows_are_pulses:
-        own = options.pulse_periods if options.pulse_times is None else options.pulse_times
+    if (own := options.pulse_periods if options.pulse_times is None else options.pulse_times) is not None:
         options = replace(options, time=own)
     with reading(path), opened(path) as file:
         source = Lines(path, file)
-        for option in (name for name, columns in _FILES.items() if any(columns in line for line in source.head[:1])):
-            raise CaptureError(f"{path} has outputs of a core, from {option}: replay what --save-capture wrote")
+        _refuse_outputs(path, source)
         header = read_header(path, source.head, options, samplerate_hz)
-        if rows_are_pulses or not header.channels:
+        if own is not None or not header.channels:
             return _pulses(path, source, header, options, one_line=b == SAME)
         if len(header.channels) == 1 and a is None and b is None:
             _refuse_numbers(path, source, header)
@@ -76,8 +78,8 @@ def read_csv(
             changes.add(times.of(number, columns), pins.of(number, columns))
         pins.check_end(source.ended)
     recording = changes.recording(header, ("a", "b", *others))
-    moved = recording.time[1:][(np.diff(recording.a) != 0) | (np.diff(recording.b) != 0)]
-    check_seconds(path, header, options.slowest_s, np.diff(moved), "edges", whole=times.whole)
+    apart = np.diff(recording.time[1:][(np.diff(recording.a) != 0) | (np.diff(recording.b) != 0)])
+    check_seconds(path, header, options.slowest_s, apart, "edges", whole=times.whole)
     return named(recording, header.channels, lines, (*times.notes, *pins.notes, *changes.notes))
 
 
