@@ -20,10 +20,9 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
 
     There are `n_edges` at each of six speeds.
     """
-    rng = np.random.default_rng(seed)
+    rng, sensor = np.random.default_rng(seed), spec.encoder.kind
     cycles, longest = spec.timing.tick_cycles, spec.timing.tick_cycles * spec.timing.max_ticks
     gaps, turns = [], []
-    sensor = spec.encoder.kind
     steps = not sensor.cycle  # each is a pulse
     per_period = spec.encoder.decoding if steps else 6 if sensor.name == "hall" else 4  # edges
     least = (1.0 + steps) * (1 + spec.filter_clocks)
@@ -41,18 +40,7 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     clock = np.append(0, np.cumsum(np.maximum(1 + steps, np.rint(np.concatenate(gaps))).astype(np.int64)))
     turn = np.concatenate(turns)
     edge, counts = clock[1:], np.cumsum(turn) * spec.encoder.decoding / per_period
-    if steps:
-        form = {"directed": sensor.name == "step-dir", "both_edges": spec.encoder.decoding == 2}
-        at, level = pulsed(clock.astype(np.float64), turn, float(clock[-1] + 2), **form)
-        clock = at.astype(np.int64)
-        level[rng.random(len(level)) < 0.05] = 3  # both lines rise
-    else:
-        place = np.append(0, np.cumsum(turn))
-        levels = np.array([packed_levels(each) for each in sensor.cycle], dtype=np.uint8)
-        level = levels[place % 6] if sensor.name == "hall" else quadrature(place)
-        if sensor.name == "hall":
-            level[rng.random(len(level)) < 0.01] = 7
-        level[VirtualEncoder.of(spec.encoder).absent(place)] = 0
+    clock, level = _levels(spec, clock, turn, rng)
     z = (rng.random(len(clock)) < 0.05).astype(np.uint8)
     if spec.front_end.index_state is not None:  # at times wider than a period
         z |= np.repeat(rng.random(len(clock) // 12 + 1) < 0.1, 12)[: len(clock)].astype(np.uint8)
@@ -66,8 +54,30 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
         high = spec.filter_clocks + int(rng.integers(1, 30))
         apart = rng.integers(high + spec.filter_clocks + 1, n_clocks // few + high + spec.filter_clocks + 2, few)
         trace = trace.with_pulses(name, np.cumsum(apart), high)
-    if not spec.external_tick:
-        return trace
+    return _ticked(trace, cycles, rng) if spec.external_tick else trace
+
+
+def _levels(
+    spec: TachometerSpec, clock: NDArray[np.int64], turn: NDArray[np.int64], rng: np.random.Generator
+) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
+    """Return clocks and levels of the lines of steps at these clocks, some of which are illegal."""
+    sensor = spec.encoder.kind
+    if not sensor.cycle:
+        form = {"directed": sensor.name == "step-dir", "both_edges": spec.encoder.decoding == 2}
+        at, level = pulsed(clock.astype(np.float64), turn, float(clock[-1] + 2), **form)
+        level[rng.random(len(level)) < 0.05] = 3  # both lines rise
+        return at.astype(np.int64), level
+    place = np.append(0, np.cumsum(turn))
+    levels = np.array([packed_levels(each) for each in sensor.cycle], dtype=np.uint8)
+    level = levels[place % 6] if sensor.name == "hall" else quadrature(place)
+    if sensor.name == "hall":
+        level[rng.random(len(level)) < 0.01] = 7
+    level[VirtualEncoder.of(spec.encoder).absent(place)] = 0
+    return clock, level
+
+
+def _ticked(trace: PinTrace, cycles: int, rng: np.random.Generator) -> PinTrace:
+    """Return the trace with external ticks, some early, some late, some missing."""
     apart = np.full(trace.n_clocks // cycles + 1, cycles)
     apart[500:1000] += rng.integers(-cycles // 2, cycles, len(apart[500:1000]))
     apart[700:710] *= 4

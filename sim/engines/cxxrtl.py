@@ -271,14 +271,33 @@ def _moving(idle: Idle, names: Mapping[str, str], of: str) -> tuple[str, str]:
     raise TypeError(idle)
 
 
+def _evaluations(parts: Mapping[str, State], design: Design) -> str:
+    outputs = [mangled(port.name) for port in design.outputs]
+    head = "bool {}(performer *performer = nullptr) {{\n{}\n}}"
+    return "\n".join(head.format(name, part.evaluation(outputs)) for name, part in parts.items())
+
+
+_NEVER = "int64_t idle() { return 0; } void move_on(int64_t) {}"
+
+
+def _alone(boxes: list[IdleBox], names: Mapping[str, str], whole: State, others: State, inner: State) -> str:
+    """Return what plays boxes alone, while all around them stands still."""
+    return _ALONE.format(
+        works=f"{_writes(whole.written)} || {_changing('top', whole.flip_flops)}",
+        busy=" || ".join(f"!top.{names[name]}.curr.is_zero()" for box in boxes for name in box.busy) or "false",
+        others=f"{_writes(others.written)} || {_changing('top', others.flip_flops)}",
+        inner=inner.edge,
+        edge=others.edge,
+    )
+
+
 def _skip(design: Design, state: State) -> dict[str, Any]:
     """Return what of the struct `Model` skips clocks, and what stands before it."""
     names = {plain(wire): wire for wire in state.flip_flops}
     paths = {path for idle in design.idle for path in idle.paths}
     assert paths <= names.keys(), f"no such signals: {paths - names.keys()}"
     if not paths:
-        skip = "int64_t idle() { return 0; } void move_on(int64_t) {}"
-        return {"parts": "", "orders": "", "round": 1, "skip": skip, "played": ""}
+        return {"parts": "", "orders": "", "round": 1, "skip": _NEVER, "played": ""}
     moved = {names[path] for path in paths}
     boxes = [idle for idle in design.idle if isinstance(idle, IdleBox)]
     around, waited = (tuple(f"{box.box}." for box in chosen) for chosen in (boxes, [box for box in boxes if box.busy]))
@@ -288,24 +307,15 @@ def _skip(design: Design, state: State) -> dict[str, Any]:
     wires = [wire for wire in state.flip_flops if wire not in alone.flip_flops]
     rounds = next((idle for idle in design.idle if isinstance(idle, IdleRounds)), None)
     of = "top" if rounds is None else "turn"
-    moving, orders = zip(
-        *(_moving(idle, names, of) for idle in (rounds.moving if rounds else design.idle)), strict=True
-    )
+    moves = [_moving(idle, names, of) for idle in (rounds.moving if rounds else design.idle)]
+    moving, orders = zip(*moves, strict=True)
     texts = {
         "moving": " && ".join(moving),
         "changing": _changing(of, (wire for wire in wires if wire not in moved)),
         "writes": _writes(memory for memory in state.written if memory not in alone.written),
         "forget": " ".join(f"top.{memory}.write_queue.clear();" for memory in state.written),
-        "alone": "",
+        "alone": _alone(boxes, names, alone, others, inner) if boxes else "",
     }
-    if boxes:
-        texts["alone"] = _ALONE.format(
-            works=f"{_writes(alone.written)} || {_changing('top', alone.flip_flops)}",
-            busy=" || ".join(f"!top.{names[name]}.curr.is_zero()" for box in boxes for name in box.busy) or "false",
-            others=f"{_writes(others.written)} || {_changing('top', others.flip_flops)}",
-            inner=inner.edge,
-            edge=others.edge,
-        )
     if rounds is not None:
         texts |= {
             "wires": " ".join(f"wire<{width}> {wire};" for wire, width in state.flip_flops.items()),
@@ -314,13 +324,8 @@ def _skip(design: Design, state: State) -> dict[str, Any]:
             "keep": " ".join(f"turn.{wire}.curr = turn.{wire}.next;" for wire in wires),
             "back": " ".join(f"top.{wire}.curr = top.{wire}.next = turn.{wire}.curr;" for wire in moved),
         }
-    outputs = [mangled(port.name) for port in design.outputs]
-    parts = {"alone": alone, "within": inner} if boxes else {}
     return {
-        "parts": "\n".join(
-            f"bool {name}(performer *performer = nullptr) {{\n{part.evaluation(outputs)}\n}}"
-            for name, part in parts.items()
-        ),
+        "parts": _evaluations({"alone": alone, "within": inner} if boxes else {}, design),
         "orders": "\n".join(orders),
         "round": rounds.clocks if rounds else 1,
         "skip": (_MOVING + (_ROUNDS if rounds else _CLOCKS)).format(**texts),

@@ -48,6 +48,13 @@ class Through:
     currents: NDArray[np.int64]
 
 
+def _traced(lines: NDArray[np.int64], n_clocks: int) -> PinTrace:
+    """Return a trace of rows of a clock and levels; the last of a clock is what is seen."""
+    lines = lines[np.append(lines[1:, 0] != lines[:-1, 0], True)]
+    level = lines[:, 1].astype(np.uint8)
+    return PinTrace(lines[:, 0], level & np.uint8(1), level >> np.uint8(1), n_clocks)
+
+
 class GateLoop:
     """Runs a core with a control loop in gates about a motor; it is compiled once.
 
@@ -96,15 +103,10 @@ class GateLoop:
         )
         # A current is at the motor in the clock after the one in which it is new.
         first, delay = spec.latency.first_tick, spec.latency.tick_to_result + 1
-        clocks = {"clocks": int(spec.period), "first": first, "delay": delay}
-        controller = CONTROLLER(**clocks)
-        found = self._simulation.call(
-            motor, edges, controller, course, log, 1e-5, ctypes.cast(ctypes.byref(gates), ctypes.c_void_p).value
-        )
+        controller = CONTROLLER(clocks=int(spec.period), first=first, delay=delay)
+        there = ctypes.cast(ctypes.byref(gates), ctypes.c_void_p).value
+        found = self._simulation.call(motor, edges, controller, course, log, 1e-5, there)
         if gates.n_edges >= MOST_EDGES:
             raise ValueError(f"a run must have less than {MOST_EDGES} edges")
-        lines = lines[: gates.n_edges]
-        lines = lines[np.append(lines[1:, 0] != lines[:-1, 0], True)]  # the last of a clock is what is seen
-        level = lines[:, 1].astype(np.uint8)
-        trace = PinTrace(lines[:, 0], level & 1, level >> 1, n_clocks)
+        trace = _traced(lines[: gates.n_edges], n_clocks)
         return found, Through(trace, commands[: gates.n_commands], currents[: gates.n_currents])

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,32 @@ async def drive(ctx: Any, trace: Trace, pins: Mapping[str, Signal], period: floa
         before = row
 
 
+def _played(
+    simulator: Simulator, n_clocks: int, progress: Callable[[int], None] | None
+) -> tuple[int, KeyboardInterrupt | None]:
+    """Return how many clocks were simulated, and what interrupted them."""
+    done = 0
+    try:
+        while done < n_clocks:
+            after = min(done + _CLOCKS_PER_CALL, n_clocks)
+            simulator.run_until(after * _PERIOD)
+            done = after
+            if progress is not None:
+                progress(done)
+    except KeyboardInterrupt as raised:
+        return done, raised
+    return done, None
+
+
+async def _collect(ctx: Any, values: Value, rows: list[tuple[int, int]]) -> None:
+    """Append the clocks in which a strobe is high, which is bit 0 of the values, with the other bits."""
+    clock = 0
+    async for _, _, packed in ctx.tick().sample(values):
+        if packed & 1:
+            rows.append((clock, packed >> 1))
+        clock += 1
+
+
 class PySim:
     """Is the engine that is always there."""
 
@@ -57,8 +84,7 @@ class PySim:
         progress: Callable[[int], None] | None = None,
     ) -> Run:
         """Run the core, as `Engine.run` says."""
-        core = core_of(spec)
-        top = Module()
+        core, top = core_of(spec), Module()
         top.submodules.core = core
         outputs = spec.ports.outputs
         strobe = Cat(getattr(core, port.name) for port in outputs if port.is_strobe).any()
@@ -68,23 +94,10 @@ class PySim:
         simulator = Simulator(top)
         simulator.add_clock(_PERIOD)
 
-        async def bench(ctx: Any) -> None:
-            await drive(ctx, trace, {port.name: getattr(core, port.name) for port in driven_pins(spec, trace)}, _PERIOD)
-
-        simulator.add_testbench(bench)
-
+        pins = {port.name: getattr(core, port.name) for port in driven_pins(spec, trace)}
+        simulator.add_testbench(partial(drive, trace=trace, pins=pins, period=_PERIOD))
         rows: list[tuple[int, int]] = []
-
-        async def collect(ctx: Any) -> None:
-            clock = 0
-            async for _, _, packed in ctx.tick().sample(values):
-                if packed & 1:
-                    rows.append((clock, packed >> 1))
-                clock += 1
-
-        simulator.add_process(collect)
-
-        done, interrupt = 0, None
+        simulator.add_process(partial(_collect, values=values, rows=rows))
         begin, end = window or (0, trace.n_clocks)
         with ExitStack() as stack:
             waveform = None
@@ -92,15 +105,7 @@ class PySim:
                 widths = {name: (len(value), value.shape().signed) for name, value in seen.items()}
                 waveform = stack.enter_context(Waveform(vcd, spec.timing.clock_hz, widths))
                 _watch(simulator, waveform, seen_values, begin, end)
-            try:
-                while done < trace.n_clocks:
-                    after = min(done + _CLOCKS_PER_CALL, trace.n_clocks)
-                    simulator.run_until(after * _PERIOD)
-                    done = after
-                    if progress is not None:
-                        progress(done)
-            except KeyboardInterrupt as raised:
-                interrupt = raised
+            done, interrupt = _played(simulator, trace.n_clocks, progress)
             if waveform is not None:
                 waveform.close(min(done, end))
 

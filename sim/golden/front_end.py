@@ -186,6 +186,27 @@ def together(
     return clock, [level[np.searchsorted(at, clock, side="right") - 1] for at, level in lines]
 
 
+def _indices(
+    spec: TachometerSpec,
+    clock: NDArray[np.int64],
+    levels: Sequence[NDArray[np.uint8]],
+    step: NDArray[np.int64],
+    line_z: tuple[NDArray[np.int64], NDArray[np.uint8]],
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Return clocks of indices, of those wider than a period, and of those that pass without the state of the index."""
+    at_z, z = line_z
+    delay = spec.latency.pin_to_count
+    wide = missed = clock[:0]
+    z = z ^ np.uint8("z" in spec.encoder.inverted)
+    if spec.front_end.index_state is not None:
+        at_z, levels_z = together([*((clock, level) for level in levels), (at_z, z)])
+        z, again = in_state(spec, levels_z)
+        wide = at_z[again] + delay
+        at = clock + delay + (np.arange(len(clock)) == 0)
+        missed = passed_by(at[step != 0], step[step != 0], at_z + delay, levels_z[-1], z)
+    return at_z[1:][z[1:] > z[:-1]] + delay, wide, missed
+
+
 def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     """Return conditioned and decoded lines."""
     returned = [np.empty(0, dtype=np.int64)]
@@ -206,24 +227,15 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     # The level before the first is not real.
     at = clock + spec.latency.pin_to_count + (np.arange(len(clock)) == 0)
     changed = packed([line[1:] ^ line[:-1] for line in levels])
-    rises = wide = missed = at[:0]
     seen = {name: conditioned(name) for name in spec.front_end.sensed}
     pins = {name: (clock_of + spec.latency.pin_to_count, level) for name, (clock_of, level) in seen.items()}
     if spec.front_end.wheel is not None:
         swallowed = np.sort(np.concatenate(returned)) + 3
-        return _without_gaps(spec, Steps(at[1:], step[1:], at[:0], rises, swallowed, pins=pins), trace)
+        return _without_gaps(spec, Steps(at[1:], step[1:], at[:0], at[:0], swallowed, pins=pins), trace)
+    rises, wide, missed = at[:0], at[:0], at[:0]
     if spec.index:
-        at_z, z = conditioned("z")
-        z = z ^ np.uint8("z" in encoder.inverted)
-        if spec.front_end.index_state is not None:
-            at_z, levels_z = together([*zip([clock] * len(levels), levels, strict=True), (at_z, z)])
-            line_z = levels_z[-1]
-            z, again = in_state(spec, levels_z)
-            at_state = at_z + spec.latency.pin_to_count
-            wide = at_state[again]
-            missed = passed_by(at[step != 0], step[step != 0], at_state, line_z, z)
-        rises = at_z[1:][z[1:] > z[:-1]] + spec.latency.pin_to_count
-    asked = {"preset": rises[:0], "home": rises[:0]}
+        rises, wide, missed = _indices(spec, clock, levels, step, conditioned("z"))
+    asked = {"preset": at[:0], "home": at[:0]}
     for name in spec.front_end.controls:
         at_pin, level = conditioned(name)
         asked[name] = at_pin[1:][level[1:] > level[:-1]] + spec.latency.pin_to_count

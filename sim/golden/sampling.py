@@ -26,12 +26,8 @@ def external_windows(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return windows that end with a rise, none shorter than `min_cycles` and none longer than `max_cycles`.
 
-    - `rises`: Clocks in which a rise is seen.
-
-    Returns
-    -------
-    last, errors : int64 arrays
-        Last clocks of windows; clocks of rises that came too early, and of ends without a rise.
+    `rises` are clocks in which a rise is seen. It returns the last clocks of windows, and the clocks of rises that came
+    too early or of ends without a rise.
     """
     rises = rises[rises < n_clocks]
     last: list[NDArray[np.int64]] = []

@@ -133,6 +133,20 @@ def locked(folder: Path) -> Iterator[None]:
             os.close(descriptor)
 
 
+def _begun(command: Sequence[str], folder: Path | None, variables: Mapping[str, str]) -> "subprocess.Popen[str]":
+    return subprocess.Popen(
+        command,
+        cwd=folder,
+        env=variables,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        encoding="utf-8",  # whatever the locale is
+        errors="replace",
+        process_group=0,
+    )
+
+
 def run_tool(
     command: Sequence[str],
     folder: Path | None = None,
@@ -154,19 +168,7 @@ def run_tool(
     started: list[subprocess.Popen[str]] = []
     try:
         with held_back():
-            started.append(
-                subprocess.Popen(
-                    command,
-                    cwd=folder,
-                    env={**os.environ, **ours, **(variables or {})},
-                    stdin=subprocess.PIPE,
-                    stdout=subprocess.PIPE,
-                    stderr=subprocess.PIPE,
-                    encoding="utf-8",  # whatever the locale is
-                    errors="replace",
-                    process_group=0,
-                )
-            )
+            started.append(_begun(command, folder, {**os.environ, **ours, **(variables or {})}))
         _running.update(started)
         _limit(started[0].pid, memory, seconds)
         out, err = started[0].communicate(text, _LONGEST if sys.platform == "linux" else seconds or _LONGEST)

@@ -208,8 +208,8 @@ class Model:
         turns = ~is_nep & np.repeat(found.turns, 2)
         sign = np.where(turns, -sign, sign)
         nth = np.arange(len(found.start)) > 0  # the first window is not one that a count opened
-        # After reset or rest a count is no measurement.
-        fresh = ~turns & ~is_nep & np.repeat(~nth | (found.n_dt >= most), 2)
+        rests = found.n_dt >= most
+        fresh = ~turns & ~is_nep & np.repeat(~nth | rests, 2)  # after reset or rest a count is no measurement
         sets, n, high = self._regime(value, is_nep, happens, turns | fresh)
         sets &= ~fresh
         loose = is_nep & np.repeat(found.c_ep == 1, 2)
@@ -222,7 +222,6 @@ class Model:
         n_forced = np.maximum(0, np.minimum(found.n_dt, most - 1) - least + 1)
         n_forced = np.where((n0 > 0) & alone & spec.bound_decay, n_forced, 0)
         whole = counting(n_forced) + np.repeat(least, n_forced)
-        rests = found.n_dt >= most
         forced_at = np.repeat(found.start, n_forced) + whole * np.repeat(dt, n_forced)
         rest_at = (found.start + most * dt)[rests]
         # A count just at the end of dt is one update with it: the later of both.
@@ -236,9 +235,8 @@ class Model:
         shift = np.concatenate([shift[sets], np.repeat(found.shift, n_forced), found.shift[rests]])
         loose, unsynced = np.append(loose[sets], alone), np.append(unsynced[sets], ~alone)
         order = np.argsort(clock, kind="stable")
-        loose, unsynced = loose[order], unsynced[order]
         clock, n, high, sign, forced = clock[order], n[order], high[order], sign[order], forced[order]
-        shift = shift[order]
+        shift, loose, unsynced = shift[order], loose[order], unsynced[order]
         n_ep1 = np.where(high, n, np.minimum(n, 1))
         n_dt1 = np.where(high | (n == 0), 1, n)
         standstill, valid = forced & (n == 0), n > 0
