@@ -1,9 +1,12 @@
 """The figure of a comparison shows all velocities, and the error of each; the least error is on a yellow ground."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from tachometry.sim.plots.style import COLOURS, columns, in_words, place_panels, save_figure
 from tachometry.sim.studies.comparing.compare import Curve, Instants, Score, TrueSpeed
@@ -22,6 +25,28 @@ def save_comparison(
     save_figure(path, lambda: _draw(spec, curves, scores, instants, true_speed))
 
 
+def _draw_error(
+    axes: Axes, at: NDArray[np.float64], error: NDArray[np.float64], colour: str, words: tuple[str, str], least: bool
+) -> None:
+    """Draw the error of a method, with words at the left and at the right; the least one has a colour behind it."""
+    kept = columns(at, error)
+    axes.axhline(0, color="0.6", linewidth=0.7)
+    axes.plot(at[kept], error[kept], color=colour, linewidth=0.6)
+    if least:
+        axes.set_facecolor("#fff4c2")
+    left, right = words
+    axes.text(0.005, 0.84, left, transform=axes.transAxes, fontsize=8, color=colour, weight="bold")
+    shown = f"least error: {right}" if least else right
+    axes.text(0.995, 0.84, shown, transform=axes.transAxes, ha="right", fontsize=8, weight="bold")
+
+
+def _draw_truth(axes: Axes, at: NDArray[np.float64], truth: NDArray[np.float64]) -> None:
+    """Draw the true speed as a broad band, from which a curve that is wrong stands out."""
+    kept = columns(at, truth)
+    band: dict[str, Any] = {"color": "0.82", "linewidth": 5, "zorder": 1.5, "solid_capstyle": "butt"}
+    axes.plot(at[kept], truth[kept], label="shaft (true)", **band)
+
+
 def _draw(
     spec: TachometerSpec, curves: list[Curve], scores: list[Score], instants: Instants, true_speed: TrueSpeed | None
 ) -> Figure:
@@ -35,41 +60,17 @@ def _draw(
     for place, (curve, result, colour) in enumerate(zip(curves, scores, COLOURS * len(curves), strict=False)):
         at, held = instants[place], values[place]
         kept = columns(at, held)
-        panels["velocity"].plot(
-            at[kept],
-            held[kept],
-            color=colour,
-            linewidth=0.7,
-            drawstyle="steps-post",
-            label=_words(curve).partition(":")[0],
-            zorder=2 - calmest.index(place) / 100,
-        )
+        line: dict[str, Any] = {"linewidth": 0.7, "drawstyle": "steps-post", "label": _words(curve).partition(":")[0]}
+        depth = 2 - calmest.index(place) / 100
+        panels["velocity"].plot(at[kept], held[kept], color=colour, zorder=depth, **line)
         if true_speed is None:
             continue
-        axes, error = panels[curve.name], held - unit.of(true_speed(at))
-        kept = columns(at, error)
-        axes.axhline(0, color="0.6", linewidth=0.7)
-        axes.plot(at[kept], error[kept], color=colour, linewidth=0.6)
-        axes.text(0.005, 0.84, _words(curve), transform=axes.transAxes, fontsize=8, color=colour, weight="bold")
         words = f"RMS {unit.of(result.rms):.3g} {unit.name}"
-        if result.rms == least:
-            axes.set_facecolor("#fff4c2")
-            words = f"least error: {words}"
-        axes.text(0.995, 0.84, words, transform=axes.transAxes, ha="right", fontsize=8, weight="bold")
+        axes = panels[curve.name]
+        _draw_error(axes, at, held - unit.of(true_speed(at)), colour, (_words(curve), words), result.rms == least)
     first = instants[0]
     if true_speed is not None:
-        truth = unit.of(true_speed(first))
-        kept = columns(first, truth)
-        # A broad band, from which a curve that is wrong stands out.
-        panels["velocity"].plot(
-            first[kept],
-            truth[kept],
-            color="0.82",
-            linewidth=5,
-            zorder=1.5,
-            label="shaft (true)",
-            solid_capstyle="butt",
-        )
+        _draw_truth(panels["velocity"], first, unit.of(true_speed(first)))
         # Most of all errors set the scale; what leaves the panel is a spike.
         reach = np.percentile([unit.of(result.max) for result in scores if result.max is not None], 60)
         for curve in curves:

@@ -83,6 +83,16 @@ class Simulation:
         return self.lockstep.actual.n_clocks < self.wanted
 
 
+def _pulsed(spec: CoreSpec, source: str, trace: PinTrace, pulses: Pulses) -> PinTrace:
+    """Return the trace with pulses of other inputs; it raises ParameterError if one is before or after it."""
+    for name, rises in pulses(spec.tachometer).items():
+        if len(rises) and not 0 < rises[0] <= rises[-1] < trace.n_clocks:  # in clock 0 it would be high, not rise
+            end = format_time(spec.tick.seconds(trace.n_clocks))
+            raise ParameterError("pulse", f"must have times after 0 and before the end of {source}, at {end}")
+        trace = trace.with_pulses(name, rises, spec.tachometer.filter_clocks + 1)
+    return trace
+
+
 def simulate(
     spec: CoreSpec,
     source: str,
@@ -104,14 +114,9 @@ def simulate(
 
     It raises ValueError if the recordings do not last a tick, or have too many.
     """
-    trace: Trace
-    trace = PinTrace.of(recordings[0], spec) if spec.axes is None else AxesTrace.placed(recordings, spec)
+    trace: Trace = PinTrace.of(recordings[0], spec) if spec.axes is None else AxesTrace.placed(recordings, spec)
     if pulses is not None and isinstance(trace, PinTrace):
-        for name, rises in pulses(spec.tachometer).items():
-            if len(rises) and not 0 < rises[0] <= rises[-1] < trace.n_clocks:  # in clock 0 it would be high, not rise
-                end = format_time(spec.tick.seconds(trace.n_clocks))
-                raise ParameterError("pulse", f"must have times after 0 and before the end of {source}, at {end}")
-            trace = trace.with_pulses(name, rises, spec.tachometer.filter_clocks + 1)
+        trace = _pulsed(spec, source, trace, pulses)
     fewest = spec.tick.longest + spec.latency.tick  # after which there is something to report
     if trace.n_clocks < fewest:
         raise ValueError(

@@ -110,22 +110,7 @@ def check(
     name = str(written.get("module", ""))
     if path.name != f"{name}.json":
         raise ValueError(f"{path} must have the name of its module, {name}.json")
-    ours = all(written.get(entry) == here for entry, here in entries().items())
-    checked = Checked(path)
-    expected = _expected(spec, name, written, make)
-    hashes = json.loads(expected[path.name] or "")["files"]
-    for file, text in expected.items():
-        may_differ = Path(file).name == f"{name}.v" and not ours  # the core, and copies of it for frameworks
-        there = _text(path.parent / file)
-        found = _compared(there, text and _as_of(file, text, written), name if may_differ else None)
-        if hashes.get(file) not in (None, make.digest(there)) and there:
-            found = DIFFERENT, found[1] or "its hash is not that in the manifest"
-        elif hashes.get(file) and there and not ours and not may_differ:
-            found = SAME, ""  # as other versions wrote it
-        checked.files[file] = found
-    checked.files.update((file, (LEFT, "")) for file in left_files(path.parent, name, make.names(name), expected))
-    if written.get("tools") != entries()["tools"] and checked.files[path.name][0] == SAME:
-        checked.files[path.name] = EQUIVALENT, ""  # as far as these versions can tell
+    checked = Checked(path, files=_files(path, spec, name, written, make))
     if make.proof is not None:
         say("proving that its Verilog is the circuit")
         checked.files[f"{name}.v"] = _proven(path.parent / f"{name}.v", make.proof(spec, name, _bus(written)), written)
@@ -138,6 +123,26 @@ def check(
     clocks = json.loads(bench[f"{name}_vectors.json"])["clocks"]
     say(f"playing {clocks} clocks on its Verilog")
     return _simulated(checked, bench, name, sources, waves)
+
+
+def _files(path: Path, spec: AnySpec, name: str, written: dict[str, Any], make: Make) -> dict[str, tuple[str, str]]:
+    """Return how each file beside a manifest differs from what is made now, and why."""
+    ours = all(written.get(entry) == here for entry, here in entries().items())
+    found: dict[str, tuple[str, str]] = {}
+    expected = _expected(spec, name, written, make)
+    hashes = json.loads(expected[path.name] or "")["files"]
+    for file, text in expected.items():
+        may_differ = Path(file).name == f"{name}.v" and not ours  # the core, and copies of it for frameworks
+        there = _text(path.parent / file)
+        found[file] = _compared(there, text and _as_of(file, text, written), name if may_differ else None)
+        if hashes.get(file) not in (None, make.digest(there)) and there:
+            found[file] = DIFFERENT, found[file][1] or "its hash is not that in the manifest"
+        elif hashes.get(file) and there and not ours and not may_differ:
+            found[file] = SAME, ""  # as other versions wrote it
+    found.update((file, (LEFT, "")) for file in left_files(path.parent, name, make.names(name), expected))
+    if written.get("tools") != entries()["tools"] and found[path.name][0] == SAME:
+        found[path.name] = EQUIVALENT, ""  # as far as these versions can tell
+    return found
 
 
 def _expected(spec: AnySpec, name: str, written: Mapping[str, Any], make: Make) -> dict[str, str | None]:

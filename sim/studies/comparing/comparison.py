@@ -97,6 +97,17 @@ class Comparison(Shown):
         return [cost for tried in self.costs.values() for cost in front(tried)]
 
 
+def _instants(source: Source, curves: list[Curve], judge: Judge, earliest: float | None) -> Instants:
+    """Return when each curve is read; it raises ValueError if one is read less than twice."""
+    judge = replace(judge, begin=begun(curves, judge.begin))
+    instants = [judge.among(curve.reads) for curve in curves]
+    if min(map(len, instants)) < 2:
+        beyond = "" if earliest is None else ", and beyond --from"
+        what = source.name if judge.end == source.recording.duration else "--until"
+        raise ValueError(f"{what} must last until every method has a value{beyond}, longer than {_time(judge.end)}")
+    return instants
+
+
 def comparison(
     spec: TachometerSpec,
     specs: Specs,
@@ -138,17 +149,13 @@ def comparison(
         if tune:
             specs, n_tried = trial.tuned(specs)
     curves = [Setting(name, one).curve(*edges) for name, one in specs.items()]
-    judge = replace(judge, begin=begun(curves, begin))
-    instants = [judge.among(curve.reads) for curve in curves]
-    if min(map(len, instants)) < 2:
-        beyond = "" if earliest is None else ", and beyond --from"
-        what = source.name if judge.end == duration else "--until"
-        raise ValueError(f"{what} must last until every method has a value{beyond}, longer than {_time(judge.end)}")
+    instants = _instants(source, curves, judge, earliest)
+    scores = [score(curve, duration, at, source.true_speed) for curve, at in zip(curves, instants, strict=True)]
     return Comparison(
         spec=spec,
         specs=specs,
         curves=curves,
-        scores=[score(curve, duration, at, source.true_speed) for curve, at in zip(curves, instants, strict=True)],
+        scores=scores,
         instants=instants,
         true_speed=source.true_speed,
         recording=source.recording,

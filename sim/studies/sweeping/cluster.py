@@ -129,6 +129,12 @@ def _deaf_to_interrupts() -> Iterator[None]:
             signal.raise_signal(number)
 
 
+def _tasks(digests: list[str]) -> dict[str, list[str]]:
+    """Return digests of points that make a task together, by the first of them."""
+    size = min(max(len(digests) // _TASKS, 1), _MOST)
+    return {digests[first]: digests[first : first + size] for first in range(0, len(digests), size)}
+
+
 def rows(client: Client, points: Mapping[str, Point | LoopPoint], study: str = "sweeping.sweep") -> Iterator[Row]:
     """Yield rows of points, by their digests, as they come; Dask schedules them, and again where a worker was lost.
 
@@ -144,16 +150,10 @@ def rows(client: Client, points: Mapping[str, Point | LoopPoint], study: str = "
 
         return [*import_module(f"tachometry.sim.studies.{study}").run_packed(code, packed)]
 
-    size = min(max(len(points) // _TASKS, 1), _MOST)
-    digests = [*points]
-    tasks = {digests[first]: digests[first : first + size] for first in range(0, len(digests), size)}
+    tasks = _tasks([*points])
     # Keys of one kind: what the scheduler does for a task grows with the number of kinds.
     keys = [("point", first) for first in tasks]
-    # Points of a task go together: what they share is sent once, and what follows from a core is computed once.
-    packed = [pickle.dumps([points[digest] for digest in group]) for group in tasks.values()]
-    codes = [points[group[0]].code for group in tasks.values()]
-    futures = client.map(run, codes, packed, key=keys, batch_size=_AT_ONCE, pure=False)
-    del packed
+    futures = client.map(run, *_packed(points, tasks), key=keys, batch_size=_AT_ONCE, pure=False)
     # Nothing else may hold futures: a worker keeps the rows of one that is held, and where it dies, runs it again.
     arrived = as_completed(futures, with_results=True, raise_errors=False)
     del futures
@@ -168,17 +168,28 @@ def rows(client: Client, points: Mapping[str, Point | LoopPoint], study: str = "
             raise LostScheduler("lost the connection to the scheduler")
         if isinstance(error, ImportError):
             raise OSError(f"workers must have the same version of tachometry as this machine: {error}")
-        lost = 1
         if isinstance(error, KilledWorker):
-            group = tasks[error.task[1]]
-            lost = len(group)
-            which = f"one of {len(group)} points, the first that" if len(group) > 1 else "the point"
-            point = points[group[0]]
-            error = OSError(f"every worker died at {which} of {point.method} on {point.text}: {error}")
-        failed += [error] * lost
+            failed += _killed([points[digest] for digest in tasks[error.task[1]]], error)
+        else:
+            failed.append(error)
     if failed:
-        first = failed[0]
-        if not isinstance(first, ValueError | OSError):
-            raise first
-        more = f"; {len(failed)} of {plural(len(points), 'point')} could not be run"
-        raise ParameterError.longer(first, more) if isinstance(first, ValueError) else OSError(f"{first}{more}")
+        raise _summed(failed[0], f"; {len(failed)} of {plural(len(points), 'point')} could not be run")
+
+
+def _packed(points: Mapping[str, Point | LoopPoint], tasks: Mapping[str, list[str]]) -> tuple[list[str], list[bytes]]:
+    """Return the code of each task, and its points together: what they share is sent once, and computed once."""
+    codes = [points[group[0]].code for group in tasks.values()]
+    return codes, [pickle.dumps([points[digest] for digest in group]) for group in tasks.values()]
+
+
+def _killed(group: list[Point | LoopPoint], error: Exception) -> list[Exception]:
+    """Return an error for each point of a task at which workers died."""
+    which = f"one of {len(group)} points, the first that" if len(group) > 1 else "the point"
+    return [OSError(f"every worker died at {which} of {group[0].method} on {group[0].text}: {error}")] * len(group)
+
+
+def _summed(first: Exception, more: str) -> Exception:
+    """Return the error of the first point that could not be run, with how many could not."""
+    if isinstance(first, ValueError):
+        return ParameterError.longer(first, more)
+    return OSError(f"{first}{more}") if isinstance(first, OSError) else first

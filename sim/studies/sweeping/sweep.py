@@ -237,9 +237,8 @@ def run_point(point: Point) -> Row:
     duration = encoding.recording.duration
     trace = PinTrace.of(encoding.recording, spec)
     run = golden.run(spec, trace)
-    mismatches = None
-    if point.engine is not None:
-        mismatches = lockstep(spec, trace, pick(point.engine), expected=run).n_mismatches
+    engine = point.engine and pick(point.engine)
+    mismatches = lockstep(spec, trace, engine, expected=run).n_mismatches if engine else None
     curve = run_curve(point.method, spec, run, trace)
     instants = np.empty(0)
     if len(run.updates.clock):
