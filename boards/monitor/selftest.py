@@ -161,35 +161,30 @@ def _compared(
     captured = [(number, register) for number, register in enumerate(registers) if register.captured]
     at = [register.name for _, register in captured].index("TIME")
     n_clocks = max(words[at] for words in seen) + 1
-    trace = GoldenEmulator(*emulated(spec)).trace(changes, n_clocks)
-    if spec.external_tick:
-        trace = trace.with_tick_in(np.arange(1, n_clocks, spec.timing.tick_cycles))
+    played = GoldenEmulator(*emulated(spec)).trace(changes, n_clocks)
+    ticks = np.arange(1, n_clocks, spec.timing.tick_cycles)
+    trace = played.with_tick_in(ticks) if spec.external_tick else played
     bank = GoldenBank(registers, trace)
-    before = sum(words[at] < cleared for words in seen)
+    before = sum(words[at] < cleared for words in seen) * len(captured)
     reads = [Access(words[at], number) for words in seen for number, _ in captured]
-    reads.insert(before * len(captured), Access(cleared, registers["CONTROL"].offset // 4, 1))
-    golden = iter(bank.answers([*reads, Access(n_clocks - 1, registers["COUNTERS"].offset // 4)]))
+    reads.insert(before, Access(cleared, registers["CONTROL"].offset // 4, 1))
+    golden = [right for right, _ in bank.answers([*reads, Access(n_clocks - 1, registers["COUNTERS"].offset // 4)])]
+    del golden[before]
     compared = 0
     for k, words in enumerate(seen):
-        if k == before:
-            next(golden)
-        for (_, register), word in zip(captured, words, strict=True):
-            right, _ = next(golden)
+        answers = golden[k * len(captured) : (k + 1) * len(captured)]
+        for (_, register), word, right in zip(captured, words, answers, strict=True):
             if right is None:
                 continue
             wrong = right ^ word
-            if k == 0 or words[at] - seen[k - 1][at] > most:
-                # What was before the restart, or before a frame that was lost, is not known.
+            if k == 0 or words[at] - seen[k - 1][at] > most:  # what was before a restart or a lost frame is not known
                 wrong &= ~sum(field.mask for field in register.fields if field.name in _EVENTS)
             compared += 1
             if wrong:
-                told = f"{register.name} is 0x{word:08x}, not 0x{right:08x}, in clock {words[at]}"
-                return Result(name, k + 1, compared, told)
-    if before == len(seen):
-        next(golden)
-    counters, _ = next(golden)
+                other = f"{register.name} is 0x{word:08x}, not 0x{right:08x}, in clock {words[at]}"
+                return Result(name, k + 1, compared, other)
     (field,) = (field for field in registers["COUNTERS"].fields if field.name == "decode_errors")
-    wanted = (counters or 0) >> field.low & (1 << field.width) - 1
+    wanted = (golden[-1] or 0) >> field.low & (1 << field.width) - 1
     more = errors > wanted and changes[-1].settings.glitches > 0  # which go on after the last frame
-    difference = "" if errors == wanted or more else f"{errors} illegal transitions are counted, not {wanted}"
-    return Result(name, len(seen), compared + 1, difference)
+    other = "" if errors == wanted or more else f"{errors} illegal transitions are counted, not {wanted}"
+    return Result(name, len(seen), compared + 1, other)

@@ -18,7 +18,7 @@ from tachometry.cli.options.option import FilePath, GroupedCommand, option
 from tachometry.cli.reports.build import print_build
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control import LoopSpec
-from tachometry.spec.registers.buses import BUSES, bus_of
+from tachometry.spec.registers.buses import BUSES, Bus, bus_of
 from tachometry.spec.registers.demo import demo_map, demo_ports
 from tachometry.spec.registers.manifest import check_module_name
 
@@ -26,6 +26,15 @@ if TYPE_CHECKING:  # Amaranth is slow to import, and --help does not need it
     from tachometry.boards.fpga.build import Built
 
 _SERIAL = ("uart", "spi")  # buses that leave the FPGA over a few pins
+
+
+def _bus(name: str, baud: int | None, spec: TachometerSpec | LoopSpec) -> Bus:
+    """Return the bus; it raises ParameterError if the clock cannot have its baud rate."""
+    bus = bus_of(name, baud)
+    assert bus is not None
+    if bus.baud:
+        bus.bit_cycles(spec.timing.clock_hz)
+    return bus
 
 
 @click.command(
@@ -82,16 +91,12 @@ def build(
     """
     begun = time.monotonic()
     check_module_name(name)
-    on = bus_of(bus, baud)
-    assert on is not None
-    if on.baud:
-        on.bit_cycles(spec.timing.clock_hz)
+    on = _bus(bus, baud, spec)
     demo_map(spec)  # what cannot have registers is refused at once
     from tachometry.boards.fpga import build as builder
 
     builder.check_tools(board)
-    suffix = ".zip" if board.flow is None else board.flow.suffix
-    suffixes = (suffix, ".json", ".v")
+    suffixes = suffix, *_ = (".zip" if board.flow is None else board.flow.suffix, ".json", ".v")
     folder = default_folder(board) if directory is None else directory
     with Outputs({kind: folder / f"{name}{kind}" for kind in suffixes}) as outputs:
         from tachometry.boards.fpga.top import component, described
@@ -106,8 +111,8 @@ def build(
             verilog = verilog_of(component(spec, on), manifest, demo_ports(demo_map(spec), on))
         manifest["board"] |= _made(board, name, built)
         outputs[suffix].write_bytes(built.content)
-        outputs[".json"].write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8", newline="\n")
-        outputs[".v"].write_text(verilog, encoding="utf-8", newline="\n")
+        for kind, text in ((".json", json.dumps(manifest, indent=2) + "\n"), (".v", verilog)):
+            outputs[kind].write_text(text, encoding="utf-8", newline="\n")
     for kind in suffixes:
         click.echo(click.format_filename(folder / f"{name}{kind}"))
     click.echo()

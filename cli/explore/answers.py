@@ -11,7 +11,7 @@ import math
 import re
 import shlex
 from bisect import bisect_left
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from itertools import pairwise
 from pathlib import Path
@@ -149,6 +149,13 @@ def files(options: Texts) -> Answer:
     return {"name": f"{name}.zip", "files": [*texts], "zip": base64.b64encode(packed.getvalue()).decode()}
 
 
+def _greatest(values: NDArray[np.float64], starts: Sequence[int]) -> list[float | None]:
+    """Return the greatest of the values from each start to the next, None where there is no number."""
+    found = _numbers(values)
+    near = (found[first:last] for first, last in pairwise([*starts, len(found)]))
+    return [max((value for value in each if value is not None), default=None) for each in near]
+
+
 def curves(options: Texts) -> Answer:
     """Return error, delay and standstill of all methods over speed, that of the options first; its theory is `plan`'s.
 
@@ -162,16 +169,11 @@ def curves(options: Texts) -> Answer:
     every = plans.line.speed.tolist()
     starts = sorted({bisect_left(every, speed) for speed in near.tolist()})
 
-    def greatest(values: NDArray[np.float64]) -> list[float | None]:
-        found = _numbers(values)
-        near = (found[first:last] for first, last in pairwise([*starts, len(found)]))
-        return [max((value for value in each if value is not None), default=None) for each in near]
-
     def shown(name: str, spec: TachometerSpec, plan: Plan) -> Answer:
         error = plan.resolution + plan.disc + spec.velocity.rounding_lsb * spec.velocity.rad_per_s_per_lsb
         late = float(spec.tick.seconds(spec.latency.tick_to_velocity) + spec.times.filter_lag)
         delay = late + plan.measurement_time / 2 * (not spec.words.on_ramps)
-        errors, delays = greatest(unit.of(error)), greatest(delay)
+        errors, delays = _greatest(unit.of(error), starts), _greatest(delay, starts)
         known = [(one, late) for one, late in zip(errors, delays, strict=True) if one is not None and late is not None]
         worst = (f"{max(known)[0]:.4g}", shown_time(max(late for _, late in known))) if known else ("-", "-")
         rest, cells = spec.times.standstill_ticks * spec.timing.tick_seconds, cells_of(spec)

@@ -98,6 +98,16 @@ def _updates(run: Run) -> tuple[str, str]:
     return "updates", f"{len(run.updates.clock)} ({np.count_nonzero(run.updates.forced)} of them forced)"
 
 
+def _index(axis: Axis) -> str:
+    """Return how often the index came, where, and what was wrong with it."""
+    run = axis.run
+    last = f", the last at position {run.index.index_position[-1]}" if len(run.index.clock) else ""
+    wrong = {WIDE: "wider than a period", MISSED: "passed by without the state of --index-at"}
+    found = {text: len(run.tables.get(name, ())) for name, text in wrong.items()}
+    more = "".join(f"; {text} {number} times" for text, number in found.items() if number)
+    return f"{len(run.index.clock)} times{last}{index_distance(axis)}{more}"
+
+
 def _rows(axis: Axis) -> list[tuple[str, str]]:
     """Return rows of the table of a core of one axis: a name and its value."""
     spec, run, truth = axis.spec, axis.run, axis.truth
@@ -116,11 +126,7 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
     if spec.filter_clocks:
         rows.append(("edges filtered", f"{run.ticks.filtered_edges[-1]} (glitch filter)"))
     if spec.index:
-        last = f", the last at position {run.index.index_position[-1]}" if len(run.index.clock) else ""
-        wrong = {WIDE: "wider than a period", MISSED: "passed by without the state of --index-at"}
-        found = {text: len(run.tables.get(name, ())) for name, text in wrong.items()}
-        told = "".join(f"; {text} {number} times" for text, number in found.items() if number)
-        rows.append(("index", f"{len(run.index.clock)} times{last}{index_distance(axis)}{told}"))
+        rows.append(("index", _index(axis)))
     if spec.front_end.wheel is not None:
         synced = np.flatnonzero(run.ticks.synced)
         when = format_time(spec.tick.seconds(int(run.ticks.clock[synced[0]]))) if len(synced) else ""

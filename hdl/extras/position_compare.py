@@ -180,6 +180,16 @@ class FineGates(Gates):
         native = {"native_velocity": In(signed(self._native_width)), "native_position_fine": In(signed(width))}
         return native | dict.fromkeys(("native_valid", "tick", "moves"), In(1))
 
+    def _has_moved(self, m: Module) -> Signal:
+        """Return whether the update is of a tick in which something moved the position."""
+        moved, of_tick, of_update = Signal(), Signal(), Signal()
+        m.d.sync += moved.eq(self.moves | (moved & ~self.tick))
+        with m.If(self.tick):
+            m.d.sync += of_tick.eq(moved)
+        with m.If(self.native_valid):
+            m.d.sync += of_update.eq(of_tick)
+        return of_update
+
     def _awaited(self, m: Module, reached: Signal) -> Awaited:
         compare, carrying = self._compare, self._carrying
         layout = data.StructLayout({"velocity": signed(len(self.native_velocity) + carrying.shift)})
@@ -205,15 +215,6 @@ class FineGates(Gates):
             m.d.sync += catching.eq(catching - 1)
             with m.If(catching <= carrying.adds):
                 m.d.sync += late.eq(late + (new << FASTER_BITS))
-        # What moved the position since the tick before is of the next tick, and of its update.
-        moved = Signal()
-        of_tick = Signal()
-        of_update = Signal()
-        m.d.sync += moved.eq(self.moves | (moved & ~self.tick))
-        with m.If(self.tick):
-            m.d.sync += of_tick.eq(moved)
-        with m.If(self.native_valid):
-            m.d.sync += of_update.eq(of_tick)
         awaited = Signal.like(
             self.native_position_fine, init=compare.in_lsb(compare.start, carrying.position_fine_bits)
         )
@@ -221,7 +222,7 @@ class FineGates(Gates):
         m.d.comb += beyond.eq((place >> carrying.more_bits) - awaited)
         ahead = beyond[-1] ^ (compare.direction == BACKWARD)
         armed = Signal()
-        m.d.sync += armed.eq((armed | ahead) & ~(loads & of_update))
+        m.d.sync += armed.eq((armed | ahead) & ~(loads & self._has_moved(m)))
         with m.If(loads):
             m.d.sync += speed.eq(new)
         there = armed & ~ahead & (self.position_compare_count != compare.count if compare.count else 1)

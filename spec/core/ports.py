@@ -9,6 +9,15 @@ from tachometry.spec.language.port import INDEX, MISSED, TICK, UPDATE, WIDE, Por
 BOUNDS = {"velocity_lower": -1, "velocity_upper": 1}
 
 
+_RESTS = {
+    UPDATE: "The shaft stands still: at the end of this period the last count, or the reset, was the maximum time ago. "
+    "The velocity is 0.",
+    TICK: "The shaft rests: pulse_count was 0 in this period and in those before it for longer than the maximum time, "
+    "that is for standstill_after_ticks of the manifest; the time before the first period is one of them. It falls "
+    "with the next count.",
+}
+
+
 def ports_of(spec: Core, own: Iterable[Port]) -> Iterator[Port]:
     """Yield all ports of a core, in the order of the exported module; those of options and methods come last."""
     yield from _inputs(spec)
@@ -28,14 +37,7 @@ def ports_of(spec: Core, own: Iterable[Port]) -> Iterator[Port]:
     yield strobe("decode_error", f"One clock: {wrong}" if wrong else "Never high: one line cannot be wrong.")
     text = "pulse_count was saturated at the maximum speed; position is exact all the same."
     yield held(TICK, "overflow", help=text)
-    if spec.facts.rests_with == UPDATE:
-        text = "The shaft stands still: at the end of this period the last count, or the reset, was the maximum time "
-        text += "ago. The velocity is 0."
-    else:
-        text = "The shaft rests: pulse_count was 0 in this period and in those before it for longer than the maximum "
-        text += "time, that is for standstill_after_ticks of the manifest; the time before the first period is one of "
-        text += "them. It falls with the next count."
-    yield held(spec.facts.rests_with, "standstill", help=text)
+    yield held(spec.facts.rests_with, "standstill", help=_RESTS[spec.facts.rests_with])
     if spec.velocity.output:
         yield held(UPDATE, "velocity_overflow", help="This velocity was saturated to the width of the port.")
     if spec.age:
@@ -44,6 +46,11 @@ def ports_of(spec: Core, own: Iterable[Port]) -> Iterator[Port]:
         text += "between the ticks."
         yield held(TICK, "age", spec.timing.max_ticks.bit_length(), unit="ticks", help=text)
     yield from own
+    yield from _more_ports(spec)
+
+
+def _more_ports(spec: Core) -> Iterator[Port]:
+    """Yield ports of options."""
     yield from _index_ports(spec)
     if modulus := spec.front_end.modulus:
         text = f"Counts up to this period modulo {modulus}, from 0 on, since reset or since an index that resets. "

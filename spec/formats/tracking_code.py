@@ -8,7 +8,7 @@ the first two terms of a line at once.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cache, cached_property
@@ -90,6 +90,20 @@ class Instruction:
         return "; ".join(part for part in parts if part)
 
 
+_STARTS = ("log", "exp", "by", "chance")
+
+
+def _change(word: str, rest: Iterator[str]) -> dict[str, object]:
+    """Return what a word, with those that follow it, changes in the instruction before."""
+    if word in _STARTS:
+        return {"start": Start[word.upper()]}
+    if word == "keep":
+        return {"keep": True}
+    if word == "out":
+        return {"output": next(rest)}
+    return {"start": Start.TIMES if word == "product" else Start[word.upper()], "how": next(rest)}
+
+
 def _chain(words: list[str]) -> list[Instruction]:
     """Return the instructions of a line of the listing."""
     done: list[Instruction] = []
@@ -119,16 +133,8 @@ def _chain(words: list[str]) -> list[Instruction]:
             if limit != "zero":
                 add(Left.SUM, limit, "-")
             add(left, limit, "+")
-        elif word == "keep":
-            last(keep=True)
-        elif word in ("log", "exp", "by", "chance") and number:
-            last(start=Start[word.upper()])
-        elif word in ("over", "gain"):
-            last(start=Start[word.upper()], how=next(rest))
-        elif word == "product":
-            last(start=Start.TIMES, how=next(rest))
-        elif word == "out":
-            last(output=next(rest))
+        elif word in ("keep", "over", "gain", "product", "out") or (word in _STARTS and number):
+            last(**_change(word, rest))
         elif word in ("zero", "sum"):
             fresh = word == "zero"
         else:
@@ -231,8 +237,6 @@ def _joined(code: list[Instruction], labels: dict[str, int]) -> Code:
         ahead = [] if one.jump == Jump.ALWAYS else [place + 1]
         return any(takes_sign(following) for following in [*ahead, *([labels[one.target]] if one.target else [])])
 
-    made: list[Instruction] = []
-    places: list[int] = []  # where each one is among those that are made
     entered = {*labels.values()}
     labels = dict(labels)
     skipped: set[int] = set()
@@ -248,6 +252,13 @@ def _joined(code: list[Instruction], labels: dict[str, int]) -> Code:
                 labels.setdefault(target, term + 1)
                 code[place] = replace(code[term], jump=one.jump, target=target)
                 skipped |= set() if always else {term}
+    return _without(code, labels, skipped)
+
+
+def _without(code: list[Instruction], labels: dict[str, int], skipped: set[int]) -> Code:
+    """Return a code without these places, and without what nothing reaches."""
+    made: list[Instruction] = []
+    places: list[int] = []  # where each one is among those that are made
     entered = {labels[one.target] for one in code if one.target}
     for place, one in enumerate(code):
         places.append(len(made))

@@ -226,9 +226,7 @@ def read_options(
     It raises ParameterError if a text cannot be read, two options for one field are given, or one is missing.
     """
     given: dict[str, Option] = {}
-    for about in options_of(spec):
-        if about.name not in texts:
-            continue
+    for about in (one for one in options_of(spec) if one.name in texts):
         if about.needs and texts.get(about.needs, "no").strip().lower() in _NO:
             raise ParameterError(about.parameter, f"must be given together with --{about.needs}")
         if other := given.get(about.field):
@@ -237,7 +235,7 @@ def read_options(
     read: dict[str, Option] = {}
     for about in options_of(spec):
         if about.required and about.field not in given and about.extra is None:
-            others = (f", or --{one.name}" for one in options_of(spec) if one.field == about.field and one is not about)
+            others = [f", or --{one.name}" for one in options_of(spec) if one.field == about.field and one is not about]
             raise ParameterError(about.parameter, f"must be given{''.join(others)}")
         if about.field in given or about.text is not None:
             read.setdefault(about.field, given.get(about.field, about))
@@ -251,6 +249,11 @@ def read_options(
         else:
             read_at = about.fit_at if about.fit_at and about.name not in texts else about.parse_at
             values[about.field] = read_at(about.parameter, text, {**known, **values})
+    return _grouped(spec, values)
+
+
+def _grouped(spec: type[Any], values: dict[str, Any]) -> dict[str, Any]:
+    """Return values of fields: those of an extra, and of a part, are one value."""
     extras: dict[type[Any], dict[str, Any]] = {}
     for about in options_of(spec):
         if about.extra and about.field in values:
