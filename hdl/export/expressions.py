@@ -13,7 +13,8 @@ from typing import Any
 
 from amaranth.hdl import _nir as nir
 
-from tachometry.hdl.export.netlist import Circuit, number_of
+from tachometry.hdl.export.netlist import Circuit, extended, number_of, operator_of
+from tachometry.hdl.export.render import span
 from tachometry.spec.registers.manifest import KEYWORDS
 
 _KINDS = dict(zip(["+", "-", "*", "m"], ["sum", "difference", "product", "choice"], strict=True))
@@ -21,6 +22,7 @@ _KINDS |= dict.fromkeys(["<<", "u>>", "s>>"], "shifted")
 _WORDS = {"==": "is", "!=": "is_not", "u<": "below", "u>=": "from", "u>": "above", "u<=": "to", "&": "and", "|": "or"}
 _WORDS |= {"^": "xor", "+": "plus", "-": "minus", "s<": "below", "s>=": "from"}
 _OPPOSITE = {"==": "!=", "!=": "=="}
+_CHAINS = {"+": "+-", "-": "+-", "&": "&", "|": "|", "^": "^"}  # operators of one precedence, whose order is free
 _BRACKETS = re.compile(r"[\[({][^\[\](){}]*[\])}]")
 _LONGEST_NAME = 32  # of a name that is made of operands
 _LONGEST_CHAIN = 3  # tests of one value, each with a value that `?:` chooses
@@ -35,11 +37,6 @@ def number(value: Sequence[int]) -> str:
     width, made = len(value), number_of(value)
     digits = f"b{made}" if width == 1 else f"d{made}" if made < 1 << 16 else f"h{made:x}"
     return f"{width}'{digits}"
-
-
-def span(width: int) -> str:
-    """Return the range of a declaration, with a blank behind it; empty for one bit."""
-    return f"[{width - 1}:0] " if width > 1 else ""
 
 
 def part(name: str, first: int, count: int, width: int) -> str:
@@ -60,17 +57,13 @@ def _joined(pieces: Sequence[str]) -> str:
     return pieces[0] if len(pieces) == 1 else f"{{{', '.join(reversed(pieces))}}}"
 
 
-def _outside(text: str) -> str:
-    """Return an expression with a line for what it has in brackets."""
-    while (less := _BRACKETS.sub("_", text)) != text:
-        text = less
-    return text
-
-
-def operand(text: str) -> str:
-    """Return an expression as it stands within another."""
-    bare = _outside(text) if " " in text else text
-    return f"({text})" if " " in bare or bare.startswith(("&", "|", "^", "-")) else text
+def operand(text: str, chain: str = "") -> str:
+    """Return an expression as it stands within another; operators of a chain need no brackets."""
+    bare = text
+    while (less := _BRACKETS.sub("_", bare)) != bare:
+        bare = less
+    bound = all(each in chain for each in bare.split()[1::2])
+    return text if bound and not bare.startswith(("&", "|", "^", "-")) else f"({text})"
 
 
 class Scope:
@@ -124,25 +117,23 @@ class Scope:
 
     def text(self, value: Any) -> str:
         """Return a value as an expression of its width."""
-        pieces = [self._piece([net for _, net in nets]) for _, nets in groupby(enumerate(value), self._together)]
+        pieces = []
+        for (name, shift, width), placed in groupby(enumerate(value), self._source):
+            place, *more = (place for place, _ in placed)
+            if value[place].is_const:
+                pieces.append(number(value[place : place + 1 + len(more)]))
+            else:
+                pieces.append(
+                    part(name, place + shift, 1 + len(more), width) if width else self.made(value[place].cell)
+                )
         counted = [(text, len([*equal])) for text, equal in groupby(pieces)]
         return _joined([text if count == 1 else f"{{{count}{{{text}}}}}" for text, count in counted])
 
-    def _together(self, placed: tuple[int, Any]) -> Any:
-        """Return what the bits of a value have in common that are written together."""
+    def _source(self, placed: tuple[int, Any]) -> tuple[Any, int, int]:
+        """Return what the bits of a value have in common that are written together: name, shift and width."""
         place, net = placed
-        if net.is_const:
-            return None
-        name, bit, _ = self.home.get(net, (net.cell, net.bit, 0))
-        return name, bit - place
-
-    def _piece(self, nets: list[Any]) -> str:
-        if nets[0].is_const:
-            return number(nets)
-        if nets[0].cell in self.inline:
-            return self.made(nets[0].cell)
-        name, bit, width = self.home[nets[0]]
-        return part(name, bit, len(nets), width)
+        name, bit, width = ("", place, 0) if net.is_const else self.home.get(net, (net.cell, net.bit, 0))
+        return name, bit - place, width
 
     def made(self, cell_number: int) -> str:
         """Return the expression of a cell."""
@@ -152,20 +143,17 @@ class Scope:
         if isinstance(cell, nir.AsyncReadPort):
             return f"{self.memories[cell.memory]}[{self.text(cell.addr)}]"
         if len(cell.inputs) == 1:
-            return self._unary(cell.operator, *cell.inputs)
+            net = cell.inputs[0][0]
+            inner: Any = self.circuit.source(net) if net.is_cell and net.cell in self.inline else None
+            if cell.operator == "~" == operator_of(inner):
+                return self.text(*inner.inputs)
+            if cell.operator == "~" and operator_of(inner) in _OPPOSITE:
+                return self._binary(_OPPOSITE[inner.operator], *inner.inputs)
+            return f"{cell.operator.removeprefix('r')}{operand(self.text(*cell.inputs))}"
         if cell.operator != "m":
             return self._binary(cell.operator, *cell.inputs)
         test, yes, no = (operand(self.text(value)) for value in cell.inputs)
         return f"{test} ? {yes} : {no}"
-
-    def _unary(self, operator: str, a: Any) -> str:
-        inner = self.circuit.source(a[0]) if a[0].is_cell and a[0].cell in self.inline else None
-        if operator == "~" and isinstance(inner, nir.Operator) and a == self.circuit.whole[a[0].cell]:
-            if inner.operator in _OPPOSITE:
-                return self._binary(_OPPOSITE[inner.operator], *inner.inputs)
-            if inner.operator == "~":
-                return self.text(inner.inputs[0])
-        return f"{operator.removeprefix('r')}{operand(self.text(a))}"
 
     def _binary(self, operator: str, a: Any, b: Any) -> str:
         if operator == "*":
@@ -178,12 +166,12 @@ class Scope:
             return f"$signed({self.text(a)}) {operator[1:]} $signed({self.text(b)})"
         if operator == "+" and b.is_const and b[-1] == 1 and len(b) > 1:
             operator, b = "-", nir.Value.from_const(-number_of(b), len(b))
-        left = self.text(a)
+        left, chain = self.text(a), _CHAINS.get(operator, "")
         if operator == "==" and len(a) == 1 and b.is_const:
             return left if b[0] == 1 else f"~{operand(left)}"
-        right = self.literal(a, b) if operator in _OPPOSITE and b.is_const else operand(self.text(b))
-        same = operator in "&|^" and _outside(left).split()[1:2] == [operator]
-        return f"{left if same else operand(left)} {operator.removeprefix('u')} {right}"
+        compared = operator in _OPPOSITE and b.is_const
+        right = self.literal(a, b) if compared else operand(self.text(b), chain if operator != "-" else "")
+        return f"{operand(left, chain)} {operator.removeprefix('u')} {right}"
 
     def _product(self, a: Any, b: Any) -> str:
         """Return a product whose factors have no bits that only extend them."""
@@ -199,30 +187,24 @@ class Scope:
         """Return a constant that a value is compared with: of an enumeration, its name."""
         kind, names = self.kinds.get(value, ("", {}))
         made = len(constant), number(constant)
-        if number_of(constant) not in names:
-            return made[1]
-        name = plain(f"{kind}_{names[number_of(constant)]}").upper()
-        if self.constants.setdefault(name, made) != made:
-            return made[1]  # of another enumeration
+        name = plain(f"{kind}_{names.get(number_of(constant))}").upper()
+        if number_of(constant) not in names or self.constants.setdefault(name, made) != made:
+            return made[1]  # of no enumeration, or of another one
         self.taken.add(name)
         return name
 
     def indexed(self, cell: Any, name: str) -> tuple[list[str], str]:
-        """Return lines above the definition of a part that a value chooses, and its expression.
-
-        What is no name becomes a vector; it is as wide as the index reaches, which tools compare.
-        """
-        width, value = cell.width, cell.value
-        fill = value[-1] if cell.value_signed else nir.Net.from_const(0)
-        reach = (cell.stride << len(cell.offset)) - cell.stride + width
-        value = nir.Value([*value, *[fill] * (reach - len(value))])[:reach]
+        """Return the vector, as wide as its index reaches, above a part that a value chooses, and the expression."""
+        width, reach = cell.width, (cell.stride << len(cell.offset)) - cell.stride + cell.width
+        value = extended(cell.value if cell.value_signed else [*cell.value, *nir.Value.zeros(1)], reach)[:reach]
         lines, vector = [], self.text(value)
         if not vector.isidentifier():
             digits = f"{reach}'h{number_of(value):0{-(-reach // 4)}x}" if value.is_const else vector
             vector = self.unique(f"{name}_{'table' if value.is_const else 'from'}", True)
             lines.append(f"wire {span(reach)}{vector} = {digits};")
-        place = [*nir.Value.zeros(cell.stride.bit_length() - 1), *cell.offset]
-        at = self.text(nir.Value([*place, *nir.Value.zeros((reach - 1).bit_length() - len(place))]))
+        bits = (reach - 1).bit_length()
+        at = self.text(nir.Value([*cell.offset, *nir.Value.zeros(bits - len(cell.offset))]))
+        at += f" * {bits}'d{cell.stride}" if cell.stride > 1 else ""
         return lines, f"{vector}[{at}]" if width == 1 else f"{vector}[{at} +: {width}]"
 
     def tree(self, cell: Any, low: int = 0, high: int = 1 << 16) -> Body:
@@ -240,17 +222,14 @@ class Scope:
         return root
 
     def cases(self, test: int, bodies: Iterable[Body]) -> Iterator[tuple[Any, Body]]:
-        """Yield the cases of a choice that can be, with their bodies; the last may be None, which is met otherwise.
-
-        Others are lists of patterns, which are lists of nets with their levels.
-        """
+        """Yield the possible cases of a choice: patterns (values and levels), or None for all others, and bodies."""
         for net, body in zip(self.circuit.cells[test].inputs, bodies, strict=True):
             patterns = []
             for pattern in self.circuit.source(net).patterns if net.is_cell else ():
-                placed = zip(self.circuit.source(net).value, reversed(pattern), strict=True)
-                levels = [(bit, int(level)) for bit, level in placed if level != "-"]
-                if all(bit == level for bit, level in levels if bit.is_const):
-                    patterns.append([(bit, level) for bit, level in levels if bit.is_cell])
+                levels = zip(self.circuit.source(net).value, reversed(pattern), strict=True)
+                tests = [(bit, nir.Net.from_const(int(level))) for bit, level in levels if level != "-"]
+                if all(bit == level for bit, level in tests if bit.is_const):
+                    patterns.append([*map(nir.Value, zip(*(test for test in tests if test[0].is_cell), strict=True))])
             if net.is_const or [] in patterns:
                 yield None, body
                 return
@@ -259,16 +238,13 @@ class Scope:
 
     def compared(self, full: Iterable[tuple[Any, Body]]) -> Any:
         """Return the value that all cases compare with different numbers; empty if there is none."""
-        levels = [tuple(level) for patterns, _ in full for level in patterns or ()]
-        compared = {nir.Value(net for net, _ in one) for one in levels}
-        return compared.pop() if len(compared) == 1 and len(levels) == len({*levels}) else ()
+        tests = [(value, levels) for patterns, _ in full for value, levels in patterns or ()]
+        values = {value for value, _ in tests}
+        return values.pop() if len(values) == 1 and len(tests) == len({*tests}) else ()
 
     def condition(self, patterns: Any) -> str:
         """Return whether a value has one of the patterns."""
-        made = []
-        for pattern in patterns or ():
-            nets, levels = nir.Value(net for net, _ in pattern), [level for _, level in pattern]
-            made.append(self._binary("==", nets, nir.Value(map(nir.Net.from_const, levels))))
+        made = [self._binary("==", *pattern) for pattern in patterns or ()]
         return made[0] if len(made) == 1 else " | ".join(map(operand, made))
 
     def _chosen(self, cell: Any) -> str:
@@ -292,11 +268,10 @@ class Scope:
                 if len(branches) > _LONGEST_CHAIN:  # synthesis takes fewer cells for a sum of products
                     terms = " | ".join(f"({{{width}{{{test}}}}} & {operand(then)})" for test, then in branches)
                     branches = [(" | ".join(operand(test) for test, _ in branches), terms)]
-            while branches and branches[-1][1] == last:
-                branches.pop()
             for condition, then in reversed(branches):
-                test, bits = operand(condition), (then, last)
-                last = f"{test} ? {operand(then)} : {last}" if bits != ("1'b1", "1'b0") else condition
+                if then != last:
+                    chosen = f"{operand(condition)} ? {operand(then)} : {last}"
+                    last = condition if (then, last) == ("1'b1", "1'b0") else chosen
             now = last
         return now
 
@@ -309,12 +284,10 @@ class Scope:
                 yield f"{pad}{part(name, first, len(what), width)} <= {self.text(what)};"
                 continue
             full = [*self.cases(which, what)]
-            while full and not full[-1][1]:
-                full.pop()
             if len(full) > 2 and len(value := self.compared(full)) > 1:
                 yield f"{pad}case ({self.text(value)})"
                 for patterns, inner in full:
-                    levels = [self.literal(value, [level for _, level in one]) for one in patterns or ()]
+                    levels = [self.literal(value, level) for _, level in patterns or ()]
                     yield f"{pad}    {', '.join(levels) or 'default'}: begin"
                     yield from self.statements(inner, indent + 2)
                     yield f"{pad}    end"
@@ -335,10 +308,7 @@ class Scope:
         """Return a name for a cell that has none: of its low bits, its reader, or its operands."""
         circuit, whole = self.circuit, self.circuit.whole[cell_number]
         cell = circuit.cells[cell_number]
-        for value, names in self.called.items():
-            if len(value) < len(whole) and value == whole[: len(value)]:
-                return f"{names[0]}_wide"
-        operator = _operator(cell)
+        operator = operator_of(cell)
         if operator in _WORDS and all(net.is_const or net in self.home for value in cell.inputs for net in value):
             a = cell.inputs[0]
             texts = [self.literal(a, value) if value.is_const else self.text(value) for value in cell.inputs]
@@ -367,32 +337,28 @@ class Scope:
         """Return whether a cell is written where it is read: it has no name, and is read once and as a whole."""
         circuit, whole = self.circuit, self.circuit.whole[cell_number]
         cell, reads = circuit.cells[cell_number], circuit.reads[cell_number]
-        if isinstance(cell, nir.AssignmentList) and len(cell.assignments) > _LONGEST_CHOICE:
-            return False
-        alone = isinstance(cell, (nir.Part, nir.AsyncReadPort)) or _operator(cell) in ("*", "s>>")
+        long = isinstance(cell, nir.AssignmentList) and len(cell.assignments) > _LONGEST_CHOICE
+        alone = long or isinstance(cell, (nir.Part, nir.AsyncReadPort)) or operator_of(cell) in ("*", "s>>")
         if alone or whole in self.called or not circuit.flow[self.index].keys().isdisjoint(whole):
             return False
-        trivial = _operator(cell) == "~" and len(whole) == 1
+        trivial = operator_of(cell) == "~" and len(whole) == 1
         return (len(reads) == 1 or trivial) and {(first, count) for _, first, count in reads} <= {(0, len(whole))}
-
-
-def _operator(cell: Any) -> str:
-    return cell.operator if isinstance(cell, nir.Operator) else ""
 
 
 def merge(into: Body, body: Body, register: tuple[str, int]) -> None:
     """Add the assignments of a register to those of others, in its order, under the tests that they share."""
     place = 0
-    for kind, which, what in body:
+    for count, (kind, which, what) in enumerate(body):
         if kind == "=":
             while place < len(into) and into[place][0] == "=":
                 place += 1
             into.insert(place, ("=", (register, which), what))
-            place += 1
-            continue
-        found = next((at for at in range(place, len(into)) if into[at][:2] == (kind, which)), len(into))
-        if found == len(into):
-            into.append((kind, which, [[] for _ in what]))
-        for mine, theirs in zip(into[found][2], what, strict=True):
-            merge(mine, theirs, register)
-        place = found + 1
+        else:
+            tests = [each[:2] for each in into]
+            shared = (tests.index(each[:2], place) for each in body[count:] if each[:2] in tests[place:])
+            place = next(shared, len(into))  # before the next test that is there already
+            if (kind, which) not in tests[place:][:1]:
+                into.insert(place, (kind, which, [[] for _ in what]))
+            for mine, theirs in zip(into[place][2], what, strict=True):
+                merge(mine, theirs, register)
+        place += 1

@@ -14,13 +14,14 @@ from amaranth.hdl import _ast, _ir
 from amaranth.hdl import _nir as nir
 from amaranth.lib import wiring
 
-from tachometry.hdl.export.expressions import Body, Scope, merge, number, plain, span
-from tachometry.hdl.export.netlist import Circuit, runs
-from tachometry.hdl.export.render import ascii_of, comment, first_sentence, wrapped
+from tachometry.hdl.export.expressions import Body, Scope, merge, number, operand, part, plain
+from tachometry.hdl.export.netlist import Circuit, lanes, runs
+from tachometry.hdl.export.render import ascii_of, comment, first_sentence, port_comment, span, wrapped
 from tachometry.hdl.wires.commented_memory import CommentedMemory
 from tachometry.spec.language.port import Port
 
 _COMBINATIONAL = (nir.Operator, nir.Part, nir.AssignmentList, nir.AsyncReadPort)
+_LED = 1 << 16  # place among the ports of what is led through
 Path = tuple[str, ...]  # of a module: names of instances, the outermost first
 
 
@@ -47,10 +48,14 @@ class ModuleWriter(Scope):
         self.things = things
         self.comments = comments if index == 0 else {}  # of ports
         self.instances: list[tuple[ModuleWriter, str, str]] = []  # with their names in Amaranth, and their own
-        links = [*(self._top_ports() if index == 0 else self._boundary())]
+        links = [*self._boundary()]
+        if index == 0:
+            for name, (first, width) in circuit.top.ports_i.items():
+                nets = nir.Value(nir.Net.from_cell(0, first + bit) for bit in range(width))
+                links.append(Link(name, "input", nets))
+            links += [Link(name, "output", value) for name, value in circuit.top.ports_o.items()]
         links.sort(key=lambda link: (link.way, link.name != "clk", link.name != "rst"))
-        self.ports = [Link(name if index == 0 else self.unique(name), way, value) for name, way, value in links]
-        self.taken |= {port.name for port in self.ports}
+        self.ports = [Link(self.unique(name), way, value) for name, way, value in links]
         self.outputs: dict[Any, str] = {}
         for port in self.ports:
             if port.way == "input":
@@ -64,25 +69,19 @@ class ModuleWriter(Scope):
     def all_of(self, *kinds: type) -> list[int]:
         return [cell for cell in self.own if isinstance(self.circuit.cells[cell], kinds)]
 
-    def _top_ports(self) -> Iterator[Link]:
-        for name, (first, width) in self.circuit.top.ports_i.items():
-            yield Link(name, "input", nir.Value(nir.Net.from_cell(0, first + bit) for bit in range(width)))
-        yield from (Link(name, "output", value) for name, value in self.circuit.top.ports_o.items())
-
     def _boundary(self) -> Iterator[Link]:
         """Yield the ports that the component declares; what is led through has the name of its signal."""
         left = dict(self.circuit.flow[self.index])
         members = _members(self.things.get(self.module.name))
-        order = {name: place for place, name in enumerate(members.values())}
         found = []
         for signal, name in self.module.signal_names.items():
-            base, place = members.get(signal, name), order.get(members.get(signal), 1 << 16)
+            place, base = members.get(signal, (_LED, name))
             fields = self.circuit.signal_fields[signal]
             for path in fields:
                 if not any(longer[: len(path)] == path != longer for longer in fields):
                     whole = "_".join([base.removesuffix("__payload") if path else base, *map(str, path)])
                     found.append((place, whole, fields[path].value))
-        found.sort(key=lambda one: (one[0] == 1 << 16, -len(one[2]), "$" in one[1]))
+        found.sort(key=lambda one: (one[0] == _LED, -len(one[2]), "$" in one[1]))
         links = []
         for place, name, value in found:
             ways = {left.get(net, "") for net in value}
@@ -92,10 +91,10 @@ class ModuleWriter(Scope):
                 for net in value:
                     del left[net]
         yield from (link for *_, link in sorted(links, key=lambda one: one[:2]))
-        for first, count in runs(sorted(left)):
-            for way in ("input", "output"):
-                if value := nir.Value(nir.Net(net) for net in range(first, first + count) if left[net] == way):
-                    yield Link(self.near(value) or f"{self.module.name[-1]}_{way}", way, value)
+        for way in ("input", "output"):
+            for first, count in runs(sorted(net for net in left if left[net] == way)):
+                value = nir.Value(nir.Net(net) for net in range(first, first + count))
+                yield Link(self.near(value) or f"{self.module.name[-1]}_{way}", way, value)
 
     def _carrier(self, value: Any, made_up: str = "") -> str:
         """Name a value that this module makes: the output that it is, its signal, or what it is for."""
@@ -120,8 +119,8 @@ class ModuleWriter(Scope):
         copies = [port for port in self.ports if port.way == "output" and port.name not in self.driven]
         ends = [f"assign {port.name} = {self.text(port.value)};" for port in copies]
         written = {word for lines in (wires, *clocked) for line in lines for word in re.findall(r"[A-Z]\w+", line)}
-        read = [(name, *made) for name, made in self.constants.items() if name in written]
-        constants = [f"localparam {span(width)}{name} = {value};" for name, width, value in read]
+        read = (one for one in self.constants.items() if one[0] in written)
+        constants = [f"localparam {span(width)}{name} = {value};" for name, (width, value) in read]
         memories = [[*self._contents(cell)] for cell in self.memories]
         boxes = [[*self._instance(*instance)] for instance in self.instances]
         blocks = [[*constants, *self.declared], *memories, wires, *clocked, *boxes, ends]
@@ -172,13 +171,13 @@ class ModuleWriter(Scope):
         """Name a register, and declare it here unless it is among the ports."""
         cell, whole = self.circuit.cells[cell_number], self.circuit.whole[cell_number]
         name = self._carrier(whole, "state")
-        attributes, level = self.attributes[whole], ""
+        attributes, level = _attributes(self.attributes[whole]), ""
         if isinstance(cell, nir.FlipFlop):
-            attributes = cell.attributes | attributes
+            attributes = _attributes(cell.attributes | self.attributes[whole])
             level = f" = {number(nir.Value.from_const(cell.init, len(whole)))}"
-        self.registers[name] = _attributes(attributes), level
+        self.registers[name] = attributes, level
         if name not in self.driven:
-            self.declared.append(f"{_attributes(attributes)}reg {span(len(whole))}{name}{level};")
+            self.declared.append(f"{attributes}reg {span(len(whole))}{name}{level};")
 
     def _port_lines(self) -> Iterator[str]:
         for port in self.ports:
@@ -196,8 +195,7 @@ class ModuleWriter(Scope):
         for number_, choice in choices.items():
             cell, whole = self.circuit.cells[number_], self.circuit.whole[number_]
             level = nir.Value.from_const(cell.init, len(whole))
-            body: Body = [("=", 0, cell.data)]
-            reset = None
+            body, reset = Body([("=", 0, cell.data)]), None
             if choice is not None:
                 default = self.circuit.cells[choice].default
                 body = [*[("=", 0, default)] * (default != whole), *self.tree(self.circuit.cells[choice])]
@@ -223,12 +221,19 @@ class ModuleWriter(Scope):
         """Return the process of a port of a memory."""
         cell = self.circuit.cells[cell_number]
         word = f"{self.memories[cell.memory]}[{self.text(cell.addr)}]"
-        if isinstance(cell, nir.SyncReadPort):
-            enable, statement = cell.en, f"{self.home[self.circuit.whole[cell_number][0]][0]} <= {word};"
-        else:
-            enable, statement = cell.en[0], f"{word} <= {self.text(cell.data)};"
-        test = "" if enable == 1 else f"if ({self.text(nir.Value(enable))}) "
-        return [self._edge(cell), f"    {test}{statement}", "end"]
+        if isinstance(cell, nir.SyncWritePort):
+            return [self._edge(cell), *self._stored(cell, word), "end"]
+        data, enable = self.home[self.circuit.whole[cell_number][0]][0], self.text(nir.Value(cell.en))
+        lines = [_if([enable], f"{data} <= {word};")]
+        for port in map(self.circuit.cells.__getitem__, cell.transparent_for):
+            lines += self._stored(port, data, enable, self._binary("==", cell.addr, port.addr))
+        return [self._edge(cell), *lines, "end"]
+
+    def _stored(self, port: Any, word: str, *tests: str) -> Iterator[str]:
+        """Yield the assignments of the lanes that a port writes."""
+        for enable, first, last in lanes(port):
+            lane = part(word, first, last - first, len(port.data))
+            yield _if([*tests, self.text(enable)], f"{lane} <= {self.text(port.data[first:last])};")
 
     def _contents(self, cell_number: int) -> Iterator[str]:
         """Yield the declaration of a memory, and the words that it begins with."""
@@ -259,30 +264,26 @@ class ModuleWriter(Scope):
             yield from ((f"{name}.{old}", f"{own}.{new}") for old, new in inner.paths())
 
 
+def _if(tests: Iterable[str], statement: str) -> str:
+    parts = [text for text in tests if text != "1'b1"]
+    test = " & ".join(map(operand, parts) if parts[1:] else parts)
+    return f"    if ({test}) {statement}" if test else f"    {statement}"
+
+
 def _attributes(attributes: Mapping[str, Any]) -> str:
     """Return attributes as they stand before a declaration."""
     texts = {key: value if isinstance(value, int) else f'"{value}"' for key, value in attributes.items()}
     return "".join(f"(* {key} = {text} *) " for key, text in texts.items())
 
 
-def _comment(port: Port) -> str:
-    """Return the comment of a port of the top: its first sentence, unit and strobe."""
-    unit = f"; in {port.unit}" if port.unit else ""
-    strobe = f"; read with {port.held_by}" if port.held_by not in ("", port.name) else ""
-    return first_sentence(port.help).rstrip(".") + ascii_of(unit) + strobe
-
-
 def _members(thing: Any) -> Any:
-    """Return the names that a component has for its signals."""
-    found = _ast.SignalDict()
-    members = {} if thing is None else vars(thing)
+    """Return the places and names that a component has for its signals."""
+    members: Iterable[tuple[str, Any]] = vars(thing).items() if thing else ()
     if isinstance(thing, wiring.Component):
-        members = {"__".join(map(str, path)): value for path, _, value in thing.signature.flatten(thing)}
-    for name, member in members.items():
-        value = member.as_value() if isinstance(member, _ast.ValueCastable) else member
-        if isinstance(value, _ast.Signal) and not name.startswith("_"):
-            found[value] = name
-    return found
+        flat = thing.signature.flatten(thing)
+        members = (("__".join(map(str, path)), _ast.Value.cast(member)) for path, _, member in flat)
+    signals = (one for one in members if isinstance(one[1], _ast.Signal) and one[0][0] != "_")
+    return _ast.SignalDict((signal, (place, name)) for place, (name, signal) in enumerate(signals))
 
 
 def write(top: wiring.Component, name: str, ports: Iterable[Port] = ()) -> Written:
@@ -290,19 +291,13 @@ def write(top: wiring.Component, name: str, ports: Iterable[Port] = ()) -> Writt
 
     It raises Unwritten for an unknown kind of cell or an instance of a foreign module.
     """
-    ways = {wiring.In: _ir.PortDirection.Input, wiring.Out: _ir.PortDirection.Output}
-    comments = {port.name: _comment(port) for port in ports}
-    members = {
-        "__".join(map(str, path)): (_ast.Value.cast(value), ways[member.flow])
-        for path, member, value in top.signature.flatten(top)
-    }
+    comments = {port.name: port_comment(port) for port in ports}
+    flat = top.signature.flatten(top)
+    members = {"__".join(map(str, path)): (_ast.Value.cast(value), None) for path, _, value in flat}
     ordered = {port: members[port] for port in (*comments, *members) if port in members}
     design = _ir.Fragment.get(top, None).prepare(ports=ordered, hierarchy=(name,))
-    things = {
-        design.fragments[fragment].name: thing
-        for thing, fragment in design.elaboratables.items()
-        if not isinstance(thing, Module)  # of which components are made
-    }
+    named = ((design.fragments[fragment].name, thing) for thing, fragment in design.elaboratables.items())
+    things = {path: thing for path, thing in named if not isinstance(thing, Module)}  # of which components are made
     return _joined(Circuit(design), things, comments)
 
 
@@ -310,7 +305,6 @@ def _joined(circuit: Circuit, things: Mapping[Path, Any], comments: Mapping[str,
     """Return the modules as one text, equal ones once."""
     writers: dict[int, ModuleWriter] = {}
     first: dict[tuple[str, ...], int] = {}  # by its text: the module that has it
-    same = Counter[int]()
     for index in reversed(range(len(circuit.modules))):
         module = circuit.modules[index]
         inner = [one for one in module.submodules if one in writers]
@@ -318,20 +312,17 @@ def _joined(circuit: Circuit, things: Mapping[Path, Any], comments: Mapping[str,
             writer = writers[index] = ModuleWriter(circuit, index, things, comments)
             lines = writer.lines([(writers[one], circuit.modules[one].name[-1]) for one in inner])
             writer.index = first.setdefault(tuple(lines), index)
-            same[writer.index] += 1
-    text, names = list[str](), dict[str, int]()
+    same = Counter(writer.index for writer in writers.values())
+    text, names = list[str](), dict[str, str]()
     for body, index in sorted(first.items(), key=lambda one: one[1]):
         path = circuit.modules[index].name
         kind = type(things.get(path))
-        shared = same[index] > 1 and path in things
         snake = re.sub(r"(?<!^)(?=[A-Z])", "_", kind.__name__).lower()
-        name = plain(f"{path[0]}_{snake}" if shared else "_".join(path))
-        while name in names:
+        name = plain(f"{path[0]}_{snake}" if same[index] > 1 and path in things else "_".join(path))
+        while name in names.values():
             name += "_"
-        names[name] = index
+        names[f"{index}"] = name
         doc = "" if kind.__module__.startswith(("amaranth", "builtins")) else first_sentence(inspect.getdoc(kind) or "")
         text += [*comment(doc).splitlines(), f"module {name} (", *body, ""]
-    whole = "\n".join(text)
-    for name, index in names.items():
-        whole = whole.replace(f"\0{index}\0", name)
+    whole = re.sub("\0(.*?)\0", lambda found: names[found[1]], "\n".join(text))
     return Written(whole, dict(writers[0].paths()))

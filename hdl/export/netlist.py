@@ -15,6 +15,7 @@ from amaranth.hdl import _nir as nir
 
 OPERATORS = set("b r| r& r^ ~ - + * & | ^ << u>> s>> == != u< u> u<= u>= s< s> s<= s>= m".split())
 _LOW = set("+ - * & | ^ ~ << m".split())  # whose low bits need only low bits
+_SHARED = nir.Operator | nir.Matches | nir.PriorityMatch  # those of a module that are equal are written once
 _FORMS = nir.Top | nir.Matches | nir.PriorityMatch | nir.AssignmentList | nir.Memory | nir.AsyncReadPort
 _FORMS |= nir.Operator | nir.FlipFlop | nir.Part | nir.SyncReadPort | nir.SyncWritePort
 _LONGEST_INDEX = 9  # bits of an index into a vector
@@ -36,6 +37,18 @@ def runs(value: Any) -> Iterator[tuple[Any, int]]:
         yield from [(nets[0], len(nets))] if nets else []
 
 
+def lanes(port: Any) -> Iterator[tuple[Any, int, int]]:
+    """Yield the enables of a port that writes, each with the first bit that it enables and the one behind the last."""
+    for _, bits in groupby(range(len(port.en)), port.en.__getitem__):
+        first, *rest = bits
+        yield nir.Value(port.en[first]), first, first + len(rest) + 1
+
+
+def operator_of(cell: Any) -> str:
+    """Return the operator of a cell; "" of others."""
+    return cell.operator if isinstance(cell, nir.Operator) else ""
+
+
 class Circuit(nir.Netlist):
     """A netlist whose equal operators stand once, without the bits that nobody reads."""
 
@@ -47,12 +60,14 @@ class Circuit(nir.Netlist):
         self.connections: dict[Any, Any] = {}  # nets, by those in whose place they are read
         while self._simplify():
             self.resolve_all_nets()
-        while self._trim():
-            pass
-        self.live = self._live()
-        self.reads: dict[int, list[tuple[int, int, int]]] = defaultdict(list)  # by cell: reader, first bit, length
-        self.flow: list[dict[Any, str]] = [{} for _ in self.modules]  # nets that cross the boundary of a module
         self._follow()
+        while self._widen() or self._trim():
+            self._follow()
+        self.flow: list[dict[Any, str]] = [{} for _ in self.modules]  # nets that cross the boundary of a module
+        for number, reads in self.reads.items():
+            for reader, first, count in reads:
+                for bit in range(first, first + count):
+                    self._lead(nir.Net.from_cell(number, bit), self.cells[reader].module_idx)
 
     def _check(self, cell: Any) -> None:
         kind = type(cell).__name__
@@ -63,25 +78,19 @@ class Circuit(nir.Netlist):
                 kind += f" {cell.type} ({cell.name})"
             case nir.FlipFlop() if cell.arst != 0:
                 kind += " with an asynchronous reset"
-            case nir.Part() if cell.stride & (cell.stride - 1) or len(cell.offset) > _LONGEST_INDEX:
-                kind += f" with {len(cell.offset)} bits of index in steps of {cell.stride}"
-            case nir.SyncReadPort() if cell.transparent_for:
-                kind += " with transparency"
-            case nir.SyncWritePort() if len({*cell.en}) > 1:
-                kind += " with enables of lanes"
+            case nir.Part() if len(cell.offset) > _LONGEST_INDEX:
+                kind += f" with {len(cell.offset)} bits of index"
             case _ if isinstance(cell, _FORMS):
                 return
         where = ".".join(self.modules[cell.module_idx].name)
         raise Unwritten(f"--writer must be yosys for {kind} in {where}: legible Verilog has no form for it")
 
     def resolve_net(self, net: Any) -> Any:
-        """Return the net that is read in the place of another; Amaranth's cells ask for it."""
-        while net in self.connections:
+        while net in self.connections:  # Amaranth's cells ask for the net that is read in the place of another
             net = self.connections[net]
         return net
 
     def resolve_value(self, value: Any) -> Any:
-        """Return the nets that are read in the place of others."""
         return value if self.connections.keys().isdisjoint(value) else nir.Value(map(self.resolve_net, value))
 
     def source(self, net: Any) -> Any:
@@ -90,11 +99,7 @@ class Circuit(nir.Netlist):
 
     def tests(self, condition: Any) -> list[Any]:
         """Return the cases in which an assignment is made, the innermost first."""
-        found = []
-        while condition.is_cell:
-            found.append(condition)
-            condition = self.source(condition).en
-        return found
+        return [condition, *self.tests(self.source(condition).en)] if condition.is_cell else []
 
     def inputs(self, cell: Any) -> Iterator[Any]:
         """Yield all values that a cell reads; of assignments, also those that choose between them."""
@@ -118,8 +123,10 @@ class Circuit(nir.Netlist):
                 yield cell.addr
             case nir.SyncReadPort():
                 yield from (cell.addr, nir.Value(cell.en), nir.Value(cell.clk))
+                yield from (value for port in cell.transparent_for for value in self.inputs(self.cells[port]))
             case nir.SyncWritePort():
-                yield from (cell.data, cell.addr, nir.Value(dict.fromkeys(cell.en)), nir.Value(cell.clk))
+                yield from (cell.addr, nir.Value(cell.clk))
+                yield from (value for enable, first, last in lanes(cell) for value in (enable, cell.data[first:last]))
 
     def _simplify(self) -> bool:
         """Find wires for cells that only lead bits on, and for all but one of equal ones of a module."""
@@ -133,24 +140,37 @@ class Circuit(nir.Netlist):
                     cell.operator, cell.inputs = "!=", (a, nir.Value.zeros(len(a)))
                 case "m", test, (0,), (1,):
                     cell.operator, cell.inputs = "~", (test,)
-            value, key = _led(cell), _key(cell)
-            if value is None and key:
-                value = self.whole[first.setdefault((cell.module_idx, *key), number)]
+            value = _led(cell)
+            if value is None and isinstance(cell, _SHARED):
+                key = type(cell), *(vars(cell) | {"src_loc": None}).values()
+                value = self.whole[first.setdefault(key, number)]
             self.connections |= {bit: net for bit, net in zip(whole, value or (), strict=False) if bit != net}
         return len(self.connections) > before
 
+    def _widen(self) -> bool:
+        """Extend the terms of a sum that another extends, as tools join sums of one width; return whether any is."""
+        changed = False
+        for number, reads in self.reads.items():
+            term, whole, outer = self.cells[number], self.whole[number], self.cells[reads[0][0]]
+            if {reader for reader, *_ in reads} != {reads[0][0]} or not {*map(operator_of, (term, outer))} <= {*"+-"}:
+                continue
+            for value in outer.inputs:
+                exact = all(each[-2:-1] == each[-1:] for each in term.inputs)  # without a carry into the sign
+                if exact and value == extended(whole, len(value)) != whole:
+                    term.inputs = tuple(extended(each, len(value)) for each in term.inputs)
+                    self.whole[number] = nir.Value(nir.Net.from_cell(number, bit) for bit in range(len(value)))
+                    outer.inputs = tuple(self.whole[number] if each == value else each for each in outer.inputs)
+                    changed = True
+        return changed
+
     def _trim(self) -> bool:
         """Take bits away from sums and the like that nothing reads; return whether there were any."""
-        used: dict[int, int] = defaultdict(int)
-        for number in self._live():
-            for net in (net for value in self.inputs(self.cells[number]) for net in value if net.is_cell):
-                used[net.cell] = max(used[net.cell], net.bit + 1)
         changed = False
-        for number, width in used.items():
-            cell = self.cells[number]
+        for number, reads in self.reads.items():
+            cell, width = self.cells[number], max(first + count for _, first, count in reads)
             if width == len(self.whole[number]):
                 continue
-            if isinstance(cell, nir.Operator) and cell.operator in _LOW:
+            if operator_of(cell) in _LOW:
                 keep = {"m": (1, width, width), "<<": (width, 1 << 16)}.get(cell.operator, (width, width))
                 cell.inputs = tuple(value[:most] for value, most in zip(cell.inputs, keep, strict=False))
             elif isinstance(cell, nir.AssignmentList):
@@ -163,30 +183,23 @@ class Circuit(nir.Netlist):
             self.whole[number], changed = self.whole[number][:width], True
         return changed
 
-    def _live(self) -> set[int]:
-        """Return the cells on which an output depends."""
-        live, todo = set[int](), [0]
+    def _follow(self) -> None:
+        """Note the cells on which an output depends, and by what and in what pieces each is read."""
+        self.live: set[int] = set()
+        self.reads: dict[int, list[tuple[int, int, int]]] = defaultdict(list)  # by cell: reader, first bit, length
+        todo = [0]
         while todo:
             number = todo.pop()
-            if number in live:
+            if number in self.live:
                 continue
-            live.add(number)
+            self.live.add(number)
             cell = self.cells[number]
             if isinstance(cell, (nir.AsyncReadPort, nir.SyncReadPort)):
                 writes = (port for port, each in enumerate(self.cells) if isinstance(each, nir.SyncWritePort))
                 todo += [cell.memory, *(port for port in writes if self.cells[port].memory == cell.memory)]
-            todo += [net.cell for value in self.inputs(cell) for net in value if net.is_cell]
-        return live
-
-    def _follow(self) -> None:
-        """Note by what and in what pieces each cell is read, and lead nets through modules."""
-        for number in sorted(self.live):
-            cell = self.cells[number]
-            for value in self.inputs(cell):
-                for first, count in runs(value):
-                    self.reads[first.cell].append((number, first.bit, count))
-                    for bit in range(count):
-                        self._lead(nir.Net(first + bit), cell.module_idx)
+            for first, count in (run for value in self.inputs(cell) for run in runs(value)):
+                self.reads[first.cell].append((number, first.bit, count))
+                todo.append(first.cell)
 
     def _lead(self, net: Any, to: int) -> None:
         """Lead a net from the module that has its cell to another, through those between them."""
@@ -200,16 +213,9 @@ class Circuit(nir.Netlist):
                 to = self.modules[to].parent
 
 
-def _key(cell: Any) -> tuple[Any, ...]:
-    """Return what cells that compute the same have in common; nothing of registers and memories."""
-    match cell:
-        case nir.Operator():
-            return cell.operator, cell.inputs
-        case nir.Matches():
-            return cell.value, cell.patterns
-        case nir.PriorityMatch():
-            return "priority", cell.en, cell.inputs
-    return ()
+def extended(value: Any, width: int) -> Any:
+    """Return a value with its last bit repeated to a width."""
+    return nir.Value([*value, *value[-1:] * (width - len(value))])
 
 
 def _led(cell: Any) -> Iterable[Any] | None:
@@ -223,12 +229,10 @@ def _led(cell: Any) -> Iterable[Any] | None:
         return None
     zero = nir.Net.from_const(0)
     match cell.operator, *cell.inputs:
-        case "m", test, (1,), (0,):
-            return test
         case "m", test, yes, no if test.is_const or yes == no:
             return yes if test[0] == 1 else no
-        case "r&" | "r^", a if len(a) == 1:
-            return a
+        case "r&" | "r^", (net,):
+            return [net]
         case "!=", a, b if len(a) == 1 and not any(b):
             return a
         case "~", a if a.is_const:

@@ -34,9 +34,14 @@ def _literal(value: object) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
+def span(width: int) -> str:
+    """Return the range of a declaration in Verilog, with a blank behind it; empty for one bit."""
+    return f"[{width - 1}:0] " if width > 1 else ""
+
+
 def _shape(port: Port) -> str:
     """Return what stands in Verilog between the kind of a signal and its name."""
-    return "signed " * port.signed + f"[{port.width - 1}:0] " * (port.width > 1)
+    return "signed " * port.signed + span(port.width)
 
 
 _PLAIN = "<- floor( ) - <= >= * ^2 x .. - pi -> +- u u sqrt inf".split()
@@ -62,6 +67,13 @@ def first_sentence(text: str) -> str:
     """Return the first sentence of a text."""
     first = _SENTENCE.split(" ".join(text.split()))[0]
     return ascii_of(first.rstrip(".;") + "." if first else "")
+
+
+def port_comment(port: Port) -> str:
+    """Return the comment of a port of the top: its first sentence, unit and strobe."""
+    unit = f"; in {port.unit}" if port.unit else ""
+    strobe = f"; read with {port.held_by}" if port.held_by not in ("", port.name) else ""
+    return first_sentence(port.help).rstrip(".") + ascii_of(unit) + strobe
 
 
 def _vhdl_name(name: str) -> str:
