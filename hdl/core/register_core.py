@@ -90,11 +90,12 @@ class RegisterCore(wiring.Component):
         if "preset" in core.controls:
             m.d.comb += core.position_counter.value.eq(bank.preset_value)
         if modulus is not None:
-            total = core.position_modulo + bank.modulo_offset
+            counts, parts = modulus.as_integer_ratio()
+            total = core.position_modulo + (bank.modulo_offset if parts == 1 else 0)
             latest = Signal.like(self.position_modulo)
             kept = Signal.like(self.position_modulo)
             m.d.comb += [
-                self.position_modulo.eq(Mux(total >= modulus, total - modulus, total)),
+                self.position_modulo.eq(Mux(total >= counts, total - counts, total)),
                 latest.eq(Mux(core.tick, self.position_modulo, kept)),
                 bank.position_modulo.eq(latest),
             ]

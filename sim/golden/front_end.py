@@ -353,10 +353,10 @@ def count(
     if spec.front_end.index_once:
         columns["homed"] = homed(spec, steps, strobe)
     if spec.front_end.modulus is not None:
-        shaft = reached
-        if spec.front_end.index_resets:
-            shaft = reached - np.append(0, origins.captured)[np.searchsorted(steps.index, last, side="right")]
-        columns["position_modulo"] = shaft % spec.front_end.modulus
+        zeros = np.append(0, origins.captured * spec.front_end.index_resets)
+        counts, parts = spec.front_end.modulus.as_integer_ratio()
+        shaft = (reached - zeros[places(steps.index, last, "right")]) % counts
+        columns["position_modulo"] = shaft * parts % counts // parts
     if spec.filter_clocks:
         columns["filtered_edges"] = 2 * np.minimum(places(steps.swallowed, strobe, "right"), (1 << 15) - 1)
     if steps.wheel is not None:

@@ -130,9 +130,9 @@ class GoldenBank:
         values = self._held("preset_value", spec.preset or 0, clocks["preset"] + ahead)
         self._steps = self._pins.asked(spec, clocks["preset"], values, clocks["home"])
         self._tables = golden.tables(spec, self._trace, self._steps)
-        if spec.front_end.modulus is not None:
+        if (modulus := spec.front_end.modulus) is not None and modulus.denominator == 1:
             ticks = self._tables[TICK]
-            moved = (ticks.position_modulo + self._held("modulo_offset", 0, ticks.clock)) % spec.front_end.modulus
+            moved = (ticks.position_modulo + self._held("modulo_offset", 0, ticks.clock)) % int(modulus)
             self._tables[TICK] = ticks.having(position_modulo=moved)
         self._happened["indexed"] = self._tables[INDEX].clock
 

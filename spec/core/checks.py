@@ -79,17 +79,10 @@ def _check_place(spec: Core) -> None:
         raise ParameterError("preset", f"must be from {-half} to {half - 1}, a position, not {spec.preset}")
     if (counts := spec.front_end.modulus) is None:
         return
-    of, _, parts = (spec.position_modulo or "").partition("/")
-    turn = spec.encoder.counts_per_rev
-    if of == "rev" and turn % int(parts or 1):
-        raise ParameterError(
-            "position_modulo",
-            f"must be of whole counts: a revolution of {turn} has no {parts or 1} equal parts of these",
-        )
-    if of == "rev" and spec.encoder.ratio is not None and spec.front_end.index_resets:
+    if str(spec.position_modulo)[0] == "r" and spec.encoder.ratio is not None and spec.front_end.index_resets:
         raise ParameterError("position_modulo", "must be counts with --ratio and --index-reset: the encoder's index")
     if not 2 <= counts <= MAX_MODULUS:
-        raise ParameterError("position_modulo", f"must be from 2 to {MAX_MODULUS} counts, not {counts}")
+        raise ParameterError("position_modulo", f"must be from 2 to {MAX_MODULUS} counts, not {float(counts):.9g}")
 
 
 def _check_edge_error(spec: Core) -> None:

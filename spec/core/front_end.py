@@ -105,12 +105,12 @@ class FrontEnd:
         return self.asked.index is not None and not self.asked.index.once
 
     @property
-    def modulus(self) -> int | None:
-        """Counts within which `position_modulo` is; None: there is none."""
+    def modulus(self) -> Fraction | None:
+        """Counts within which `position_modulo` is, not always whole; None: there is none."""
         if self.asked.position_modulo is None:
             return None
         of, _, parts = self.asked.position_modulo.partition("/")
-        return self.asked.encoder.counts_per_rev // int(parts or 1) if of == "rev" else int(of)
+        return Fraction(self.asked.encoder.counts_per_rev if of == "rev" else int(of)) / int(parts or 1)
 
     @property
     def index_state(self) -> Levels | None:

@@ -1,6 +1,7 @@
 """Ports of the exported core of one axis."""
 
 from collections.abc import Iterable, Iterator
+from math import ceil
 
 from tachometry.spec.core.core import Core
 from tachometry.spec.language.port import INDEX, MISSED, TICK, UPDATE, WIDE, Port, held, pin, strobe
@@ -55,7 +56,7 @@ def _more_ports(spec: Core) -> Iterator[Port]:
     if modulus := spec.front_end.modulus:
         text = f"Counts up to this period modulo {modulus}, from 0 on, since reset or since an index that resets. "
         text += "It also changes between ticks. A preset does not change it."
-        yield held(TICK, "position_modulo", (modulus - 1).bit_length(), unit="counts", help=text)
+        yield held(TICK, "position_modulo", (ceil(modulus) - 1).bit_length(), unit="counts", help=text)
     if spec.external_tick:
         text = "One clock. Together with tick: the external tick was missing, and the core made one. Alone: an "
         text += "external tick came too early and was left out."

@@ -268,10 +268,10 @@ class RegisterMap:
         if spec.preset is not None:
             help = "Position that the input preset, or CONTROL.preset, sets."
             yield from position_words("PRESET", help, "preset_value", spec.position_width, spec.preset)
-        if spec.front_end.modulus is not None:
+        if (modulus := spec.front_end.modulus) is not None and modulus.denominator == 1:
             help = "Counts by which position_modulo is ahead of counts since reset, or since an index that resets."
-            width = (spec.front_end.modulus - 1).bit_length()
-            more: dict[str, Any] = {"unit": "counts", "bits": width, "least": 0, "most": spec.front_end.modulus - 1}
+            most = int(modulus) - 1
+            more: dict[str, Any] = {"unit": "counts", "bits": most.bit_length(), "least": 0, "most": most}
             field = Field("value", WORD, help=help, writable=True, port="modulo_offset", **more)
             yield "MODULO_OFFSET", help, (field,), {}
 

@@ -1,6 +1,7 @@
 """Numbers that options and pages name, computed here from their words."""
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from itertools import accumulate
 from typing import Any
@@ -27,6 +28,17 @@ def test_position_modulo_is_within_a_pole_pair(golden: Found, option: str, size:
     ticks = golden(words, range(0, 50 * len(steps) + 1, 50), 71_000, **turned(steps))["tick"]
     assert ticks.position_modulo.tolist() == [position % size for position in ticks.position.tolist()]
     assert ticks.position_modulo.max() == size - 1
+
+
+@pytest.mark.parametrize(("counts", "parts"), [(240, 7), (20_000, 21), (20_000, 7)])
+def test_position_modulo_counts_from_an_electrical_zero(golden: Found, counts: int, parts: int) -> None:
+    """No part has whole counts: every part begins with the first count that is not before its zero."""
+    steps = [1] * 2500 + [-1] * 4000
+    words = BASE | {"ppr": str(counts // 4), "position-modulo": f"rev/{parts}"}
+    ticks = golden(words, range(0, 50 * len(steps) + 1, 50), 326_000, **turned(steps))["tick"]
+    zeros = [math.ceil(part * counts / parts) for part in range(-50 * parts, 80 * parts)]
+    since = [place - zeros[bisect_right(zeros, place) - 1] for place in ticks.position.tolist()]
+    assert ticks.position_modulo.tolist() == since
 
 
 @pytest.mark.parametrize(("speed", "greatest"), [("1rev/s", 64), ("1.01rev/s", 64), ("60.9rpm", 64), ("59.9rpm", 63)])

@@ -1,5 +1,7 @@
 """A position that is set, an index that is taken once, and a position modulo a number."""
 
+import math
+from fractions import Fraction
 from itertools import product
 from pathlib import Path
 
@@ -26,6 +28,7 @@ CASES = (
     {"preset": "99", "index": "yes", "index-reset": "yes", "index-once": "yes", "filter": "2"},
     {"preset": "-3", "position-modulo": "7", "index": "yes", "index-reset": "yes", "position-compare": "2:3:0:1clk"},
     {"position-modulo": "rev", "index": "yes", "index-once": "yes", "position-width": "8"},
+    {"position-modulo": "rev/3", "index": "yes", "index-reset": "yes"},
 )
 
 
@@ -44,15 +47,16 @@ def test_no_count_is_lost_by_a_load_and_a_modulus_is_right_both_ways() -> None:
         assert shown["position"] == position
         position = ((row["value"] if row["load"] else position) + late + 8) % 16 - 8
         late = row["step"]
-    for modulus in (5, 8):
-        rng = np.random.default_rng(modulus)
-        turns = [{"step": int(step), "clear": int(rng.random() < 0.1)} for step in rng.integers(-1, 2, 400)]
+    for modulus in (5, 8, Fraction(16, 3), Fraction(23, 10)):
+        rng = np.random.default_rng(int(modulus))
+        turns = [{"step": int(step), "clear": int(rng.random() < 0.03)} for step in rng.integers(-1, 2, 400)]
         counted = clock_by_clock(modulo_counter.ModuloCounter(modulus), turns, ["count"])
-        late, count, ends = 0, 0, set()
+        late, place, ends = 0, 0, set[int]()
         for row, shown in zip(turns, counted, strict=True):
+            count = place - math.ceil(place // modulus * modulus)
             assert shown["count"] == count
-            ends |= {late} & {-1 if count == 0 else 1 if count == modulus - 1 else 0}
-            count = 0 if row["clear"] else (count + late) % modulus
+            ends |= {late} & {-1 if count == 0 else 1 if count >= modulus - 1 else 0}
+            place = 0 if row["clear"] else place + late
             late = row["step"]
         assert ends >= {-1, 1}
 

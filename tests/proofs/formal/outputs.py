@@ -1,5 +1,7 @@
 """These proofs are about what follows position and velocity, and what watches lines: a box each, side by side."""
 
+from fractions import Fraction
+
 from amaranth import Module
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
@@ -16,6 +18,7 @@ from tachometry.spec import Encoder, STachometer
 from tachometry.spec.core.extras.position_compare import Compare
 
 OPEN, MODULUS, LIMIT, PULSE, APART = 3, 5, 5, 2, 3
+PARTED, PARTS = 16, 3  # counts of a revolution, and its parts
 _WIDTH = 4  # of positions
 _PROBES = {
     "core_awaited": "compare.awaited",
@@ -23,6 +26,7 @@ _PROBES = {
     "core_since": "probe.since",
     "core_number": "both.number",
     "core_next": "both.awaited",
+    "core_rest": "parted.rest",
 }
 
 
@@ -33,6 +37,7 @@ class Outputs(wiring.Component):
         # By the names in their modules, where a mutant takes its place.
         self._boxes: dict[str, wiring.Component] = {
             "modulo": modulo_counter.ModuloCounter(MODULUS),
+            "parted": modulo_counter.ModuloCounter(Fraction(PARTED, PARTS)),
             "position": position_counter.PositionCounter(_WIDTH, preset=0),
             "home": index_capture.IndexCapture(_WIDTH, once=True),
             "probe": probe.Gates((1,), _WIDTH, 3),
@@ -63,6 +68,7 @@ class Outputs(wiring.Component):
 def _outputs(name: str, recovers: int = 0) -> Proof:
     """Return PO; from any state, once what an upset has changed is cleared, armed, set, or taken anew."""
     parameters = {"OPEN": OPEN, "MODULUS": MODULUS, "LIMIT": LIMIT, "APART": APART, "UPSET": int(recovers > 0)}
+    parameters |= {"PARTED": PARTED, "PARTS": PARTS}
     spec = STachometer(encoder=Encoder(1))
     depth = 1 if recovers else OPEN + 4
     return Proof(name, spec, "outputs", parameters, _PROBES, depth, box=Outputs, recovers=recovers)

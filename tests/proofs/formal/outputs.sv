@@ -6,6 +6,8 @@ module outputs #(
     parameter MODULUS = 5,
     parameter LIMIT = 5,
     parameter APART = 3,
+    parameter PARTED = 16,
+    parameter PARTS = 3,
     parameter UPSET = 0
 ) (
     input clk, input rst, input [1:0] way, input clear, input load, input arm, input level, input ready,
@@ -13,13 +15,15 @@ module outputs #(
     input signed [3:0] value, input signed [3:0] velocity
 );
   wire signed [1:0] step = way == 2 ? 0 : way;
-  wire [2:0] modulo, probe_time, health;
+  wire [2:0] modulo, parted, probe_time, health;
+  wire [1:0] core_rest;
   wire signed [3:0] position, index_position, probe_position, position_compare_position, both_position;
   wire index_valid, homed, probed, probe_valid, over_speed, open, seen, compare, position_compare_valid, both, both_valid;
   wire [7:0] faults;
   wire [15:0] position_compare_count;
   tachometer core (
       .clk(clk), .rst(rst), .modulo_step(step), .modulo_clear(clear), .modulo_count(modulo),
+      .parted_step(step), .parted_clear(clear), .parted_count(parted),
       .position_step(step), .position_clear(clear), .position_load(load), .position_value(value),
       .position_position(position),
       .home_level_z(level), .home_ready(ready), .home_position(value), .home_arm(arm), .home_homed(homed),
@@ -49,6 +53,7 @@ module outputs #(
   reg [2:0] modulo_ = 0, time_ = 0, since = 7, since_ = 7, health_ = 0;
   reg [7:0] faults_ = 0;
   reg [1:0] number = 0;
+  reg [3:0] turn_ = 0;  // PARTS times the counts, modulo PARTED
   reg [2:0] stands = 0;  // clocks since the position was set, in which it did not change; 0: it did
   reg [OPEN:0] history = 0;  // of `equal`, as far back as it was not cleared, the latest clock lowest
   wire hit = step == 1 && value == awaited && number != 2;
@@ -61,6 +66,7 @@ module outputs #(
     {health_, faults_, level_a_, level_b_} <= {health, faults, level_a, level_b};
     {was_a, was_b} <= {level_a_, level_b_};
     {pulse, pulse_both} <= rst ? 2'b0 : {position_compare_valid, both_valid};
+    turn_ <= turn;
     step_ <= rst ? 0 : step;
     late <= rst ? 0 : step_;
     level_ <= !rst && level;
@@ -81,6 +87,7 @@ module outputs #(
     fresh_home <= fresh_armed;
   end
   wire [2:0] after = modulo_ == MODULUS - 1 ? 0 : modulo_ + 1, before = modulo_ == 0 ? MODULUS - 1 : modulo_ - 1;
+  wire [3:0] turn = restarts ? 0 : (turn_ + PARTED + (late == 1 ? PARTS : late == 0 ? 0 : -PARTS)) % PARTED;
   wire signed [3:0] from = loaded ? value_ : position_;
   wire beyond = was_valid && (velocity_ > LIMIT || velocity_ < -LIMIT);
   wire restarts = was_reset || cleared;
@@ -110,10 +117,12 @@ module outputs #(
     po_edge: assert (!both_valid || (step_ != 0 && both_position == $signed(value_ - (step_ >>> 1))));
     if (!UPSET) begin
       po_range: assert (modulo < MODULUS && (health[2] ? health == 4 : health != 3));
+      po_parted: assert (parted == turn / PARTS);
       po_due: assert (position_compare_valid == hit_ && position_compare_count == number);
       po_aimed: assert (stands < 4 || core_number == (value_ >= 1) + (value_ >= 1 + APART));
       po_grid: assert (!both_valid || both_position == 1 || both_position == 1 + APART);
       // Lemmas: what the induction needs to know of the state.
+      lemma_rest: assert (core_rest == turn % PARTS);
       lemma_awaited: assert (core_awaited == awaited);
       lemma_waits: assert (core_armed == waits);
       lemma_since: assert (core_since == since);
