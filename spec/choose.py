@@ -10,6 +10,7 @@ from typing import Any
 from tachometry.spec.control import AnySpec, LoopSpec
 from tachometry.spec.core.described import CHOSEN
 from tachometry.spec.core.encoder import Encoder
+from tachometry.spec.core.extras import EXTRAS
 from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.core.timing import Timing
 from tachometry.spec.language.files import MOST_JSON, read_text
@@ -52,7 +53,9 @@ def of_texts(method: str, texts: Mapping[str, str | None], build_core: Build = _
 
     It raises ParameterError if the method has no such option, or a text is not what it must be.
     """
-    given = {name: text for name, text in texts.items() if text is not None}
+    given: Mapping[str, str] = {name: text for name, text in texts.items() if text is not None}
+    for extra in EXTRAS:
+        given = extra.respelled(given)
     method = method_named(method)
     few_machines = partial(_few_machines, build_core)
     if method != AUTO:

@@ -31,7 +31,7 @@ def _of_counts(what: str, text: str, known: Mapping[str, Any]) -> int:
 
 def _pole_pairs(what: str, text: str, known: Mapping[str, Any]) -> int:
     if known["sensor"] != "hall":
-        raise ParameterError(what, f"must be given with --sensor hall, not {known['sensor']}: type --ppr")
+        raise ParameterError(what, "must be given with --sensor hall or together with --lines: type --lines")
     return parse_whole(what, text)
 
 
@@ -93,7 +93,8 @@ class Encoder:
                 **_OF_TURN,
             ),
             Option(
-                "Pole pairs of the motor with halls (instead of --ppr). The halls have as many periods in a turn.",
+                "Pole pairs of the motor. With --sensor hall instead of --ppr: the halls have as many periods in a "
+                "turn. Together with --lines, --ppr or --cpr the same as --electrical.",
                 name="pole-pairs",
                 parse_at=_pole_pairs,
                 **_OF_TURN,

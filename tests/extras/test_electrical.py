@@ -22,7 +22,7 @@ from tachometry.sim.golden.extras import electrical as golden_angle
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.extras import expected_rows
 from tachometry.sim.studies.lockstep import lockstep
-from tachometry.spec import of_texts
+from tachometry.spec import of_options, of_texts
 from tachometry.spec.core.extras.electrical import ElectricalAngle
 from tachometry.spec.formats.angles import Angles
 
@@ -70,6 +70,18 @@ test_refusals = refused(
         "lead=3": "lead must be given together with --electrical",
     }
 )
+
+
+def test_pole_pairs_beside_the_lines_are_those_of_the_motor() -> None:
+    """With halls they are those of the halls."""
+    texts = {"clock": "48MHz", "tick": "100us", "pole-pairs": "7", "lead": "1tick"}
+    for encoder in ({"lines": "1000"}, {"cpr": "20000"}, {"ppr": "90", "sensor": "up-down"}):
+        spec = of_texts("auto", texts | encoder)
+        assert (spec.options["electrical"], "pole-pairs" in spec.options) == ("7", False)
+        assert of_options(spec.options).options == spec.options
+    with pytest.raises(ValueError, match="pole_pairs must not be given together with --lines"):
+        of_texts("s", texts | {"lines": "1000", "electrical": "7"})
+    assert not of_texts("s", {"clock": "48MHz", "pole-pairs": "7", "sensor": "Hall"}).extras
 
 
 FAULTS = (

@@ -59,6 +59,13 @@ class ElectricalAngle(Extra):
 
     sincos: bool = option(False, _SINCOS, tests=("", "yes"), tacit=True)
 
+    @classmethod
+    def respelled(cls, texts: Mapping[str, str]) -> Mapping[str, str]:
+        halls = texts.get("sensor", "").strip().lower() == "hall"
+        if halls or cls.name in texts or not {"lines", "ppr", "cpr"} & texts.keys():
+            return texts
+        return {cls.name if name == "pole-pairs" else name: text for name, text in texts.items()}
+
     def angles(self, spec: Numbers) -> Angles:
         """Return the formats of the angles of a core."""
         counts, tick, bits = spec.encoder.encoder_counts, spec.timing.tick_cycles, spec.velocity.native_frac_bits

@@ -36,6 +36,11 @@ class Extra:
         """Return the extra of this class among those of a core."""
         return next((one for one in extras if isinstance(one, cls)), None)
 
+    @classmethod
+    def respelled(cls, texts: Mapping[str, str]) -> Mapping[str, str]:
+        """Return texts of options, with its own options in place of others that mean the same."""
+        return texts
+
     def missing(self) -> Mapping[str, str]:
         """Return the refusals of kinds of core that cannot have it: axes, demo, loop or rio."""
         return {}
