@@ -13,11 +13,13 @@ import readme
 from amaranth.hdl import Fragment
 from amaranth.hdl._ir import PortDirection, build_netlist
 from amaranth.lib import wiring
+from compare import rows
 from cores import CONFIGURATIONS as CONFIGURATIONS
 from health import EXAMPLES, told
 from motions import OTHERS, SITUATIONS
 from pages import MEASURED, block, read_table
 from pictures import CORE as MONITORED
+from pictures import commands
 from situations import RIVALS, core, errors
 from tracking import errors as tracking_errors
 from tracking import rms
@@ -81,6 +83,7 @@ def watched() -> list[object]:
 # By file: a sample of a part of it, which is a block, a row, or the whole.
 MADE_OF: dict[str, Callable[[str], object]] = {
     "README.md": lambda _: [netlist(core_of(core)) for core in readme.cores().values()],
+    "docs/guides/angle.png": lambda _: rows(f"tachometry {commands()['angle.png'].partition(' --plot')[0]}"),
     "docs/guides/explore.png": lambda _: explored(),
     "docs/guides/monitor.svg": lambda _: watched(),
     "docs/guides/sweep.png": lambda _: block(MEASURED / "sweep.md", "errors"),

@@ -95,8 +95,8 @@ def explore(picture: Path) -> None:
 
 def commands() -> dict[str, str]:
     """Return the commands of the guides that draw a picture in build/, by its name."""
-    page = (GUIDES / "captures.md").read_text(encoding="utf-8")
-    found = re.findall(r"^tachometry (.* --plot build/(wheel\w*.png))$", page, re.MULTILINE)
+    pages = "".join((GUIDES / page).read_text(encoding="utf-8") for page in ("captures.md", "foc.md"))
+    found = re.findall(r"^tachometry (.* --plot build/((?:wheel|angle)\w*.png))$", pages, re.MULTILINE)
     return {"sweep.png": "sweep docs/guides/sweep.toml", **{name: words for words, name in found}}
 
 

@@ -307,7 +307,7 @@ def compare(specs: Sequence[TachometerSpec], motion: str, **encoder: Unpack[Enco
     if len(named) != len(specs) or not specs:
         raise ValueError("specs must be of different methods, at least one")
     truth = _recorded(specs[0], motion, 0, encoder)
-    source = Source("motion", truth.recording, truth.true_speed)
+    source = Source("motion", truth.recording, truth.true_speed, truth.true_angle)
     return comparison(
         specs[0],
         dict(named),

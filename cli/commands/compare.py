@@ -135,7 +135,9 @@ def compare(
     missing = {name: one.missing for name, one in BASELINES.items() if methods.strip() == "all" and one.missing}
     named = named_methods(methods, make, [name for name in BASELINES if name not in missing])
     spec = next((spec for spec in named.specs.values() if spec is not None), None) or make("s", {})
-    for name in () if size else (*_NO_VELOCITY, *(extra.name.replace("_", "-") for extra in EXTRAS)):
+    for name in (
+        () if size else (*_NO_VELOCITY, *(extra.name.replace("_", "-") for extra in EXTRAS if not extra.compared))
+    ):
         if name in spec.options:
             raise ValueError(f"--{name} must be left out, or given together with --size: it changes no velocity")
     source = _source(record, capture, read, spec)
@@ -177,7 +179,7 @@ def _source(
         return Source(str(capture), read(capture, spec), None)
     assert record is not None
     truth = record(spec)
-    return Source("--motion", truth.recording, truth.true_speed)
+    return Source("--motion", truth.recording, truth.true_speed, truth.true_angle)
 
 
 def _write(result: Comparison, sizes: Mapping[str, Measurement], outputs: Outputs) -> None:

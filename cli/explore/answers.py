@@ -212,7 +212,7 @@ def respond(options: Texts, motion: Texts) -> Answer:
                 f"must be of at most {_MOST} counts and ticks, not {max(edges, ticks):.3g}: take tachometry compare",
             )
         truth = record(core)
-        return _response(options, core, Source("--motion", truth.recording, truth.true_speed))
+        return _response(options, core, Source("--motion", truth.recording, truth.true_speed, truth.true_angle))
 
     core = _core(options)
     return _run(_moved, motion, of)

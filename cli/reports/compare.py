@@ -35,6 +35,12 @@ def print_comparison(comparison: Comparison, sizes: Mapping[str, Measurement], l
         times = f", {second / least:.2g} times as much" if least else ""
         shown = f"{best} has the least error, {unit.of(least):.3g} {unit.name}; {other} is next{times}"
         console.print(Text(shown))
+    if comparison.position_angle:
+        rms, most = comparison.position_angle
+        console.print(
+            "angle: its error at the instant of use; float models have ODrive's interpolation of counts. The position "
+            f"alone has {rms:.3g} RMS, {most:.3g} max"
+        )
     console.print()
     for row in scores:
         tried = f"; best of {comparison.n_tried[row.name]} settings" if row.name in comparison.n_tried else ""
@@ -69,12 +75,14 @@ def shown_scores(
             "-" if row.rms is None else f"{unit.of(row.rms):.4g}",
             "-" if row.max is None else f"{unit.of(row.max):.4g}",
             time(row.delay),
+            *(() if row.angle_rms_deg is None else (f"{row.angle_rms_deg:.3g}", f"{row.angle_max_deg:.3g}")),
             *(_size_cells(sizes.get(row.name)) if sizes else ()),
         )
         for row in comparison.scores
     ]
     errors = (f"RMS ({unit.name})", f"max ({unit.name})")
-    heads = ("method", "updates/s", "T_m mean", "T_m worst", *errors, "delay")
+    angles = ("angle RMS (deg el.)", "angle max") if comparison.position_angle else ()
+    heads = ("method", "updates/s", "T_m mean", "T_m worst", *errors, "delay", *angles)
     return [*heads, *(_SIZE if sizes else ())], rows
 
 
@@ -87,7 +95,8 @@ def comparison_table(
 ) -> tuple[list[str], Iterator[list[object]]]:
     """Return heads and rows of the table as CSV."""
     scores, unit = comparison.scores, comparison.spec.scale.shown_unit
-    names = [name for name in vars(scores[0]) if name != "what"]
+    unknown = {"what"} if comparison.position_angle else {"what", "angle_rms_deg", "angle_max_deg"}
+    names = [name for name in vars(scores[0]) if name not in unknown]
     figures = list(_SIZE) if sizes else []
 
     def cells(row: Score) -> list[object]:

@@ -319,6 +319,10 @@ class Encoding:
             return -np.abs(speed) if self.encoder.reverse else np.abs(speed)
         return speed
 
+    def true_angle(self, t: ArrayLike) -> FloatArray:
+        """Return angle of the shaft in rad, vibration included, at times `t` in seconds."""
+        return self._shaft.angle(t)
+
     def motion_speed(self, t: ArrayLike) -> FloatArray:
         """Return speed of the motion in rad/s, without vibration, at times `t` in seconds."""
         return self.motion.speed(t)

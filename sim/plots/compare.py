@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from tachometry.sim.plots.style import COLOURS, columns, in_words, place_panels, save_figure
+from tachometry.sim.plots.style import COLOURS, FloatArray, columns, in_words, place_panels, save_figure
 from tachometry.sim.studies.comparing.compare import Curve, Instants, Score, TrueSpeed
 from tachometry.spec import TachometerSpec
 
@@ -56,8 +56,10 @@ def _draw(
     values = [unit.of(curve.estimate.at(at)) for curve, at in zip(curves, instants, strict=True)]
     # What goes up and down most is drawn behind, as it would bury the others.
     calmest = sorted(range(len(curves)), key=lambda place: float(np.sum(np.abs(np.diff(values[place])))))
-    least = min((result.rms for result in scores if result.rms is not None), default=None)
-    for place, (curve, result, colour) in enumerate(zip(curves, scores, COLOURS * len(curves), strict=False)):
+    errors = [_error(spec, *of, true_speed) for of in zip(curves, scores, instants, strict=True)] if true_speed else []
+    least = min((rms for _, _, rms, _ in errors), default=None)
+    name = unit.name if curves[0].angle is None else "electrical degrees at the instant of use"
+    for place, (curve, colour) in enumerate(zip(curves, COLOURS * len(curves), strict=False)):
         at, held = instants[place], values[place]
         kept = columns(at, held)
         line: dict[str, Any] = {"linewidth": 0.7, "drawstyle": "steps-post", "label": _words(curve).partition(":")[0]}
@@ -65,26 +67,37 @@ def _draw(
         panels["velocity"].plot(at[kept], held[kept], color=colour, zorder=depth, **line)
         if true_speed is None:
             continue
-        words = f"RMS {unit.of(result.rms):.3g} {unit.name}"
-        axes = panels[curve.name]
-        _draw_error(axes, at, held - unit.of(true_speed(at)), colour, (_words(curve), words), result.rms == least)
+        at, error, rms, _ = errors[place]
+        words = (_words(curve), f"RMS {rms:.3g} {name.partition(' at')[0]}")
+        _draw_error(panels[curve.name], at, error, colour, words, rms == least)
     first = instants[0]
     if true_speed is not None:
         _draw_truth(panels["velocity"], first, unit.of(true_speed(first)))
         # Most of all errors set the scale; what leaves the panel is a spike.
-        reach = np.percentile([unit.of(result.max) for result in scores if result.max is not None], 60)
+        reach = np.percentile([most for *_, most in errors], 60)
+        reach *= 1.1 if curves[0].angle is None else 1.7  # which leaves room for the words
         for curve in curves:
-            panels[curve.name].set_ylim(-1.1 * reach, 1.1 * reach)
+            panels[curve.name].set_ylim(-reach, reach)
     panels["velocity"].set_ylabel(f"velocity ({unit.name})")
     n_columns = len(curves) // 2 + 1  # two lines, which fit below the title
     panels["velocity"].legend(
         loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.1, ncols=n_columns, columnspacing=1.2, fontsize=7
     )
     last = list(panels.values())[-1]
-    below = f"; below the velocities the errors in {unit.name}, at one scale" if true_speed else ""
+    below = f"; below the velocities the errors in {name}, at one scale" if true_speed else ""
     last.set_xlabel(f"time (s){below}")
     last.set_xlim(first[0], first[-1])
     return figure
+
+
+def _error(
+    spec: TachometerSpec, curve: Curve, result: Score, at: FloatArray, true_speed: TrueSpeed
+) -> tuple[FloatArray, FloatArray, float, float]:
+    """Return times (s), errors of the angle there or else of the velocity, their RMS, and the greatest."""
+    if curve.angle is not None:
+        return *curve.angle, result.angle_rms_deg or 0.0, result.angle_max_deg or 0.0
+    unit = spec.scale.shown_unit
+    return at, unit.of(curve.estimate.at(at) - true_speed(at)), unit.of(result.rms or 0.0), unit.of(result.max or 0.0)
 
 
 def _words(curve: Curve) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from extras.harness import Case, agreeing, in_icarus, on_a_bus, refused
 from proofs.formal.mutants import mutant
+from support.command import run
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.extras import electrical
@@ -198,6 +199,22 @@ def test_the_angle_is_that_of_the_motor_at_its_use(method: str, motion: str, rms
     error = errors(method, motion, words, 400, disc)
     assert np.std(error) < rms
     assert np.abs(error - np.median(error)).max() < worst
+
+
+def test_comparisons_have_the_error_at_the_instant_of_use(capsys: pytest.CaptureFixture[str]) -> None:
+    """The position alone is 1.5 ticks behind; ODrive's loop is right at a constant speed, and late in a ramp."""
+    words = "--lines 1000 --clock 48MHz --tick 100us --pole-pairs 7 --lead 1.5tick --methods track,mt,odrive"
+    for motion, disc, position, odrive in (
+        ("constant:100rad/s:150ms", "--phase-error 10 --nonuniformity 0.1 --jitter 0.05", (6.0, 6.1), (0.1, 0.4)),
+        ("ramp:0:200rad/s:50ms", "", (7.5, 11.0), (0.6, 2.0)),
+    ):
+        assert run(*f"compare {words} --motion {motion} --from 25ms {disc}".split()) == 0
+        rows = [line.split() for line in capsys.readouterr().out.splitlines() if line]
+        rms = {row[0]: float(row[-2]) for row in rows[1:4]}
+        alone = next(float(row[row.index("has") + 1]) for row in rows if row[0] == "angle:")
+        assert position[0] < alone < position[1]
+        assert odrive[0] < rms["odrive"] < odrive[1]
+        assert (rms["track"] < 0.01, 2 * rms["track"] < rms["mt"] < 0.2) == (True, True), rms
 
 
 @pytest.mark.parametrize(

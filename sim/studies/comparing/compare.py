@@ -40,6 +40,8 @@ class Curve:
     measurement_time: FloatArray
     reads: FloatArray
     ages: FloatArray | None = None  # shape (n,), seconds: of each velocity when it is new; None: it is that of its time
+    # times (s), and angles as the port shows them; in a `Comparison` their errors, in degrees
+    angle: tuple[FloatArray, FloatArray] | None = None
 
     def instants_of(self, instants: FloatArray) -> FloatArray:
         """Return the instants (s) that the velocities held at some instants belong to."""
@@ -74,6 +76,7 @@ class Score:
     - `delay`, seconds: Mean age of `velocity_smooth`; else shift of the true speed that comes closest. None where it
       says nothing: the true speed is constant, or the curve would be early, or hardly any of the error goes with the
       shift, or an offset might be its cause as well.
+    - `angle_rms_deg`, `angle_max_deg`, degrees: Error of an angle at the instant of its use, if cores show one.
     """
 
     name: str
@@ -84,12 +87,16 @@ class Score:
     rms: float | None
     max: float | None
     delay: float | None
+    angle_rms_deg: float | None = None
+    angle_max_deg: float | None = None
 
 
 def core_curve(name: str, spec: TachometerSpec, trace: PinTrace) -> Curve:
     """Return what a core shows, by its golden model, which the hardware equals bit for bit; with --smooth that."""
     run = golden.run(spec, trace)
     curve, updates = run_curve(name, spec, run, trace), run.updates
+    if "angle" in run.ticks.columns:
+        curve = replace(curve, angle=(run.ticks.clock / spec.timing.clock_hz, run.ticks.angle))
     if SMOOTH[0] not in updates.columns:
         return curve
     smooth = baselines.Estimate(curve.estimate.time, updates.velocity_smooth * spec.velocity.rad_per_s_per_lsb)

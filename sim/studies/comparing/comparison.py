@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.motion import FloatArray, parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.progress import Bar
 from tachometry.sim.signals.recording import PinTrace, Recording
@@ -36,6 +36,7 @@ from tachometry.sim.studies.comparing.tune import (
     possible,
     triangle,
 )
+from tachometry.sim.studies.extras import judged_angles
 from tachometry.spec import TachometerSpec
 from tachometry.spec.language.units import format_time
 
@@ -50,6 +51,7 @@ class Source:
     name: str
     recording: Recording
     true_speed: TrueSpeed | None
+    true_angle: TrueSpeed | None = None  # rad
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -63,6 +65,7 @@ class Comparison(Shown):
     - `n_tried`: Number of settings of which one is the best, by the name of this one.
     - `costs`: Of all settings, by the method; empty if they were not asked for.
     - `rms_speed`, rad/s: Of the motion, with which delays were measured.
+    - `position_angle`, degrees: RMS and greatest error of the position as an angle at the instant of its use.
     """
 
     spec: TachometerSpec
@@ -75,6 +78,7 @@ class Comparison(Shown):
     n_tried: dict[str, int] = field(default_factory=dict)
     costs: dict[str, list[Cost]] = field(default_factory=dict)
     rms_speed: float = 0.0
+    position_angle: tuple[float, float] | None = None
 
     def shown(self) -> tuple[str, list[list[str]]]:
         """Return the errors of all methods."""
@@ -97,15 +101,15 @@ class Comparison(Shown):
         return [cost for tried in self.costs.values() for cost in front(tried)]
 
 
-def _instants(source: Source, curves: list[Curve], judge: Judge, earliest: float | None) -> Instants:
-    """Return when each curve is read; it raises ValueError if one is read less than twice."""
+def _instants(source: Source, curves: list[Curve], judge: Judge, earliest: float | None) -> tuple[Judge, Instants]:
+    """Return who judges all curves, and when each is read; it raises ValueError if one is read less than twice."""
     judge = replace(judge, begin=begun(curves, judge.begin))
     instants = [judge.among(curve.reads) for curve in curves]
     if min(map(len, instants)) < 2:
         beyond = "" if earliest is None else ", and beyond --from"
         what = source.name if judge.end == source.recording.duration else "--until"
         raise ValueError(f"{what} must last until every method has a value{beyond}, longer than {_time(judge.end)}")
-    return instants
+    return judge, instants
 
 
 def comparison(
@@ -149,9 +153,9 @@ def comparison(
         if tune:
             specs, n_tried = trial.tuned(specs)
     curves = [Setting(name, one).curve(*edges) for name, one in specs.items()]
-    instants = _instants(source, curves, judge, earliest)
+    judge, instants = _instants(source, curves, judge, earliest)
     scores = [score(curve, duration, at, source.true_speed) for curve, at in zip(curves, instants, strict=True)]
-    return Comparison(
+    result = Comparison(
         spec=spec,
         specs=specs,
         curves=curves,
@@ -162,6 +166,22 @@ def comparison(
         n_tried=n_tried,
         costs=costs,
         rms_speed=speed,
+    )
+    angles = judged_angles(spec, curves, edges[1], source.true_angle, judge) if source.true_angle else []
+    return _with_angles(result, angles) if angles else result
+
+
+def _with_angles(result: Comparison, angles: list[tuple[FloatArray, FloatArray]]) -> Comparison:
+    """Return a comparison with errors of angles in its curves and scores; those of the position come first."""
+    position, *sizes = [(float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())) for _, error in angles]
+    return replace(
+        result,
+        position_angle=position,
+        curves=[replace(curve, angle=angle) for curve, angle in zip(result.curves, angles[1:], strict=True)],
+        scores=[
+            replace(one, angle_rms_deg=rms, angle_max_deg=most)
+            for one, (rms, most) in zip(result.scores, sizes, strict=True)
+        ],
     )
 
 
