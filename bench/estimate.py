@@ -106,7 +106,8 @@ def fit(family: str) -> dict[str, list[float]]:
     routed = [(core, 1000 / figures["Fmax"]) for core, figures in rows if figures.get("Fmax")]
 
     def error(times: Sequence[float]) -> float:
-        return sum(log(Timing(*times).period(core) / period) ** 2 for core, period in routed)
+        power = DRAWN[family].get("power", 2)
+        return sum(abs(log(Timing(*times).period(core) / period)) ** power for core, period in routed)
 
     least = error(times := [*DRAWN[family]["start"]])
     for step in (1.3, 1.1):

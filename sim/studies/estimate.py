@@ -5,6 +5,7 @@
 
 import json
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from math import log2
@@ -12,7 +13,7 @@ from typing import Any, NamedTuple
 
 from tachometry.sim.studies import size
 from tachometry.sim.studies.mapping import ECP5, GOWIN, ICE40, Fabric, Logic, Mapped
-from tachometry.spec import TachometerSpec, TrackTachometer
+from tachometry.spec import ParameterError, TachometerSpec, TrackTachometer
 from tachometry.spec.control import AnySpec
 from tachometry.spec.registers.buses import Bus
 
@@ -35,7 +36,7 @@ class Family:
 FAMILIES = {
     "ecp5": Family("ECP5", size.TARGETS["ECP5"], ECP5, 18, packs=False, timed=True),
     "ice40hx": Family("iCE40 HX", size.TARGETS["HX8K"], ICE40, 0, packs=True, timed=True),
-    "ice40up": Family("iCE40 UltraPlus", size.TARGETS["UP5K"], ICE40, 16, packs=True, timed=False),
+    "ice40up": Family("iCE40 UltraPlus", size.TARGETS["UP5K"], ICE40, 16, packs=True, timed=True),
     "gowin": Family("Gowin GW1N", size.GOWIN, GOWIN, 18, packs=False, timed=False),
 }
 
@@ -139,6 +140,7 @@ def _remedies(spec: TachometerSpec) -> Iterator[tuple[str, TachometerSpec]]:
     from tachometry.sim.studies.plan import others  # as is NumPy
 
     if isinstance(spec, TrackTachometer) and spec.multiplier != "serial":
-        yield "--multiplier serial", replace(spec, multiplier="serial")
+        with suppress(ParameterError):  # the tick may be too short for it
+            yield "--multiplier serial", replace(spec, multiplier="serial")
     found = {other.method: other for other in others(spec)}
     yield from ((f"--method {method}", found[method]) for method in ("mt", "s", "t") if method in found)
