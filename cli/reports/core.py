@@ -122,8 +122,8 @@ def advice(plans: Plans) -> list[tuple[str, str]]:
         error = f"{float(f'{gain:.1g}'):,.0f} times less error at a constant speed"
     else:
         error = f"{1 / gain:.1f} times the error" if gain < 1 / 1.05 else "no more error"
-    cells = f"{float(f'{abs(found.cells):.2g}'):,.0f} cells {'more' if found.cells > 0 else 'fewer'}"
-    return [("advice", f"{found.method}: {error}, {cells} (--method {found.method})")]
+    more = "more" if found.cells > 0 else "fewer"  # how many depends on other options than the error does
+    return [("advice", f"{found.method}: {error}, with {more} cells (--method {found.method})")]
 
 
 def size_rows(found: Estimate) -> list[tuple[str, str]]:
@@ -134,7 +134,8 @@ def size_rows(found: Estimate) -> list[tuple[str, str]]:
         clock = f"about {found.clock_hz / 1e6:.0f} MHz ({family.title}); seeds of the router differ by {SPREAD:.0%}"
         rows.append(("greatest clock", clock))
     if found.is_too_slow:
-        remedy = "take a lower --clock, or route it with several seeds"
+        near = found.wanted_hz < found.clock_hz * (1 + SPREAD)
+        remedy = "take a lower --clock" + ", or route it with several seeds" * near
         if found.remedy is not None:
             remedy = f"{found.remedy[0]} reaches about {found.remedy[1] / 1e6:.0f} MHz"
         rows.append(("warning", f"--clock {parse_frequency.written(found.wanted_hz)} is above that: {remedy}"))

@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from functools import cached_property
 from importlib.resources import files
@@ -17,14 +18,16 @@ from tachometry.sim.signals.shown import Shown
 from tachometry.sim.studies.extras import expected_rows
 from tachometry.sim.theory.performance import PERFORMANCES, disc_counts, disc_error, unknown
 from tachometry.sim.theory.tsuji import unit_velocity
-from tachometry.spec import METHODS, ParameterError, TachometerSpec, TrackTachometer
+from tachometry.spec import METHODS, ParameterError, TachometerSpec, Timing, TrackTachometer
 from tachometry.spec.formats.tracking_units import BLOCK
+from tachometry.spec.language.option import read_options
 from tachometry.spec.language.units import SpeedUnit
 
 _ROWS = 12  # of a table
 _UNITS = 10  # of the default range
 # Cells of an ECP5 that the core of a method takes with the options of the reference core; `make size` writes them.
 CELLS: dict[str, int] = json.loads(files(__package__).joinpath("cells.json").read_text(encoding="utf-8"))
+_USUAL = {name for method in METHODS.values() for name in method.facts.usual}  # options whose default is a method's
 _BETTER, _SMALLER, _ALIKE = 10, 2, 1.5  # ratios: of errors that are much less, of much fewer cells, of errors as good
 _STEADY, _MULTIPLES, _DISTANCES = 1000, 200, 8  # samples: speeds, multiples of ω_u, distances from each of them
 
@@ -218,18 +221,25 @@ class Advice:
 
     method: str
     gain: float  # how many times less its greatest error is, with a real disc
-    cells: int  # how many more cells it takes
+    cells: int  # how many more cells its reference core takes
 
 
 def others(spec: TachometerSpec) -> Iterator[TachometerSpec]:
-    """Yield the cores of other methods that can be, with all that methods have alike as in this one."""
+    """Yield the cores of other methods that can be, with all that methods have alike as in this one.
+
+    A default of its method becomes that of the other one.
+    """
     common = {one.name: getattr(spec, one.name) for one in fields(TachometerSpec) if one.name != "chosen"}
+    given = {name: text for name, text in spec.options.items() if name not in _USUAL}
+
+    def timing(method: type[TachometerSpec]) -> Timing:
+        return Timing(**read_options(Timing, given, usual=method.facts.usual))
+
     for other in METHODS.values():
         if other is not type(spec):
-            try:
-                yield other(**common)
-            except ParameterError:
-                continue
+            with suppress(ParameterError):
+                own = timing(type(spec)) == spec.timing
+                yield other(**common | ({"timing": timing(other)} if own else {}))
 
 
 def _error(spec: TachometerSpec, worst: Plan | None) -> float | None:

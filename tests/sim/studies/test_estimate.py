@@ -11,7 +11,7 @@ from tachometry.sim.studies import estimate
 from tachometry.sim.studies.estimate import FAMILIES, SPREAD, Estimate, Timing
 from tachometry.sim.studies.mapping import ECP5, ICE40, Fabric, Logic, Mapped
 from tachometry.sim.studies.size import TARGETS
-from tachometry.spec import AxesSpec, STachometer, of_texts
+from tachometry.spec import AxesSpec, STachometer, of_options, of_texts
 from tachometry.spec.registers.buses import bus_of
 
 LEVELS = Timing(0, 0, 0, 1, 0, 0, 0, 0, 100, 0, 0)  # a period is the number of tables on the longest path
@@ -139,3 +139,23 @@ def test_a_bus_and_axes_take_cells() -> None:
     assert alone.cells + 100 < on_bus.cells < alone.cells + 250
     assert alone.cells < axes.cells < 4 * alone.cells
     assert 0 < SPREAD < 0.1
+
+
+DRIVE = {"lines": "1024", "clock": "125MHz", "max-speed": "6000rpm"}
+
+
+def test_a_remedy_is_the_core_that_its_option_makes() -> None:
+    """With the defaults of its method: the maximum time of tracking is ten times that of others."""
+    found = Estimate.of(of_options(DRIVE | {"tick": "50us"}), None, "ecp5")
+    assert found.remedy is not None
+    option, method = found.remedy[0].split()
+    other = Estimate.of(of_options(DRIVE | {"tick": "50us", option.removeprefix("--"): method}), None, "ecp5")
+    assert found.remedy[1] == other.clock_hz > 125e6
+
+
+def test_a_remedy_that_cannot_be_is_none() -> None:
+    """A tick that has no time for the serial multiplier, in a core that is too slow with the other."""
+    found = Estimate.of(of_options(DRIVE | {"tick": "6us"}), None, "ecp5")
+    assert found.is_too_slow
+    assert found.remedy is not None
+    assert found.remedy[0].startswith("--method ")
