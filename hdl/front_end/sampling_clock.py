@@ -30,10 +30,10 @@ def state_after(state: Value) -> Value:
 
 
 class SamplingClock(wiring.Component):
-    """Divides time into windows of `tick_cycles` clocks, the first of which begins with the first clock after reset.
+    """Divides time into windows of `tick_cycles` clocks by a shift register with feedback, or else by a counter.
 
-    Nothing needs the clocks of a window counted, so a shift register with feedback takes fewer cells than a counter.
-    Whatever state an upset brings, it comes to the last one of a window.
+    The first window begins with the first clock after reset. Nothing needs its clocks counted, and the shift register
+    takes fewer cells. Whatever state an upset brings, it comes to the last one of a window.
 
     - `tick_cycles`: T, clocks in a window.
 
