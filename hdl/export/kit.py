@@ -82,7 +82,7 @@ def _turned(encoder: Encoder, turns: tuple[int, int]) -> tuple[dict[str, str], i
     if encoder.sensor == "hall":
         by_place = zip(*kind.cycle, strict=True)
         each = (sum(level << number for number, level in enumerate(of_line)) for of_line in by_place)
-        levels = {line: f"6'd{bits} >> quarter" for line, bits in zip(kind.lines, each, strict=True)}
+        levels = {line: f"1'(6'd{bits} >> quarter)" for line, bits in zip(kind.lines, each, strict=True)}
         counts = moved
     elif encoder.sensor == "pulses":
         levels = {"a": levels["a"]}

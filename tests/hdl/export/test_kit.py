@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from support import docs
+from support.compiled import lint
 from support.nightly import only, only_rows
 from support.options import had_by
 
@@ -81,6 +82,7 @@ def test_the_smoke_test_includes_the_template_and_passes(method: str, bus: str, 
         (tmp_path / file).write_text(text)
     said = run(tmp_path, "iverilog", "-g2012", "-Wall", "-o", "x.vvp", "spindle.v", "spindle_tb.sv")
     assert said == ""
+    lint(["--timing", "spindle.v", "spindle_tb.sv"], "spindle_tb", tmp_path)
     counts = 24 * int(CASES[method].get("decoding", "4")) // 4
     text = run(tmp_path, "vvp", "-n", "x.vvp")
     passed = re.match(rf"PASS: position {counts}, [1-9]\d* updates, velocity from (\S+) to (\S+) (\S+)\n", text)
