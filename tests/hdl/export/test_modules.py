@@ -162,7 +162,6 @@ def test_an_unknown_cell_is_an_error_that_names_it(build: Callable[[Module, Box]
         write(Box(build), "box")
 
 
-# The guide to the exported Verilog quotes the file that its command writes.
 PAGE = docs.page("guides/reading-the-verilog.md")
 
 

@@ -5,11 +5,13 @@ from fractions import Fraction
 
 import pytest
 from loops import KINDS, REAL, check, setting
+from support.compiled import read_exported
+from support.nightly import only
 
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.engines.loop import Observer
 from tachometry.sim.golden.control import Control
-from tachometry.sim.studies.loops.control import Load, Task, in_gates
+from tachometry.sim.studies.loops.control import Load, Task, in_gates, simulation_of
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.language.option import ParameterError
 
@@ -43,7 +45,11 @@ def test_the_core_of_a_setting_has_its_gains() -> None:
         in_gates(replace(DOUBLE, gains=replace(DOUBLE.gains, observer=1e-9)))
 
 
-def test_a_check_counts_what_differs(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("exported", only([False], [False, True]))
+def test_a_check_counts_what_differs(exported: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    simulation_of.cache_clear()
+    if exported:
+        read_exported(monkeypatch)
     short = replace(DOUBLE, task=Task(motion=parse_motion("ramp:0:15rad/s:60ms+constant:15rad/s:20ms"), noise=0.005))
     found = check(short, 1)
     assert (found.ticks, found.mismatches) == (3_999, 0)
