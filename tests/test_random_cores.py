@@ -25,7 +25,7 @@ from tachometry.spec.registers.buses import BUSES
 
 CLOCKS_HZ, MOST_COUNTS = (100_000, 400_000_000), 1 << 24
 EDGES, TICKS, LEAST_CLOCKS, MOST_CLOCKS = 20, 30, 6000, 24_000  # of a motion
-_LAST = {"blanking", "electrical"}  # drawn by `_add_last`
+_LAST = {"blanking", "electrical", "ratio", "teeth"}  # drawn by `_add_last`
 _NUMBERS = "ppr clock tick max-time unit sensor decoding frac-bits velocity-width max-speed over-speed filter lowpass"
 _QUADRATURE = {"health", "index-at"}  # which few other sensors have
 
@@ -85,6 +85,7 @@ def random_options(seed: int) -> tuple[dict[str, str], str]:
         axes = draw.choice((1, 2, 3, 5, 8, 32, 64))
         kept = {"method", "ppr", "clock", "unit", "max-speed", "filter", "index", "external-tick"}
         texts = {name: text for name, text in texts.items() if name in kept} | {"axes": str(axes)}
+        texts |= _ratio(_Draw(MANY + seed))
     else:
         _add_last(texts, _Draw(MANY + seed))
     return texts, draw.choice([*BUSES]) if draw.often(0.1) else "none"
@@ -114,6 +115,14 @@ def _add_last(texts: dict[str, str], draw: _Draw) -> None:
         texts |= {"electrical": texts["ppr"]} if texts.get("sensor") == "hall" else {}
     if draw.often(0.1):
         texts["blanking"] = str(draw.log(2, 3000))
+    if texts.get("sensor") == "pulses" and texts["decoding"] == "1" and draw.often(0.2):
+        texts["teeth"] = draw.choice(["60-2", "36-2-2-2", "15-2,3-2,18-2", "12-1-1-2", "24+1"])
+        texts["ppr"] = str(sum(int(part.partition("-")[0]) for part in texts["teeth"].replace("+", "-").split(",")))
+    texts |= _ratio(draw)
+
+
+def _ratio(draw: _Draw) -> dict[str, str]:
+    return {"ratio": f"{draw.log(1, 100)}/{draw.log(1, 100)}"} if draw.often(0.1) else {}
 
 
 def motions(spec: CoreSpec, seed: int) -> list[Trace]:
@@ -129,8 +138,9 @@ def motions(spec: CoreSpec, seed: int) -> list[Trace]:
     return [trace, hurried.until(min(whole.n_clocks, clocks // 4))]
 
 
-# Cores that are played in a second: every method and sensor, and number 205, a constant of which was too wide.
-SEEDS = (3, 8, 12, 13, 20, 26, 28, 31, 42, 59, 61, 67, 97, 205)
+# Cores that are played in seconds: every method and sensor, number 205, a constant of which was too wide, axes that are
+# geared (265), and a geared wheel with an extra tooth (1764).
+SEEDS = (3, 8, 12, 13, 20, 26, 28, 31, 42, 59, 61, 67, 97, 205, 265, 1764)
 MANY, PARTS = 2000, 8
 
 

@@ -82,7 +82,7 @@ def _index(axis: Axis) -> list[str]:
     encoder, distances = axis.spec.encoder, np.abs(axis.index_distances)
     turn, lines = encoder.encoder_counts, encoder.pulses_per_rev
     distances = distances[distances > min(encoder.decoding, turn / 2)]
-    if not len(distances) or abs((apart := float(np.median(distances))) - turn) <= max(1, turn / 100):
+    if not len(distances) or encoder.teeth or abs((apart := float(np.median(distances))) - turn) <= max(1, turn / 100):
         return []
     fits = (
         f", and --ppr {apart / encoder.decoding:.0f} if it comes once a turn" if apart % encoder.decoding == 0 else ""

@@ -131,7 +131,8 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         synced = np.flatnonzero(run.ticks.synced)
         when = format_time(spec.tick.seconds(int(run.ticks.clock[synced[0]]))) if len(synced) else ""
         lost = "" if run.ticks.synced[-1] or not when else ", and lost"
-        rows.append(("gap of the wheel", f"found within {when}{lost}" if when else "not found"))
+        what = "gap of the wheel" if spec.front_end.wheel.gaps else "extra tooth"
+        rows.append((what, f"found within {when}{lost}" if when else "not found"))
     if spec.front_end.index_once:
         rows.append(("homed", "yes" if run.ticks.homed[-1] else "no"))
     if spec.preset is not None:

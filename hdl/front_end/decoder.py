@@ -4,7 +4,7 @@ from amaranth import Cat, Module, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.front_end.tooth_wheel import GapFiller
+from tachometry.hdl.front_end.tooth_wheel import wheel_of
 from tachometry.hdl.wires.ports import by_name, only_if
 from tachometry.spec.core.encoder import Encoder
 from tachometry.spec.core.sensors import Levels, changes, packed_levels
@@ -86,7 +86,7 @@ class SensorDecoder(wiring.Component):
                 "ready": In(1),  # low while the levels before these are not real: neither a step nor an error
                 "step": Out(signed(2)),  # −1, 0 or +1
                 "decode_error": Out(1),  # the lines did what they should not
-                **only_if(wheel, index=Out(1), synced=Out(1)),  # see `GapFiller`
+                **only_if(wheel, index=Out(1), synced=Out(1)),  # see `wheel_of`
             }
         )
 
@@ -113,7 +113,7 @@ class SensorDecoder(wiring.Component):
                 m.d.sync += past.eq(level)
             wrong |= illegal & ~told
         if self._wheel is not None:
-            m.submodules.gap_filler = filler = GapFiller(self._wheel)
+            m.submodules.gap_filler = filler = wheel_of(self._wheel)
             m.d.comb += [
                 filler.tooth.eq(self.ready & (forward | backward)),
                 self.step.eq(Cat(filler.filled, filler.filled & encoder.reverse)),

@@ -72,8 +72,7 @@ def _levels(
     level = levels[place % 6] if sensor.name == "hall" else quadrature(place)
     if sensor.name == "hall":
         level[rng.random(len(level)) < 0.01] = 7
-    level[VirtualEncoder.of(spec.encoder).absent(place)] = 0
-    return clock, level
+    return clock, VirtualEncoder.of(spec.encoder).patterned(level, place)
 
 
 def _ticked(trace: PinTrace, cycles: int, rng: np.random.Generator) -> PinTrace:

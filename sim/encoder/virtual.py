@@ -20,6 +20,7 @@ from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.sim.signals.recording import MAX_EDGES, Recording, packed, quadrature
 from tachometry.spec import Encoder, TachometerSpec
 from tachometry.spec.core.sensors import SENSORS
+from tachometry.spec.core.tooth_wheel import parts_of
 from tachometry.spec.language.option import ParameterError
 
 MAX_PULSES_PER_REV = 1 << 26
@@ -100,7 +101,7 @@ class VirtualEncoder(EncoderOptions):
       as it ends. Of these a pitch is a step, and neither they nor halls have faults of quadrature.
     - `reverse`: It is mounted the other way round, so its lines are those of a shaft that turns backward.
     - `invert`: Lines that are low where others are high, with commas between.
-    - `missing_teeth`: Of pulses, see `Encoder`: the last teeth of a turn are not there.
+    - `teeth`: Of pulses, the pattern of the wheel, see `Encoder`: the gap of a part comes last in it.
     - `both_edges`: Of steps: each edge of A is one, and there are two in each of `pulses_per_rev` periods.
     - `ratio`: Turns of the disc for one of the shaft, see `Encoder`.
     - `complemented`: Lines whose complements are there as well, named `a_n` for `a`.
@@ -115,7 +116,7 @@ class VirtualEncoder(EncoderOptions):
     index_state: int = 2
     reverse: bool = False
     invert: str | None = None
-    missing_teeth: str | None = None
+    teeth: str | None = None
     both_edges: bool = False
     ratio: str | None = None
     complemented: tuple[str, ...] = ()
@@ -123,9 +124,9 @@ class VirtualEncoder(EncoderOptions):
     @classmethod
     def of(cls, encoder: Encoder, **values: Any) -> "VirtualEncoder":
         """Return the encoder that a core is made for, with these values of its other parameters."""
-        own = {name: getattr(encoder, name) for name in ("sensor", "reverse", "invert", "missing_teeth", "ratio")}
+        own = {name: getattr(encoder, name) for name in ("sensor", "reverse", "invert", "teeth", "ratio")}
         own["both_edges"] = encoder.sensor == "step-dir" and encoder.decoding == 2
-        if encoder.missing:  # its gap is the index
+        if encoder.teeth:  # its pattern is the index
             values["index"] = False
         return cls(encoder.pulses_per_rev, **own, **values)
 
@@ -210,8 +211,7 @@ class VirtualEncoder(EncoderOptions):
             return self._indexed(times, level, time, turned, duration), 0, 0
         level = _halls()[turned % 6] if self.sensor == "hall" else quadrature(turned)
         if self.sensor == "pulses":
-            level &= np.uint8(1)
-            level[self.absent(turned)] = 0
+            level = self.patterned(level & np.uint8(1), turned)
         if self.lost:
             level, n_lost = imperfections.lose_pulses(level, self.lost, self._stream(LOST))
         row = np.flatnonzero(np.append(True, level[1:] != level[:-1]))
@@ -225,13 +225,13 @@ class VirtualEncoder(EncoderOptions):
             times, level = time[row], level[row]
         return self._indexed(times, level, time, turned, duration), n_illegal, n_lost
 
-    def absent(self, quarter: IntArray) -> NDArray[np.bool_]:
-        """Return which quarters belong to teeth that are not there."""
-        if self.missing_teeth is None:
-            return np.zeros(quarter.shape, dtype=np.bool_)
-        missing = Encoder(self.pulses_per_rev, sensor=self.sensor, missing_teeth=self.missing_teeth).missing
-        absent: NDArray[np.bool_] = quarter // 4 % self.pulses_per_rev >= self.pulses_per_rev - missing
-        return absent
+    def patterned(self, level: NDArray[np.uint8], quarter: IntArray) -> NDArray[np.uint8]:
+        """Return the levels of the wheel from those of a full one: some teeth are not there, or the last is two."""
+        if self.teeth is None:
+            return level
+        slot = quarter // 4 % self.pulses_per_rev
+        twice = self.teeth.endswith("+1") & (slot == self.pulses_per_rev - 1)
+        return np.where(twice, quarter & 1, level * _there(self.teeth)[slot]).astype(np.uint8)
 
     def _indexed(
         self, times: FloatArray, level: NDArray[np.uint8], at: FloatArray, quarter: IntArray, duration: float
@@ -259,6 +259,24 @@ class VirtualEncoder(EncoderOptions):
 
     def _stream(self, which: int) -> np.random.PCG64:
         return imperfections.stream(self.seed, which)
+
+
+def _there(pattern: str) -> NDArray[np.bool_]:
+    """Return which teeth of a full wheel this one has."""
+    return np.concatenate([np.arange(teeth) < teeth - missing for teeth, missing in parts_of(pattern)])
+
+
+def _placed(pattern: str, there: NDArray[np.bool_], seen: IntArray) -> NDArray[np.bool_]:
+    """Return at which teeth the gaps are known: after one gap, or after rows of teeth that fill a turn.
+
+    - `there`, `seen`: Whether a tooth of the full wheel is there, and how many were up to it.
+    """
+    ends = np.flatnonzero(there[1:] & ~there[:-1] & (seen[:-1] >= 2)) + 1  # two teeth have shown their distance
+    gaps = len(parts_of(pattern))
+    up_to = np.append(0, seen[ends - 1])
+    turns = up_to[gaps:] - up_to[:-gaps] == np.count_nonzero(_there(pattern))
+    known = ends if gaps == 1 else ends[gaps - 1 :][turns]
+    return np.arange(len(there)) > (known[0] if len(known) else len(there))
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,13 +320,14 @@ class Encoding:
         change = np.diff((quadrature(turned) & 1).astype(np.int8))
         rises = change != 0 if decoding == 2 else change > 0
         counted: FloatArray = time[rises]
-        if self.encoder.missing_teeth is None:
+        if (pattern := self.encoder.teeth) is None:
             return counted
-        # Those of the first gap that ends what two teeth have begun are not known to be missing yet.
-        absent = self.encoder.absent(turned[1:][rises])
-        seen = np.cumsum(~absent)
-        gap = absent & (seen >= 2)
-        return counted[~absent | (seen > seen[np.argmax(gap)] if gap.any() else gap)]
+        level = self.encoder.patterned(quadrature(turned) & np.uint8(1), turned).astype(np.int8)
+        extra = time[~rises & (np.diff(level) > 0)]
+        there = level[1:][rises] > 0
+        seen = np.cumsum(there)
+        early = extra[np.searchsorted(counted, extra) < 4]  # an extra tooth counts until four have been seen
+        return np.sort(np.append(counted[there | _placed(pattern, there, seen)], early))
 
     def true_speed(self, t: ArrayLike) -> FloatArray:
         """Return speed of the shaft in rad/s, vibration included, at times `t` in seconds; of pulses, which do not tell

@@ -141,9 +141,9 @@ AXES: tuple[tuple[str, ...], ...] = (
     _axes_words(3, 120, 4, "--unit", "rpm", "--velocity-width", "24", "--external-tick", "--filter", "5"),
 )
 
-# Missing teeth go with one sensor and one number of pulses.
+# A pattern of teeth goes with one sensor and one number of pulses.
 _WHEEL = "--method s --ppr 12 --clock 48000000 --tick 96clk --max-time 960clk --sensor pulses --decoding 1"
-WHEELS = ((*_WHEEL.split(), "--missing-teeth", "12-2"),)
+WHEELS = ((*_WHEEL.split(), "--teeth", "12-2"),)
 
 
 def core_of(words: tuple[str, ...]) -> CoreSpec:

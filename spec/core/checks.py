@@ -23,8 +23,8 @@ def check(spec: Core) -> None:
     _check_lines(spec)
     if "z" in spec.encoder.inverted and "z" not in spec.front_end.lines:
         raise ParameterError("invert", "must not have z without --index, which makes the line z")
-    if spec.encoder.missing and spec.bounds:
-        raise ParameterError("bounds", "must not be given with --missing-teeth: teeth that are not there have no edges")
+    if spec.encoder.teeth and spec.bounds:
+        raise ParameterError("bounds", "must not be given with --teeth: teeth that are not there have no edges")
     _check_index_state(spec)
     _check_place(spec)
     for extra in spec.extras:
@@ -59,8 +59,8 @@ def _check_index_state(spec: Core) -> None:
         return
     if not kind.cycle:
         raise ParameterError("index_at", f"must be edge for {kind.name}, whose levels are no place")
-    if spec.encoder.missing:
-        raise ParameterError("index_at", "must be left out with --missing-teeth, where a gap is the index")
+    if spec.encoder.teeth:
+        raise ParameterError("index_at", "must be left out with --teeth, whose pattern is the index")
     named = [word[0].lower() for word in spec.index.at.split(",")]
     if named != [*kind.lines] or state not in kind.cycle:
         states = " or ".join(
@@ -73,7 +73,7 @@ def _check_index_state(spec: Core) -> None:
 def _check_place(spec: Core) -> None:
     if spec.front_end.wheel is not None and spec.front_end.controls:
         name = OF_CONTROLS[spec.front_end.controls[0]]
-        raise ParameterError(name, "must not be given together with --missing-teeth, whose gap is the index")
+        raise ParameterError(name, "must not be given together with --teeth, whose pattern is the index")
     half = 1 << spec.position_width - 1
     if spec.preset is not None and not -half <= spec.preset < half:
         raise ParameterError("preset", f"must be from {-half} to {half - 1}, a position, not {spec.preset}")

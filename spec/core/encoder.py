@@ -7,11 +7,11 @@ from fractions import Fraction
 from typing import Any
 
 from tachometry.spec.core.sensors import SENSORS, Sensor
+from tachometry.spec.core.tooth_wheel import parts_of
 from tachometry.spec.language.option import REQUIRED, Option, ParameterError, check_options, option, parse_whole
 
 _MOST = 1 << 24  # counts
 _INVERTIBLE = ("a", "b", "c", "z")
-_MOST_MISSING = 4  # with more, a gap is too long to go by the speed before it
 _OF_TURN: dict[str, Any] = {"metavar": "N", "parse": parse_whole}
 
 
@@ -60,14 +60,14 @@ def _ratio(what: str, text: str) -> str | None:
     return None if ratio == 1 else str(ratio)
 
 
-def _wheel(what: str, text: str) -> str:
-    match = re.fullmatch(r"(\d{1,8})-(\d)", text.strip(), re.ASCII)
-    if match is None or not 1 <= int(match[2]) <= _MOST_MISSING or int(match[1]) - int(match[2]) < 3:
-        most = f"at most {_MOST_MISSING} of them missing and at least 3 there"
-        raise ParameterError(
-            what, f"must be the teeth of a full wheel less those missing, as 60-2, {most}, not {text!r}"
-        )
-    return f"{int(match[1])}-{match[2]}"
+def _teeth(what: str, text: str) -> str:
+    pattern = re.sub(r"\s", "", text)
+    if not parts_of(pattern):
+        rules = "at most 4 missing in a row, 4 gaps, and 3 teeth in a row somewhere"
+        rest = f"must be a full wheel less its gaps, as 60-2 or 36-2-2-2, or 24+1: {rules}, not {text!r}"
+        full = f": for a full wheel leave it out, and type --ppr {pattern}" if pattern.isdigit() else ""
+        raise ParameterError(what, rest + full)
+    return pattern
 
 
 @dataclass(frozen=True)
@@ -140,14 +140,15 @@ class Encoder:
         tests=(),
         tacit=True,
     )
-    missing_teeth: str | None = option(
+    teeth: str | None = option(
         None,
-        "Teeth of a crank wheel and those missing, as 60-2 or 36-1. It needs --sensor pulses and --ppr N. "
-        "The missing teeth count where they would be, from the second gap on. With --index the first "
-        "tooth after a gap is the index, and there is no pin z. Output synced is high while the gap is in "
-        "its place.",
-        metavar="N-M",
-        parse=_wheel,
+        "Teeth of a crank wheel: 60-2, 36-2-2-2, or 24+1 for one extra. It needs --sensor pulses and --ppr N. "
+        "Gaps are evenly spread, or listed with the teeth before them, as 15-2,3-2,18-2; the core takes any. "
+        "Missing teeth count where they would be once the place is known, extra ones do not. With --index "
+        "the first tooth after the gap, after the longest row of teeth, or after the extra tooth is the index, and "
+        "there is no pin z. Output synced is high while the pattern is in its place.",
+        metavar="PATTERN",
+        parse=_teeth,
         tests=(),
         tacit=True,
     )
@@ -155,7 +156,7 @@ class Encoder:
     def __post_init__(self) -> None:
         check_options(self)
         if self.decoding is None:
-            object.__setattr__(self, "decoding", 1 if self.missing_teeth else self.kind.decodings[0])
+            object.__setattr__(self, "decoding", 1 if self.teeth else self.kind.decodings[0])
         self._check_decoding()
         if not 1 <= self.encoder_counts <= _MOST:
             raise ParameterError(
@@ -170,8 +171,8 @@ class Encoder:
         if wrong := sorted(self.inverted - {*self.kind.lines, "z"}):
             lines = ", ".join((*self.kind.lines, "z"))
             raise ParameterError("invert", f"must be of {lines} for {self.sensor}, not {wrong[0]}")
-        if self.missing_teeth:
-            self._check_teeth(_wheel("missing_teeth", self.missing_teeth))
+        if self.teeth:
+            self._check_teeth(parts_of(_teeth("teeth", self.teeth)))
 
     def _check_decoding(self) -> None:
         if self.decoding in self.kind.decodings:
@@ -181,20 +182,15 @@ class Encoder:
         allowed = " or ".join(map(str, sorted(self.kind.decodings)))
         raise ParameterError("decoding", f"must be {allowed} for {self.sensor}, not {self.decoding}")
 
-    def _check_teeth(self, wheel: str) -> None:
+    def _check_teeth(self, parts: tuple[tuple[int, int], ...]) -> None:
         if self.sensor != "pulses":
-            raise ParameterError("missing_teeth", f"must be given with --sensor pulses, not {self.sensor}")
+            raise ParameterError("teeth", f"must be given with --sensor pulses, not {self.sensor}")
         if self.decoding != 1:
+            raise ParameterError("decoding", f"must be 1 with --teeth, one count for a tooth, not {self.decoding}")
+        if (teeth := sum(number for number, _ in parts)) != self.pulses_per_rev:
             raise ParameterError(
-                "decoding", f"must be 1 with --missing-teeth, one count for a tooth, not {self.decoding}"
+                "teeth", f"must be of --ppr, {self.pulses_per_rev} teeth, not of {teeth}: type --ppr {teeth}"
             )
-        if (teeth := int(wheel.split("-")[0])) != self.pulses_per_rev:
-            raise ParameterError("missing_teeth", f"must be of --ppr, {self.pulses_per_rev} teeth, not of {teeth}")
-
-    @property
-    def missing(self) -> int:
-        """Teeth that are missing in a row, 0 for none."""
-        return int(self.missing_teeth.split("-")[1]) if self.missing_teeth else 0
 
     @property
     def kind(self) -> Sensor:

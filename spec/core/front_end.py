@@ -5,7 +5,7 @@ from fractions import Fraction
 
 from tachometry.spec.core.asked import Asked
 from tachometry.spec.core.sensors import EDGE, USUAL_STATE, Levels
-from tachometry.spec.core.tooth_wheel import ToothWheel
+from tachometry.spec.core.tooth_wheel import ToothWheel, parts_of
 from tachometry.spec.language.port import Port
 
 # The options that inputs of `controls` come with.
@@ -39,7 +39,7 @@ class FrontEnd:
     @property
     def lines(self) -> tuple[str, ...]:
         """Lines of the sensor, the index and `controls` included."""
-        of_index = ("z",) if self.asked.index and not self.asked.encoder.missing else ()  # a gap needs none
+        of_index = ("z",) if self.asked.index and not self.asked.encoder.teeth else ()  # a pattern needs none
         return (*self.asked.encoder.kind.lines, *of_index, *self.controls)
 
     @property
@@ -64,10 +64,13 @@ class FrontEnd:
 
     @property
     def wheel(self) -> ToothWheel | None:
-        """The wheel, if teeth of it are missing; they are as far apart as an update may take."""
-        if not (missing := self.asked.encoder.missing):
+        """The wheel, if its teeth make a pattern; they are as far apart as an update may take."""
+        if not (pattern := self.asked.encoder.teeth):
             return None
-        return ToothWheel(self.asked.encoder.pulses_per_rev - missing, missing, (1 << self.longest.bit_length()) - 1)
+        parts = parts_of(pattern)
+        teeth = sum(number - max(missing, 0) for number, missing in parts)
+        gaps = tuple(missing for _, missing in parts if missing > 0)
+        return ToothWheel(teeth, gaps, (1 << self.longest.bit_length()) - 1)
 
     @property
     def controls(self) -> tuple[str, ...]:

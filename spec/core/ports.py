@@ -95,15 +95,20 @@ def _inputs(spec: Core) -> Iterator[Port]:
         yield from (pin.port for pin in extra.pins(spec) if not pin.of)
 
 
+# By the number of gaps, at most 2: after what the index comes, and what is found.
+_OF_WHEELS = (("the extra one", "extra tooth"), ("a gap", "gap of the wheel"), ("the longest row of teeth", "gaps"))
+
+
 def _index_ports(spec: Core) -> Iterator[Port]:
-    gap, place = bool(spec.encoder.missing), "the index"
-    if gap:
-        place = "the first tooth after a gap"
-        yield held(TICK, "synced", help="The gap of the wheel was found, and the latest one was where it had to be.")
+    wheel, place = spec.front_end.wheel, "the index"
+    if wheel is not None:
+        after, what = _OF_WHEELS[min(len(wheel.gaps), 2)]
+        place = f"the first tooth after {after}"
+        yield held(TICK, "synced", help=f"The {what} was found, and the latest one was where it had to be.")
     if not spec.index:
         return
     text = "index: z rises in the state of --index-at, or rises at all with edge."
-    yield strobe(INDEX, f"One clock for every {'first tooth after a gap.' if gap else text}")
+    yield strobe(INDEX, f"One clock for every {text if wheel is None else place.removeprefix('the ') + '.'}")
     if spec.front_end.index_state is not None:
         text = "One clock: z stayed high from the state of --index-at to the same state a period further, so the index "
         yield strobe(WIDE, text + "is at two places.")
@@ -116,7 +121,7 @@ def _index_ports(spec: Core) -> Iterator[Port]:
 
 
 def _wrong(spec: Core) -> str:
-    if spec.encoder.missing:
+    if spec.encoder.teeth:
         return "the gap was not where it had to be, as of a tooth lost or extra; the next gap is taken."
     return spec.encoder.kind.wrong
 

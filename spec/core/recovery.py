@@ -23,10 +23,10 @@ class Recovery:
     @property
     def clocks(self) -> int | None:
         """Clocks after which all is right; None: the core forgets only gradually, as a low-pass filter does, or has a
-        wheel with a gap, which must come.
+        wheel with a pattern, which must come.
         """
         asked = self.asked
-        if self.remembered is None or asked.lowpass is not None or asked.encoder.missing:
+        if self.remembered is None or asked.lowpass is not None or asked.encoder.teeth:
             return None
         # What counts the ticks of a silence may have to begin anew.
         silence = ((1 << asked.timing.max_ticks.bit_length()) + 1) * self.tick.longest

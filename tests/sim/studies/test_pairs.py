@@ -82,7 +82,7 @@ def test_every_option_is_a_factor(method: str) -> None:
     assert {about.name for about in own_options(method)} <= set(found)
     without = {about.name for about in common_options() if not about.needs} - set(found)
     never = {"rairan": {"external-tick"}, "track": {"tick", "bounds"}}
-    lines = {"pole-pairs", "missing-teeth", "ratio"}  # tests/hdl/front_end has the wheel, tests/spec/core the ratio
+    lines = {"pole-pairs", "teeth", "ratio"}  # tests/hdl/front_end has the wheel, tests/spec/core the ratio
     assert without == {"ppr", "lines", "cpr", "clock", "dt", "pwm", "lsb"} | lines | never.get(method, set())
     assert "yes index-reset" in found["index"]
     assert ("yes edge-error 0.3" in found.get("bounds", ())) == METHODS[method].facts.bounds

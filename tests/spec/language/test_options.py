@@ -111,7 +111,7 @@ def test_every_option_does_what_it_says() -> None:
         "lines",
         "cpr",
         "pole-pairs",
-        "missing-teeth",
+        "teeth",
         "blanking",
         "ratio",
         "pwm",
