@@ -12,12 +12,11 @@ from tachometry.cli.files import Outputs
 from tachometry.cli.options.capture import CAPTURE_OPTIONS
 from tachometry.cli.options.core import COMMON_CORE_OPTIONS, Make
 from tachometry.cli.options.methods import named_methods
-from tachometry.cli.options.motion import FORMS, OPTIONAL_MOTION_OPTIONS, delay, read_delay
+from tachometry.cli.options.motion import FORMS, OPTIONAL_MOTION_OPTIONS, Recorder, delay, read_delay, shown_in_unit_of
 from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
 from tachometry.cli.reports.compare import comparison_table, cost_table, print_comparison, shown_time
 from tachometry.cli.reports.terminal import progress_bar
 from tachometry.hdl.export import export
-from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.signals.files import write_csv
 from tachometry.sim.signals.recording import Recording
 from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES
@@ -108,7 +107,7 @@ Examples:
 def compare(
     make: Make,
     methods: str,
-    record: Callable[[TachometerSpec], Encoding] | None,
+    record: Recorder | None,
     tables: list[Path],
     capture: Path | None,
     read: Callable[[Path, TachometerSpec], Recording],
@@ -140,6 +139,8 @@ def compare(
     ):
         if name in spec.options:
             raise ValueError(f"--{name} must be left out, or given together with --size: it changes no velocity")
+    if record is not None:
+        spec = shown_in_unit_of(record.motion, spec)
     source = _source(record, capture, read, spec)
     earliest = None if start is None else delay("start", start)
     latest = math.inf if until is None else float(parse_time("until", until))
@@ -168,7 +169,7 @@ def compare(
 
 
 def _source(
-    record: Callable[[TachometerSpec], Encoding] | None,
+    record: Recorder | None,
     capture: Path | None,
     read: Callable[[Path, TachometerSpec], Recording],
     spec: TachometerSpec,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -11,12 +10,11 @@ from tachometry.cli.files import Outputs
 from tachometry.cli.options.axes import AXES
 from tachometry.cli.options.core import core_options
 from tachometry.cli.options.engine import ENGINE_OPTIONS
-from tachometry.cli.options.motion import FORMS, MOTION_OPTIONS
+from tachometry.cli.options.motion import FORMS, MOTION_OPTIONS, Recorder, shown_in_unit_of
 from tachometry.cli.options.option import GroupedCommand
 from tachometry.cli.options.outputs import OUTPUT_OPTIONS, refuse_plot, write_outputs
 from tachometry.cli.reports.run import print_simulation
 from tachometry.cli.reports.terminal import progress_bar
-from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.studies.simulation import Pulses, Window
 from tachometry.sim.studies.simulation import simulate as simulation_of
 from tachometry.spec import CoreSpec
@@ -45,7 +43,7 @@ a --clock that is a few times the edge rate then.""",
 @ENGINE_OPTIONS
 def simulate(
     spec: CoreSpec,
-    record: Callable[..., Encoding],
+    record: Recorder,
     tables: list[Path],
     targets: dict[str, Path],
     engine: str,
@@ -63,6 +61,7 @@ def simulate(
     """
     outputs = Outputs(targets, inputs=tables)
     refuse_plot(spec, targets)
+    spec = shown_in_unit_of(record.motion, spec)
     truths = [record(spec.tachometer, axis, spec.axes) for axis in range(spec.axes or 1)]
     recordings = [truth.recording for truth in truths]
     with outputs:

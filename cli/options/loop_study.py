@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tachometry.cli.options.core import core_click_options
-from tachometry.cli.options.motion import DISC_OPTIONS
+from tachometry.cli.options.motion import DISC_OPTIONS, shown_in_unit_of
 from tachometry.cli.options.option import declared
 from tachometry.cli.options.sweep import made_by_name
 from tachometry.sim.encoder.options import EncoderOptions
@@ -139,7 +139,7 @@ def _setting(
     from tachometry.sim.engines import loop as engine
     from tachometry.sim.studies.loops.control import Setting, in_gates
 
-    task = _task(spec, motion, loop)
+    spec, task = shown_in_unit_of(motion, spec), _task(spec, motion, loop)
     begin, duration = float(parse_time("from", loop.start)), task.motion.duration
     if not 0.01 <= duration <= MOST_SECONDS:
         raise ParameterError("motion", f"must last from 10ms to {MOST_SECONDS:g}s in a loop, not {duration:.6g}s")

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from tachometry.cli.options.option import Group, declared, option, refuse_without, take_values
 from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.sim.signals.files import file_of
-from tachometry.spec import TachometerSpec
+from tachometry.spec import CoreSpec, TachometerSpec
 from tachometry.spec.language.option import ParameterError, options_of
-from tachometry.spec.language.units import parse_time
+from tachometry.spec.language.units import SPEED, parse_time
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
 
 _MOTION = "Motion"
+Core = TypeVar("Core", bound=CoreSpec)
 
 FORMS = """\b
 Motions, joined by + into one:
@@ -103,32 +105,44 @@ def _record(encoder: VirtualEncoder, motion: str, spec: TachometerSpec) -> Encod
     return replace(encoding, recording=replace(encoding.recording, source=log.source))
 
 
-def _read_record(*, motion: str | None, **given: Any) -> dict[str, Any]:
-    values = take_values(EncoderOptions, given)
+def shown_in_unit_of(motion: str, spec: Core) -> Core:
+    """Return a core whose speeds are shown in the unit that the motion was typed in."""
+    unit = re.search("|".join(SPEED), motion)
+    return spec if unit is None else cast(Core, spec.shown_in(unit[0]))
 
-    def record(spec: TachometerSpec, axis: int = 0, axes: int | None = None) -> Encoding:
+
+@dataclass(frozen=True)
+class Recorder:
+    """Gives what the encoder of a core, or that of an axis, records of the motion."""
+
+    motion: str
+    values: Mapping[str, Any]  # of the virtual encoder
+
+    def __call__(self, spec: TachometerSpec, axis: int = 0, axes: int | None = None) -> Encoding:
+        """Return the recording; ValueError if there are more motions than axes."""
         from tachometry.sim.encoder.virtual import VirtualEncoder
 
-        assert motion is not None
-        own = VirtualEncoder.of_core(spec, **values)
+        own = VirtualEncoder.of_core(spec, **self.values)
         if axes is None:
-            return _record(own, motion, spec)
-        each = motion.split(",")
+            return _record(own, self.motion, spec)
+        each = self.motion.split(",")
         if len(each) > axes:
             raise ValueError(f"--motion must have at most one motion for each of the --axes {axes}, not {len(each)}")
         return _record(replace(own, seed=own.seed + axis), each[min(axis, len(each) - 1)], spec)
 
+
+def _read_record(*, motion: str | None, **given: Any) -> dict[str, Any]:
+    values = take_values(EncoderOptions, given)
     if motion is None:
         refuse_without("--motion", _OPTIONS)
         return dict(record=None, tables=[], **given)
-    return dict(record=record, tables=tables_of(motion), **given)
+    return dict(record=Recorder(motion, values), tables=tables_of(motion), **given)
 
 
 MOTION_OPTIONS = Group([_motion(required=True), *_OPTIONS], _read_record)
 """The options of the virtual encoder, handed over as two arguments.
 
-`record` gives what the encoder of a spec, or that of an axis, records of the motion; `tables` are the files that it
-reads.
+`record` is a `Recorder`; `tables` are the files that it reads.
 """
 
 OPTIONAL_MOTION_OPTIONS = Group([_motion(required=False), *_OPTIONS], _read_record)

@@ -9,7 +9,7 @@ from tachometry.spec import TachometerSpec
 from tachometry.spec.control import AnySpec
 from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.language.field import WORD
-from tachometry.spec.language.units import SpeedUnit, parse_frequency, plural, short_time
+from tachometry.spec.language.units import parse_frequency, plural, short_time
 from tachometry.spec.registers.buses import Bus, registers_on
 from tachometry.spec.registers.manifest import manifest
 
@@ -142,13 +142,6 @@ def size_rows(found: Estimate) -> list[tuple[str, str]]:
     return rows
 
 
-def typed_unit(spec: TachometerSpec) -> SpeedUnit:
-    """Return the unit to show speeds in: that of --unit, else that of --max-speed, else rad/s."""
-    if spec.unit == NATIVE and spec.max_speed is not None:
-        return SpeedUnit(spec.max_speed.unit)
-    return spec.scale.shown_unit
-
-
 def registers_row(spec: AnySpec, bus: Bus) -> tuple[str, str]:
     """Return how many registers a core has on a bus."""
     registers = registers_on(spec, bus)
@@ -169,5 +162,5 @@ def _standstill(spec: TachometerSpec) -> str:
 
 def speed_text(spec: TachometerSpec, rad_per_s: float, digits: int = 6) -> str:
     """Return a speed in the unit that was typed."""
-    unit = typed_unit(spec)
+    unit = spec.scale.shown_unit
     return f"{unit.of(rad_per_s):.{digits}g} {unit.name}"

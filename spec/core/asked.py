@@ -1,6 +1,6 @@
 """Options of the measurement that every method has."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import ClassVar
 
@@ -157,6 +157,10 @@ class Asked:
         parse=parse_bandwidth,
         tests=("", "20kHz"),
     )
+
+    # Unit that speeds are shown in, of those without a unit of their own; None: that of --max-speed, or rad/s. It is
+    # what a motion was typed in, and makes no other core.
+    shown: str | None = field(default=None, compare=False, repr=False)
 
     # Name of the method, and what sets it apart.
     method: ClassVar[str]

@@ -1,8 +1,8 @@
 """A tachometer is what is asked for: from encoder pins to velocity, whatever the method."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self, cast
 
 from tachometry.spec.core.checks import check
 from tachometry.spec.core.core import Core
@@ -31,6 +31,10 @@ class TachometerSpec(Core):
     def tachometer(self) -> "TachometerSpec":
         """The spec itself."""
         return self
+
+    def shown_in(self, unit: str) -> Self:
+        """Return the same core, whose speeds are shown in this unit unless they have one."""
+        return replace(self, shown=unit)
 
     @cached_property
     def ports(self) -> Ports:
@@ -86,6 +90,10 @@ class WithTachometer:
     """Properties that a core has from its tachometer."""
 
     tachometer: TachometerSpec
+
+    def shown_in(self, unit: str) -> Self:
+        """Return the same core, whose speeds are shown in this unit unless they have one."""
+        return replace(cast(Any, self), tachometer=self.tachometer.shown_in(unit))
 
     @property
     def method(self) -> str:

@@ -62,5 +62,8 @@ class Scale:
 
     @property
     def shown_unit(self) -> SpeedUnit:
-        """The unit in which commands show speeds; rad/s for counts per tick, which depend on the tick."""
-        return SpeedUnit("rad/s" if self.asked.unit == NATIVE else self.asked.unit)
+        """The unit in which commands show speeds: that of the velocity, else the one that was typed, else rad/s."""
+        asked = self.asked
+        if asked.unit != NATIVE:
+            return SpeedUnit(asked.unit)
+        return SpeedUnit(asked.shown or (asked.max_speed.unit if asked.max_speed is not None else "rad/s"))

@@ -114,16 +114,15 @@ def test_the_worst_error_is_told_with_where_it_is(
     assert least is not None
     with (tmp_path / "p.csv").open() as file:
         shown = [
-            (*(float(row[f"{name}_rad_s"]) for name in ("speed", "resolution", "disc")),)
-            for row in csv.DictReader(file)
+            (*(float(row[f"{name}_rpm"]) for name in ("speed", "resolution", "disc")),) for row in csv.DictReader(file)
         ]
     rpm = math.pi / 30
-    errors = {speed: (q_v + disc, q_v) for speed, q_v, disc in shown if speed >= float(least[1]) * rpm}
+    errors = {speed: (q_v + disc, q_v) for speed, q_v, disc in shown if speed >= float(least[1])}
     greatest = max(errors, key=lambda speed: errors[speed][0])
-    assert float(match[2]) * rpm == pytest.approx(greatest, rel=1e-3)
-    lsb = json.loads((tmp_path / "core" / "tachometer.json").read_text())["velocity"]["rad_per_s_per_lsb"]
+    assert float(match[2]) == pytest.approx(greatest, rel=1e-3)
+    lsb = json.loads((tmp_path / "core" / "tachometer.json").read_text())["velocity"]["rad_per_s_per_lsb"] / rpm
     for told_error, error in zip((match[1], ideal[1]), errors[greatest], strict=True):
-        assert float(told_error) * rpm == pytest.approx(error, rel=0.005, abs=1.1 * lsb)
+        assert float(told_error) == pytest.approx(error, rel=0.005, abs=1.1 * lsb)
 
 
 @pytest.mark.usefixtures("mapped")
