@@ -51,7 +51,6 @@ class CoreOptions(TypedDict, total=False):
     max_time: Value | None
     method: Value | None
     min_time: Value | None
-    missing_teeth: Value | None
     multiplier: Value | None
     observer: Value | None
     over_speed: Value | None
@@ -74,6 +73,7 @@ class CoreOptions(TypedDict, total=False):
     smooth: bool | None
     stream: Value | None
     synchronised: bool | None
+    teeth: Value | None
     tick: Value | None
     timer: Value | None
     torque_constant: Value | None

@@ -29,10 +29,9 @@ from tachometry.cli.options.core import core_click_options
 from tachometry.cli.options.help import needed
 from tachometry.cli.options.methods import Methods, named_methods
 from tachometry.cli.options.motion import OPTIONAL_MOTION_OPTIONS
-from tachometry.cli.options.option import GroupedCommand, Option, options_named
+from tachometry.cli.options.option import RESEARCH, GroupedCommand, Option, options_named
 from tachometry.cli.options.sweep_settings import arguments, yes
 from tachometry.cli.reports.compare import shown_scores, shown_time
-from tachometry.cli.reports.core import typed_unit
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.sim.encoder.virtual import Encoding
@@ -112,7 +111,9 @@ def options() -> Answer:
     """Return what can be asked for: options by groups, and those that most need."""
     of_core, groups = _options_of(_generate), dict[str, list[Answer]]()
     for one in (of_core | _options_of(_captured)).values():
-        groups.setdefault(one.group, []).append(_described(one))
+        of_method = one.group.startswith("Method ")
+        groups.setdefault("Method" if of_method else one.group, []).append(_described(one))
+    groups[RESEARCH] = groups.pop(RESEARCH)  # the last
     return {
         "groups": [{"title": title, "part": _PARTS.get(title, "core"), "options": of} for title, of in groups.items()],
         "needed": [_name(one) for one in needed([*of_core.values()])],
@@ -165,7 +166,7 @@ def curves(options: Texts) -> Answer:
     methods = _methods(options, core)
     specs = {name: spec for name, spec in methods.specs.items() if spec is not None} | {core.method: core}
     plans = Plans(core, specs, *default_range(core))
-    unit, near = typed_unit(core), np.geomspace(plans.low, plans.high, _POINTS + 1)[:-1]
+    unit, near = core.scale.shown_unit, np.geomspace(plans.low, plans.high, _POINTS + 1)[:-1]
     every = plans.line.speed.tolist()
     starts = sorted({bisect_left(every, speed) for speed in near.tolist()})
 
@@ -176,20 +177,16 @@ def curves(options: Texts) -> Answer:
         errors, delays = _greatest(unit.of(error), starts), _greatest(delay, starts)
         known = [(one, late) for one, late in zip(errors, delays, strict=True) if one is not None and late is not None]
         worst = (f"{max(known)[0]:.4g}", shown_time(max(late for _, late in known))) if known else ("-", "-")
-        rest, cells = spec.times.standstill_ticks * spec.timing.tick_seconds, cells_of(spec)
-        return {
-            "name": name,
-            "own": name == core.method,
-            "error": errors,
-            "delay": delays,
-            "cells": [*worst, short_time(rest), "-" if cells is None else str(cells)],
-        }
+        rest = spec.times.standstill_ticks * spec.timing.tick_seconds
+        own = name == core.method
+        cells = "see the core" if own else str(cells_of(spec) or "-")  # a reference core has other options
+        return dict(name=name, own=own, error=errors, delay=delays, cells=[*worst, short_time(rest), cells])
 
     each = [shown(name, plans.methods[name], plan) for name, plan in plans.lines.items()]
     return {
         "unit": unit.name,
         "x": [float(f"{unit.of(every[start]):.6g}") for start in starts],
-        "heads": ["method", f"worst error ({unit.name})", "longest delay", "standstill within", "cells (ECP5)"],
+        "heads": ["method", f"worst error ({unit.name})", "longest delay", "standstill within", "plain cells (ECP5)"],
         "curves": sorted(each, key=lambda one: not one["own"]),
         "left_out": methods.left_out,
     }
@@ -267,7 +264,7 @@ def _response(options: Texts, core: TachometerSpec, source: Source) -> Answer:
     found = comparison(
         core, specs, of_texts, source, earliest=None, latest=math.inf, tune=False, tradeoff=False, bar=no_bar
     )
-    unit = typed_unit(core)
+    unit = core.scale.shown_unit
     heads, rows = shown_scores(found, unit)
     at = found.instants[0][:: -(-len(found.instants[0]) // _POINTS_OF_TIME)]
     each = zip(found.curves, rows, strict=True)
@@ -370,11 +367,11 @@ def _described(one: Option) -> Answer:
     return {
         "name": _name(one),
         "help": _DEFAULT.sub("", help),
-        "default": (default[1] or "") if default else "",
+        "default": (default[1] or "") if default else "none" * ("none" in choices),
         "choices": choices,
         "flag": one.is_flag,
-        "metavar": "" if choices else metavar.strip("[]").replace("|", " or "),
-        "methods": methods_with(_name(one)) if one.group.startswith("Method ") else [],
+        "metavar": "" if choices else re.sub(r"^\[([^\[\]]*)\]$", r"\1", metavar).replace("|", " or "),
+        "methods": methods_with(_name(one)),
     }
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from tachometry.cli.options.option import Group, Option, default_of, kind_of, later, option
+from tachometry.cli.options.option import RESEARCH, Group, Option, default_of, kind_of, later, option
 from tachometry.sim.studies.estimate import FAMILIES
 from tachometry.spec import (
     AUTO,
@@ -85,6 +85,9 @@ def own_click_options() -> Sequence[click.Option]:
     return tuple(_made_own(name, tuple(by_method.items())) for name, by_method in declarations.items())
 
 
+_RESEARCH = {"paper-exact", "cancel", "reciprocal", "adaptive", "whole-cycles", "bound-decay"}
+
+
 @cache
 def _made_own(name: str, by_method: tuple[tuple[str, declaration.Option], ...]) -> click.Option:
     """Return the option of one or several methods: if they say different things of it, its help has all of them."""
@@ -97,7 +100,7 @@ def _made_own(name: str, by_method: tuple[tuple[str, declaration.Option], ...]) 
     help_ += default_of(about) * alike
     words = [f"--{name}/--no-{name}" if about.flag else f"--{name}", _argument(name)]
     kind = {} if about.flag else kind_of(about)
-    group = f"Method {' and '.join(method for method, _ in by_method)}"
+    group = RESEARCH if name in _RESEARCH else f"Method {' and '.join(method for method, _ in by_method)}"
     return Option(words, group=group, default=None, help=help_, **kind)
 
 

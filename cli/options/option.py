@@ -135,8 +135,15 @@ def later(name: str, make: Callable[[], Sequence[click.Option]]) -> Callable[[Co
     return click.option(f"--{name}", cls=Later, make=make, hidden=True)
 
 
+RESEARCH = "Research"  # the group of options for those who study methods
 LONG = "tachometry.long"  # of a context: its help has all sentences
 _MOST_LINES = 100  # of --help
+
+
+def _other(name: str, help: str) -> str:
+    """Return how an option is typed to be another than by default, without its value."""
+    yes, _, no = name.partition(" / ")
+    return no if no and f"default: {yes.removeprefix('--')}]" in help else yes.partition(" ")[0]
 
 
 def _within(block: str) -> list[str]:
@@ -211,7 +218,11 @@ class GroupedCommand(click.Command):
             return
         lines = self._head(ctx)
         for heading, records in self._groups(ctx).items():
-            lines += [f"{heading}:", *map(line, records)]
+            if heading == RESEARCH:
+                names = ", ".join(_other(*record) for record in records)
+                lines += textwrap.wrap(f"{heading}: {names}", 79, subsequent_indent="  ", break_on_hyphens=False)
+            else:
+                lines += [f"{heading}:", *map(line, records)]
         last = f"{(ctx.parent or ctx).command_path} help {self.name} [--OPTION] explains them."
         for block in (self.epilog or "").replace("\b\n", "").split("\n\n"):
             if len(lines) + len(block.splitlines()) + 3 <= _MOST_LINES:
@@ -240,7 +251,7 @@ class GroupedCommand(click.Command):
             record = parameter.get_help_record(ctx)
             if record is not None:
                 groups.setdefault(getattr(parameter, "group", "Other"), []).append(record)
-        return groups
+        return {name: groups[name] for name in sorted(groups, key=RESEARCH.__eq__)}
 
 
 def option(group: str, name: str, *others: str, **attributes: Any) -> Callable[[Command], Command]:

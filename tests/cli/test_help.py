@@ -114,7 +114,7 @@ def test_shared_options_say_what_every_method_does(capsys: pytest.CaptureFixture
             assert about.help in text, (method, about.name)
     for about in common_options():
         assert about.help in text
-    assert "Method t and mt and rairan:" in text
+    assert "Research:" in text
     assert "t, mt: Let the velocity decay" in text
     assert " rairan: Let the velocity decay" in text
     assert text.count("[default: bound-decay]") == 1

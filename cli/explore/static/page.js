@@ -40,6 +40,9 @@ let known, checked = null;
 const part = name => Object.fromEntries(known.groups.filter(group => group.part === name).flatMap(group => group.options)
   .filter(one => one.name in values && one.name !== "motion").map(one => [one.name, values[one.name]]));
 
+// Of these options one is given: the one that was typed last.
+const INSTEAD = [["ppr", "lines", "cpr", "pole-pairs"], ["tick", "pwm", "dt"], ["frac-bits", "lsb"]];
+
 function field(about) {
   const id = `o-${about.name}`, told = `${id}-help ${id}-error`;
   const on = about.flag && about.default === about.name;
@@ -60,6 +63,10 @@ function field(about) {
     const text = about.flag ? (input.checked === on ? "" : input.checked ? "yes" : "no") : input.value.trim();
     if (text === "" || (about.choices.length && text === about.default)) delete values[about.name];
     else values[about.name] = text;
+    for (const other of text && INSTEAD.find(names => names.includes(about.name)) || []) if (other !== about.name) {
+      delete values[other];
+      $(`o-${other}`).value = "";
+    }
     changed();
   });
   const default_ = about.default && !about.flag && !about.choices.length ? ` Without it: ${about.default}.` : "";
@@ -69,29 +76,34 @@ function field(about) {
     made("p", { class: "error", id: `${id}-error`, role: "alert" }));
 }
 
+const narrow = matchMedia("(max-width: 62rem)");  // as in page.css
+
 function form() {
   const core = known.groups.filter(group => group.part === "core");
   const first = new Set(known.needed), all = core.flatMap(group => group.options);
   const basics = all.filter(one => first.has(one.name));
   const groups = [["Basics", basics], ...core.map(({ title, options }) => [title, options.filter(one => !first.has(one.name))])];
+  const more = made("details", { class: "more", open: !narrow.matches || all.some(one => one.name in values && !first.has(one.name)) },
+    made("summary", {}, "All options"));
   for (const [title, options] of groups) {
     if (!options.length) continue;
     const open = title === "Basics" || options.some(one => one.name in values);
-    $("form").append(made("details", { class: "group", open }, made("summary", {}, title, made("span", { class: "set" })), ...options.map(field)));
+    (title === "Basics" ? $("form") : more).append(made("details", { class: "group", open }, made("summary", {}, title, made("span", { class: "set" })), ...options.map(field)));
   }
+  $("form").append(more);
 }
 
-// Shows how many options of a group are given, and hides what the method does not have.
+// Shows how many options of a group are given, and hides what the method does not have; of auto what was chosen has it.
 function dressed() {
-  const method = values.method ?? "auto";
+  const method = values.method ?? checked?.method ?? "auto";
   for (const group of document.querySelectorAll(".group, #encoder, #lines")) {
     const given = [...group.querySelectorAll("input, select")].filter(one => one.id.slice(2) in values).length;
-    group.querySelector(".set").textContent = given ? `${given} set` : "";
+    group.querySelector(".set").textContent = given ? ` ${given} set` : "";
     const fields = [...group.querySelectorAll(".field")];
     for (const one of fields) one.hidden = method !== "auto" && one.dataset.methods !== "" && !one.dataset.methods.split(" ").includes(method);
     if (group.className === "group") group.hidden = fields.every(one => one.hidden);
   }
-  for (const [name] of Object.entries(values)) if ($(`o-${name}`)?.closest(".field")?.hidden) delete values[name];
+  if (values.method) for (const name of Object.keys(values)) if ($(`o-${name}`)?.closest(".field")?.hidden) delete values[name];
 }
 
 function wrong(error, within = "form") {
@@ -356,6 +368,7 @@ const refresh = latest(async () => {
     checked = await ask("check", { options: part("core") });
     wrong(null);
     show(checked);
+    dressed();
     presets(checked);
     $("status").textContent = "";
   } catch (error) {
@@ -405,6 +418,9 @@ $("form").addEventListener("submit", event => event.preventDefault());
   known = await ask("options", {});
   const given = [...new URLSearchParams(location.hash.slice(1))];
   Object.assign(values, given.length ? Object.fromEntries(given) : known.start);
+  const names = new Set(known.groups.flatMap(group => group.options).map(one => one.name));
+  const strange = Object.keys(values).filter(name => !names.has(name));
+  for (const name of strange) delete values[name];
   form();
   const ofMotion = known.groups.filter(group => group.part === "motion").flatMap(group => group.options).filter(one => one.name !== "motion");
   $("encoder").lastChild.append(...ofMotion.map(field));
@@ -413,4 +429,5 @@ $("form").addEventListener("submit", event => event.preventDefault());
   $("o-motion").value = values.motion ?? "";
   boards().catch(() => {});
   changed();
+  $("strange").textContent = strange.length ? `The address has options that are not known, and are left out: ${strange.join(", ")}.` : "";
 })().catch(error => wrong(error));

@@ -211,7 +211,7 @@ def test_curves_are_those_of_plan(client: TestClient) -> None:
     assert (error >= 0.99 * floor).all()
     assert error.max() <= 1.01 * floor.max() + spec.velocity.rad_per_s_per_lsb
     rest = spec.times.standstill_ticks * spec.timing.tick_seconds
-    assert found["curves"][0]["cells"] == [f"{error.max():.4g}", "503us", short_time(rest), "252"]
+    assert found["curves"][0]["cells"] == [f"{error.max():.4g}", "503us", short_time(rest), "see the core"]
 
 
 def test_a_motion_is_answered_by_golden_models(client: TestClient) -> None:
@@ -297,3 +297,15 @@ def test_size_says_what_it_needs(client: TestClient, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(size, "PACKAGES", ("no-such-package",))
     found = asked(client, "size", options=CORE)
     assert found["error"].startswith("the size cannot be measured: no-such-package is not installed: pip install")
+
+
+def test_the_form_shows_each_choice_once_and_no_half_bracket(client: TestClient) -> None:
+    groups = {group["title"]: group["options"] for group in asked(client, "options")["groups"]}
+    options = {one["name"]: one for of in groups.values() for one in of}
+    assert (options["bus"]["default"], options["bus"]["choices"].count("none")) == ("none", 1)
+    assert options["position-compare"]["metavar"] == "[START:STEP:COUNT or list:DEPTH]:WIDTH"
+    assert all(one["metavar"].count("[") == one["metavar"].count("]") for one in options.values())
+    research = {"paper-exact", "cancel", "reciprocal", "adaptive", "whole-cycles", "bound-decay"}
+    assert [*groups][-1] == "Research"
+    assert {one["name"] for one in groups["Research"]} == research
+    assert [title for title in groups if "Method" in title] == ["Method"]
