@@ -151,7 +151,6 @@ page: $(LINKED) ## the page of `tachometry explore` without a server, in build/p
 
 site: $(VENV)/.docs page ## the pages of docs/ with a search, in build/www, and `make page` as explore; a dead link is an error
 	$(BIN)/python bench/website.py
-	cp -r build/page build/www/explore
 
 # README.md is the page at PyPI, too, where links are those of the repository, at the tag of the version.
 dist: $(VENV)/.made ## wheel and sdist in build/dist, checked; ADDRESS and MAIL are those of the repository and its owner, if pyproject.toml has none

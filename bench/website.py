@@ -1,5 +1,6 @@
 """Makes the site in build/www: the pages of docs/, with a search that needs no service but the server of the files."""
 
+import html
 import re
 import shutil
 import subprocess
@@ -7,7 +8,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES, SITE = ROOT / "build" / "pages", ROOT / "build" / "www"
+PAGES, SITE, PAGE = (ROOT / "build" / name for name in ("pages", "www", "page"))  # PAGE is that of `make page`
 
 
 def lay_out() -> None:
@@ -19,7 +20,20 @@ def lay_out() -> None:
     for page in PAGES.rglob("*.md"):
         text = page.read_text(encoding="utf-8").replace("](../../", "](../").replace("](docs/", "](")
         text = re.sub(r"\[([^]]*)\]\(\.\./tests/[^)]*\)", r"\1", text)
+        text = re.sub(r"`([^`\n]*\\\|[^`\n]*)`", _in_cell, text)
+        if page == PAGES / "index.md" and PAGE.exists():
+            text = re.sub(
+                r"(?m)^# .*\n",
+                r"\g<0>\n[Configure a core in the browser](explore/index.html){ .md-button }\n",
+                text,
+                count=1,
+            )
         page.write_text(re.sub(r"\bREADME\.md", "index.md", text), encoding="utf-8")
+
+
+def _in_cell(code: re.Match[str]) -> str:
+    """Return code in a cell of a table, whose bars have backslashes in Markdown, which would be seen."""
+    return f"<code>{html.escape(code[1])}</code>".replace("\\|", "&#124;")
 
 
 def build() -> str:
@@ -33,6 +47,8 @@ def build() -> str:
     said = done.stdout + done.stderr
     if done.returncode or "No issues found" not in said:
         raise RuntimeError(said)
+    if PAGE.exists():
+        shutil.copytree(PAGE, SITE / "explore")
     return said
 
 

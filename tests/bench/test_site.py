@@ -79,6 +79,9 @@ def test_the_site_in_a_browser() -> None:
     site = load("website")
     site.build()
     assert dead(site.SITE) == []
+    text = "".join(path.read_text(encoding="utf-8") for path in site.SITE.rglob("*.html"))
+    assert not re.search(r"fonts\.g|<code>[^<]*\\\|", text)
+    assert "[4&#124;2&#124;1]" in text
     with sync_playwright() as playwright, served(site.SITE) as address:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
         page = browser.new_page()
