@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tachometry.hdl.export.targets import linux, vivado
+from tachometry.hdl.export.targets import linux, quartus, vivado
 from tachometry.hdl.export.targets.litex import FILES as LITEX
 from tachometry.hdl.export.targets.litex import litex
 from tachometry.hdl.export.targets.rio import FILES as RIO
@@ -35,6 +35,13 @@ TARGETS = {
         vivado.BUSES,
         vivado.FILES,
         vivado.vivado,
+        loops=True,
+    ),
+    "quartus": Target(
+        "component for Platform Designer of Quartus in DIR/NAME_hw.tcl, with --bus axi-lite, apb or none",
+        quartus.BUSES,
+        quartus.FILES,
+        quartus.quartus,
         loops=True,
     ),
     "linux": Target(
