@@ -57,6 +57,9 @@ class Recorder:
             self._writer.writerow([int(value) if isinstance(value, bool) else value for value in values])
         self.rows += 1
 
+    def waits(self, why: str) -> None:
+        """Write nothing: a silence is no row."""
+
     def saved(self) -> tuple[Path, int]:
         """Cut what has reached a full disk to whole rows, and return the CSV and how many there are."""
         end = lines = 0

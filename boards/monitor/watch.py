@@ -3,14 +3,13 @@
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Protocol, Self
 
 from tachometry.boards.host.link import Counts
 from tachometry.boards.monitor.columns import Column, Value
-from tachometry.boards.monitor.recorder import Recorder
 from tachometry.boards.monitor.session import Frame, Session
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.ports import BOUNDS
@@ -53,6 +52,16 @@ class State:
         return self.columns[name].value(self.frame.snapshot) if self.frame and name in self.columns else None
 
 
+class Sink(Protocol):
+    """Takes telemetry: a recording, or what publishes it."""
+
+    def write(self, frame: Frame) -> None:
+        """Take a frame."""
+
+    def waits(self, why: str) -> None:
+        """Take why there is no telemetry; empty: there is."""
+
+
 class Display(Protocol):
     """Where a state is shown; a context manager."""
 
@@ -74,11 +83,11 @@ def watch(
     session: Session,
     state: State,
     screen: Display,
-    recorder: Recorder | None,
+    sinks: Sequence[Sink],
     seconds: Fraction | None,
     stop: threading.Event,
 ) -> None:
-    """Show and record telemetry until it is stopped, or for so many seconds of the board.
+    """Show telemetry, and hand it to sinks, until it is stopped, or for so many seconds of the board.
 
     It raises TimeoutError if none has come in this time.
     """
@@ -97,9 +106,7 @@ def watch(
             if seconds is not None and frames and frames[-1].time > seconds:
                 frames = [frame for frame in frames if frame.time <= seconds]
                 over = True
-            if recorder is not None:
-                for frame in frames:
-                    recorder.write(frame)
+            _hand_over(sinks, frames, session)
             if over or not state.counters or now - looked >= _COUNTERS:
                 looked = now
                 state.counters = session.counters() or state.counters
@@ -109,3 +116,11 @@ def watch(
     finally:
         session.close()
     screen.end(state)
+
+
+def _hand_over(sinks: Sequence[Sink], frames: Sequence[Frame], session: Session) -> None:
+    for sink in sinks:
+        for frame in frames:
+            sink.write(frame)
+        if session.connections:
+            sink.waits(session.waits_for)

@@ -17,6 +17,7 @@ import click
 from tachometry.boards.fpga.boards import BOARDS
 from tachometry.boards.monitor.columns import columns
 from tachometry.boards.monitor.emulator_settings import emulator_settings
+from tachometry.boards.monitor.publisher import publisher_of
 from tachometry.boards.monitor.recorder import Recorder
 from tachometry.boards.monitor.selftest import selftest as run_selftest
 from tachometry.boards.monitor.selftest import steps
@@ -105,6 +106,13 @@ Examples:
     suffixes=(".csv", ".parquet"),
     help="Record a row for each frame: time and all outputs. .csv or .parquet.",
 )
+@option(
+    _GROUP,
+    "--publish ADDRESS",
+    help="Publish each frame: mqtt://HOST/TOPIC or epics:PREFIX. MQTT has a JSON object for each frame at TOPIC, and "
+    "USER:PASSWORD@ before HOST and :PORT behind it where the broker needs them; EPICS serves a variable PREFIX + NAME "
+    "for each output.",
+)
 @OPTIONAL_CORE_OPTIONS
 def monitor(
     port: str,
@@ -117,6 +125,7 @@ def monitor(
     selftest: bool,
     serve: Path | None,
     record: Path | None,
+    publish: str | None,
 ) -> int:
     """Show what a board measures: speed, position, errors, and a running plot of the speed.
 
@@ -128,11 +137,14 @@ def monitor(
     Exit status 1 if the self-test fails; 2 if something else answers than the board of the manifest.
     """
     if selftest:
-        _refuse("--selftest", {"--record": record, "--set": words, "--duration": duration, "--serve": serve})
+        _refuse(
+            "--selftest",
+            {"--record": record, "--publish": publish, "--set": words, "--duration": duration, "--serve": serve},
+        )
     if serve is not None:
         if not port.startswith(SIMULATED):
             raise ValueError("--serve must be given with a simulated board")
-        _refuse("--serve", {"--record": record, "--set": words})
+        _refuse("--serve", {"--record": record, "--publish": publish, "--set": words})
     seconds = None if duration is None else parse_time("duration", duration)
     if seconds is not None and seconds <= 0:
         raise ValueError(f"--duration must be longer than 0, not {duration}")
@@ -147,6 +159,7 @@ def monitor(
     outputs = Outputs({"--record": record}, inputs=[] if manifest is None else [manifest])
     shown = {column.name: column for column in columns(target.registers)}
     state = State(target.title, target.registers.spec, shown, recorded="" if record is None else str(record))
+    publisher = None if publish is None else publisher_of(publish, list(shown.values()))
     screen = display(plain)
     failure: Exception | None = None
     with _interrupts() as stop, outputs:
@@ -156,12 +169,14 @@ def monitor(
             with ExitStack() as stack:
                 if recorder is not None:
                     stack.enter_context(recorder)
+                if publisher is not None:
+                    stack.enter_context(publisher)
                 name = stack.enter_context(target.presence())
                 stop.orderly = True
                 label, described = target.label(name), target.manifest
                 session = Session(label, lambda: target.open(name), described, period, settings, screen.notice)
                 with screen:
-                    watch(session, state, screen, recorder, seconds, stop)
+                    watch(session, state, screen, [one for one in (recorder, publisher) if one], seconds, stop)
         except Exception as error:
             if recorder is None or record is None or not recorder.rows:
                 raise

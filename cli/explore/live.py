@@ -164,7 +164,7 @@ class _Watched:
         told = "stopped"
         try:
             with refusals(), self.target.presence() as self._port:
-                watch(self._session, self._state, self, None, None, self.stop)
+                watch(self._session, self._state, self, (), None, self.stop)
         except Refused as error:
             told = str(error)
         except Exception as error:
