@@ -169,18 +169,20 @@ def curves(options: Texts) -> Answer:
     unit, near = core.scale.shown_unit, np.geomspace(plans.low, plans.high, _POINTS + 1)[:-1]
     every = plans.line.speed.tolist()
     starts = sorted({bisect_left(every, speed) for speed in near.tolist()})
+    within = plans.line.speed >= plans.range[0]  # in which `generate` has the worst error
 
     def shown(name: str, spec: TachometerSpec, plan: Plan) -> Answer:
         error = plan.resolution + plan.disc + spec.velocity.rounding_lsb * spec.velocity.rad_per_s_per_lsb
         late = float(spec.tick.seconds(spec.latency.tick_to_velocity) + spec.times.filter_lag)
         delay = late + plan.measurement_time / 2 * (not spec.words.on_ramps)
-        errors, delays = _greatest(unit.of(error), starts), _greatest(delay, starts)
-        known = [(one, late) for one, late in zip(errors, delays, strict=True) if one is not None and late is not None]
-        worst = (f"{max(known)[0]:.4g}", shown_time(max(late for _, late in known))) if known else ("-", "-")
+        errors, known = _greatest(unit.of(error), starts), within & ~np.isnan(error)
+        most = [values[known].max(initial=-1) for values in (unit.of(error), delay)]
+        worst = (f"{most[0]:.4g}", shown_time(most[1])) if known.any() else ("-", "-")
         rest = spec.times.standstill_ticks * spec.timing.tick_seconds
         own = name == core.method
         cells = "see the core" if own else str(cells_of(spec) or "-")  # a reference core has other options
-        return dict(name=name, own=own, error=errors, delay=delays, cells=[*worst, short_time(rest), cells])
+        row = [*worst, short_time(rest), cells]
+        return dict(name=name, own=own, error=errors, delay=_greatest(delay, starts), cells=row)
 
     each = [shown(name, plans.methods[name], plan) for name, plan in plans.lines.items()]
     return {
