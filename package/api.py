@@ -23,7 +23,8 @@ from tachometry.sim.captures.header import TextOptions
 from tachometry.sim.captures.read import read_capture, with_last_tick
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.options import EncoderOptions
-from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
+from tachometry.sim.encoder.sampled import encoder_of
+from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.signals.progress import no_bar
 from tachometry.sim.signals.recording import Recording
 from tachometry.sim.signals.shown import Shown
@@ -369,7 +370,7 @@ def _recorded(spec: AnySpec, motion: str, axis: int, encoder: Mapping[str, objec
             raise ParameterError(name, f"must be an option of the encoder: {', '.join(known)}")
     with _in_python():
         values = read_options(EncoderOptions, _texts(encoder))
-        whole = VirtualEncoder.of_core(spec.tachometer, **values)
+        whole = encoder_of(spec.tachometer, **values)
         return replace(whole, seed=whole.seed + axis).record(parse_motion(motion))
 
 

@@ -7,6 +7,7 @@ class CoreOptions(TypedDict, total=False):
     age: bool | None
     average: Value | None
     axes: Value | None
+    bits: Value | None
     blanking: Value | None
     bound_decay: bool | None
     bounds: bool | None
@@ -68,6 +69,7 @@ class CoreOptions(TypedDict, total=False):
     ratio: Value | None
     reciprocal: Value | None
     reverse: bool | None
+    sample_age: Value | None
     sensor: Value | None
     sincos: bool | None
     smooth: bool | None
@@ -96,4 +98,7 @@ class EncoderFaults(TypedDict, total=False):
     stuck: Value | None
     index_width: Value | None
     index_skew: Value | None
+    noise: Value | None
+    interpolation: Value | None
+    frame_errors: Value | None
     seed: Value | None

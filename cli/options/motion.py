@@ -120,9 +120,9 @@ class Recorder:
 
     def __call__(self, spec: TachometerSpec, axis: int = 0, axes: int | None = None) -> Encoding:
         """Return the recording; ValueError if there are more motions than axes."""
-        from tachometry.sim.encoder.virtual import VirtualEncoder
+        from tachometry.sim.encoder.sampled import encoder_of
 
-        own = VirtualEncoder.of_core(spec, **self.values)
+        own = encoder_of(spec, **self.values)
         if axes is None:
             return _record(own, self.motion, spec)
         each = self.motion.split(",")

@@ -17,7 +17,7 @@ from tachometry.cli.options.sweep import point_options
 from tachometry.cli.options.sweep_settings import Settings, Text
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.options import EncoderOptions
-from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.encoder.sampled import encoder_of
 from tachometry.sim.studies.sweeping.grid import Grid, Item, Loops, Points
 from tachometry.sim.studies.sweeping.loops import LoopPoint, seeds_from
 from tachometry.sim.studies.sweeping.sweep import COLUMNS, Point
@@ -113,7 +113,7 @@ class _Maker:
         core = {key: texts[key] for key in self._core if key in texts} | dict(given)
         spec = self._spec(method, tuple(core.items()))
         faults = {key: text for key in _FAULTS if (text := texts.get(key)) is not None}
-        encoder = VirtualEncoder.of_core(spec, **self._values(tuple(faults.items())))
+        encoder = encoder_of(spec, **self._values(tuple(faults.items())))
         if (motion := texts.get("motion")) is None:
             raise ParameterError("motion", "must be given")
         places = {key: texts[key] or "" for key in _PLACE.findall(motion)}

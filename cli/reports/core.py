@@ -17,6 +17,8 @@ from tachometry.spec.registers.manifest import manifest
 def core_rows(spec: TachometerSpec, bus: Bus | None = None) -> list[tuple[str, str]]:
     """Return the configuration of a core, what it measures, and its registers on a bus."""
     registers = [] if bus is None else [registers_row(spec, bus)]
+    if spec.encoder.sampled is not None:  # plans are of discs
+        return [*configuration(spec), *registers]
     plans = Plans.of(spec)
     return [*configuration(spec), *measured(spec, plans), *advice(plans), *registers]
 
@@ -25,6 +27,9 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
     """Return rows of the table: a name and its value."""
     encoder, timing = spec.encoder, spec.timing
     counts = f"{encoder.pulses_per_rev} pulses per revolution x{encoder.decoding}: {encoder.encoder_counts} counts"
+    if (sampled := encoder.sampled) is not None:
+        turns = f", {sampled.turn_bits} bits of turns" if sampled.turn_bits else ""
+        counts = f"read once a tick, {sampled.bits} bits: {encoder.encoder_counts} counts per revolution{turns}"
     if encoder.ratio is not None:
         counts += f", {encoder.ratio} turns for one of the shaft: {encoder.counts_per_rev} counts"
     fastest = spec.velocity.greatest_speed

@@ -153,6 +153,8 @@ def _flagged(axis: Axis) -> str:
     flagged, truth = len(axis.run.errors), axis.truth
     if truth is None:
         return str(flagged)
+    if axis.spec.encoder.sampled is not None:
+        return f"{flagged} (reads that were wrong)"
     hint = "; the others are edges within one clock" if flagged > truth.n_illegal else ""
     return f"{flagged} (the encoder made {truth.n_illegal} illegal transitions{hint})"
 

@@ -9,6 +9,7 @@ from tachometry.hdl.bus.interrupts import Interrupts, connect
 from tachometry.hdl.bus.native import native_port
 from tachometry.hdl.bus.tick_position import TickPosition
 from tachometry.hdl.core.loop_core import LoopCore
+from tachometry.hdl.core.sampled_tachometer import tachometer_of
 from tachometry.hdl.core.tachometer import Tachometer
 from tachometry.hdl.wires.ports import by_name, drive, follow, members
 from tachometry.spec.registers.loop import LoopMap
@@ -24,7 +25,7 @@ class RegisterCore(wiring.Component):
     def __init__(self, registers: RegisterMap) -> None:
         self._map = registers
         self.loop = LoopCore(registers.loop) if isinstance(registers, LoopMap) else None
-        self.tachometer = Tachometer(registers.spec) if self.loop is None else self.loop.tachometer
+        self.tachometer = tachometer_of(registers.spec) if self.loop is None else self.loop.tachometer
         self.bank = RegisterBank(registers)
         super().__init__(
             {
@@ -60,7 +61,7 @@ class RegisterCore(wiring.Component):
         drive(m, position, {"tick": core.tick, "position": core.position})
         drive(m, bank, {"capture": self.capture, "position": position.latest})
         self._place(m)
-        for box in (core.conditioner, *core.extras.values()):
+        for box in core.settable:
             settings = {"clear", *written} & box.signature.members.keys() - core.signature.members.keys()
             follow(m, box, bank, sorted(settings))
         if self.loop is not None:

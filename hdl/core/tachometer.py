@@ -46,9 +46,35 @@ class Tachometer(wiring.Component):
     out; and those of its options.
     """
 
+    _skipped: tuple[str, ...] = ("conditioner", "datapath")  # boxes that a simulation may move on
+
     def __init__(self, spec: TachometerSpec) -> None:
         self._spec = spec
         super().__init__(members(spec.ports))
+        self._make_front(spec)
+        self.datapath = DATAPATHS[spec.method](spec)
+        self.sampling_clock: TickSource
+        if isinstance(self.datapath, OwnTicks):
+            self.sampling_clock = self.datapath
+        elif spec.external_tick:
+            self.sampling_clock = ExternalTick(spec.times.min_tick_cycles, spec.tick.longest, spec.latency.tick)
+        else:
+            self.sampling_clock = SamplingClock(spec.timing.tick_cycles)
+        layout = update_layout(spec)
+        clears = spec.facts.last_at_rest
+        self.low_pass = None if spec.lowpass is None else LowPass(spec.velocity.low_pass, layout, clears=clears)
+        self.silence: Standstill | None = None
+        if not isinstance(self.datapath, OwnStandstill) and spec.facts.rests_with == TICK:
+            self.silence = Standstill(spec.timing.max_ticks, spec.widths.count, max_shift=spec.times.max_tick_shift)
+        self.update_age = UpdateAge(spec.timing.max_ticks, spec.widths.stamp) if spec.age else None
+        self.velocity_output: SerialVelocityOutput | PipelinedVelocityOutput | None = None
+        if spec.velocity.output is not None:
+            box = SerialVelocityOutput if spec.latency.output_serial else PipelinedVelocityOutput
+            self.velocity_output = box(spec.velocity.output, layout)
+        self.extras = {extra.name: gates_of(extra, spec) for extra in spec.extras}
+
+    def _make_front(self, spec: TachometerSpec) -> None:
+        """Make the boxes from the pins to the counts of a tick."""
         front, latency = spec.front_end, spec.latency.tick
         held = {line: Blanking(spec.blanking_clocks, starts) for line, starts in front.blanked.items()}
         self.conditioner = InputConditioner(spec.filter_clocks, (*front.lines, *front.sensed), front.complemented, held)
@@ -66,26 +92,6 @@ class Tachometer(wiring.Component):
         self.index_state: IndexState | None = None
         if (state := front.index_state) is not None:
             self.index_state = IndexState(state, spec.encoder.kind.after(state), latency)
-        self.datapath = DATAPATHS[spec.method](spec)
-        self.sampling_clock: TickSource
-        if isinstance(self.datapath, OwnTicks):
-            self.sampling_clock = self.datapath
-        elif spec.external_tick:
-            self.sampling_clock = ExternalTick(spec.times.min_tick_cycles, spec.tick.longest, latency)
-        else:
-            self.sampling_clock = SamplingClock(spec.timing.tick_cycles)
-        layout = update_layout(spec)
-        clears = spec.facts.last_at_rest
-        self.low_pass = None if spec.lowpass is None else LowPass(spec.velocity.low_pass, layout, clears=clears)
-        self.silence: Standstill | None = None
-        if not isinstance(self.datapath, OwnStandstill) and spec.facts.rests_with == TICK:
-            self.silence = Standstill(spec.timing.max_ticks, spec.widths.count, max_shift=spec.times.max_tick_shift)
-        self.update_age = UpdateAge(spec.timing.max_ticks, spec.widths.stamp) if spec.age else None
-        self.velocity_output: SerialVelocityOutput | PipelinedVelocityOutput | None = None
-        if spec.velocity.output is not None:
-            box = SerialVelocityOutput if spec.latency.output_serial else PipelinedVelocityOutput
-            self.velocity_output = box(spec.velocity.output, layout)
-        self.extras = {extra.name: gates_of(extra, spec) for extra in spec.extras}
 
     @property
     def spec(self) -> TachometerSpec:
@@ -95,26 +101,25 @@ class Tachometer(wiring.Component):
     @property
     def idle(self) -> tuple[Idle, ...]:
         """Registers that a simulation may move on."""
-        names = ("conditioner", "datapath")
-        boxes: dict[str, object] = {name: getattr(self, name) for name in names}
+        boxes: dict[str, object] = {name: getattr(self, name) for name in self._skipped}
         boxes |= {f"{name}_box": box for name, box in self.extras.items()}
         if not self._spec.facts.own_ticks:
             boxes["sampling_clock"] = self.sampling_clock
         return idle_of(boxes)
 
+    @property
+    def settable(self) -> tuple[wiring.Component, ...]:
+        """Boxes with inputs that a program sets."""
+        return (self.conditioner, *self.extras.values())
+
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        m.submodules.conditioner = self.conditioner
-        m.submodules.decoder = self.decoder
-        m.submodules.pulse_counter = self.pulse_counter
-        m.submodules.position_counter = self.position_counter
+        self._place_front(m)
         m.submodules.datapath = self.datapath
         if not self._spec.facts.own_ticks:
             m.submodules.sampling_clock = self.sampling_clock
-        (step,) = delay(m, self.decoder.step, clocks=int(self._spec.latency.registers_steps))
-        self._count(m, step)
         ticks = Signal(max(self._spec.widths.stamp, 1))  # with the one in this clock
-        self._measure(m, step, ticks)
+        self._measure(m, {**self._count(m), "stamp": ticks})
         self._rest(m)
         updates = self._output(m)
         self._age(m, ticks, updates)
@@ -133,8 +138,16 @@ class Tachometer(wiring.Component):
             m.d.comb += self.filtered_edges.eq(self.conditioner.filtered_edges)
         return m
 
-    def _count(self, m: Module, step: Signal) -> None:
-        """Count the steps of the pins: the position, and the pulses of a window."""
+    def _place_front(self, m: Module) -> None:
+        """Add the boxes from the pins to the counts of a tick."""
+        m.submodules.conditioner = self.conditioner
+        m.submodules.decoder = self.decoder
+        m.submodules.pulse_counter = self.pulse_counter
+        m.submodules.position_counter = self.position_counter
+
+    def _count(self, m: Module) -> dict[str, Value]:
+        """Count the steps of the pins: the position, and the pulses of a window; return what a datapath may take."""
+        (step,) = delay(m, self.decoder.step, clocks=int(self._spec.latency.registers_steps))
         conditioner, decoder = self.conditioner, self.decoder
         position_counter, pulse_counter = self.position_counter, self.pulse_counter
         lines = self._spec.encoder.kind.lines
@@ -151,27 +164,27 @@ class Tachometer(wiring.Component):
             self.pulse_count.eq(pulse_counter.pulse_count),
             self.overflow.eq(pulse_counter.overflow),
         ]
+        taken: dict[str, Value] = {name: getattr(pulse_counter, name) for name in ("coming", "next_count")}
+        inputs, latency = self.datapath.signature.members, self._spec.latency.tick
+        if "step" in inputs:
+            # As late as `tick`: with it, all steps of the window have come.
+            (taken["step"],) = delay(m, decoder.step, clocks=latency)
+        if "step_before" in inputs:
+            (taken["step_before"],) = delay(m, decoder.step, clocks=latency - 1)
+        if isinstance(self.datapath, OwnTicks):
+            m.d.comb += pulse_counter.beyond.eq(self.datapath.beyond)
+        return {**taken, "step_now": step}
 
     def _level(self, line: str) -> Value:
         """Return the level of a line that is in the clock domain, as it should be read."""
         level: Value = getattr(self.conditioner, f"level_{line}")
         return ~level if line in self._spec.encoder.inverted else level
 
-    def _measure(self, m: Module, step: Signal, ticks: Signal) -> None:
-        """Give the datapath what its method takes of ticks, counts and steps."""
-        datapath, latency = self.datapath, self._spec.latency.tick
-        taken = {name: getattr(self, name) for name in ("tick", "pulse_count", "position", "overflow")}
-        taken |= {name: getattr(self.pulse_counter, name) for name in ("coming", "next_count")}
-        taken |= {"step_now": step, "stamp": ticks}
-        inputs = datapath.signature.members
-        if "step" in inputs:
-            # As late as `tick`: with it, all steps of the window have come.
-            (taken["step"],) = delay(m, self.decoder.step, clocks=latency)
-        if "step_before" in inputs:
-            (taken["step_before"],) = delay(m, self.decoder.step, clocks=latency - 1)
-        m.d.comb += [getattr(datapath, name).eq(value) for name, value in taken.items() if name in inputs]
-        if isinstance(datapath, OwnTicks):
-            m.d.comb += self.pulse_counter.beyond.eq(datapath.beyond)
+    def _measure(self, m: Module, counted: dict[str, Value]) -> None:
+        """Give the datapath what its method takes of ticks and counts."""
+        taken = {name: getattr(self, name) for name in ("tick", "pulse_count", "position", "overflow")} | counted
+        inputs = self.datapath.signature.members
+        m.d.comb += [getattr(self.datapath, name).eq(value) for name, value in taken.items() if name in inputs]
 
     def _rest(self, m: Module) -> None:
         """Drive `standstill`."""

@@ -68,7 +68,7 @@ def _synchronizers(spec: AnySpec, bus: Bus | None) -> dict[str, list[str]]:
 def _first_levels(spec: AnySpec) -> dict[str, int]:
     """Return levels of the sensor's lines before it turns, those that are not 0, and of an index that is inverted."""
     encoder, all_ones = spec.tachometer.encoder, (1 << (spec.axes or 1)) - 1
-    first = dict(zip(encoder.kind.lines, encoder.kind.legal[0], strict=True)) | {"z": 0}
+    first = dict(zip(encoder.kind.lines, encoder.kind.legal[0], strict=encoder.sampled is None)) | {"z": 0}
     at_pins = {line: level ^ (line in encoder.inverted) for line, level in first.items()}
     at_pins |= {f"{line}_n": 1 - at_pins[line] for line in spec.tachometer.front_end.complemented}
     return {line: all_ones for line, level in at_pins.items() if level}
@@ -87,6 +87,9 @@ def _turned(encoder: Encoder, turns: tuple[int, int]) -> tuple[dict[str, str], i
     elif encoder.sensor == "pulses":
         levels = {"a": levels["a"]}
         counts = sum(turns) * encoder.decoding // 4 * (-1 if encoder.reverse else 1)
+    elif encoder.sampled is not None:
+        age = {} if encoder.sample_age is not None else {"sample_age": "0"}
+        levels, counts = {"sample": "quarter", "sample_valid": "1'b1", "sample_ok": "1'b1", **age}, moved
     elif not kind.cycle:
         levels = {
             "a": "1'b1" if encoder.sensor == "step-dir" else "forward",
@@ -108,7 +111,8 @@ def _bench(tacho: TachometerSpec) -> dict[str, object]:
     hold = max(_hold(tacho), min(2 * (tacho.filter_clocks + 8), tacho.filter_clocks + 300), tacho.blanking_clocks)
     turns = _turns(hold)
     levels, expected = _turned(encoder, turns)
-    low = {line: f"1'b{int(line in encoder.inverted)}" for line in ("a", "b")}
+    lines = ("a", "b") if encoder.sampled is None else ("sample_valid",)
+    low = {line: f"1'b{int(line in encoder.inverted)}" for line in lines}
     if encoder.sensor == "step-dir":
         del low["b"]
     return {
@@ -118,6 +122,7 @@ def _bench(tacho: TachometerSpec) -> dict[str, object]:
         "levels": _wired(tacho, levels),
         "ends": {} if encoder.kind.cycle else low,
         "places": 6 if encoder.sensor == "hall" else 4,
+        "place_bits": encoder.sampled.width if encoder.sampled else 3 if encoder.sensor == "hall" else 2,
         "velocity": "velocity",
         "lsb": 2.0**-tacho.velocity.frac_bits,
         "compared": "generate --testbench cocotb",
@@ -125,7 +130,7 @@ def _bench(tacho: TachometerSpec) -> dict[str, object]:
         # Forward, as it counts; a line alone does not tell.
         "mirrored": encoder.reverse and encoder.sensor != "pulses",
         "backward": encoder.reverse and encoder.sensor == "pulses",
-        "steps": "quarter periods" if encoder.kind.cycle else "steps",
+        "steps": "quarter periods" if encoder.kind.cycle else "LSB" if encoder.sampled else "steps",
     }
 
 
@@ -148,6 +153,7 @@ def _axes_bench(tacho: AxesSpec) -> dict[str, object]:
         ),
         "ends": {},
         "places": 4,
+        "place_bits": 2,
         "velocity": "velocity_0" if tacho.parallel else "velocity",
         "store": f"begin {stores} end" if tacho.parallel else "positions[axis] <= position;",
         "compared": "generate --testbench cocotb",

@@ -1,5 +1,7 @@
 """The tracking method."""
 
+from typing import Any
+
 from amaranth import Module, ResetInserter, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
@@ -9,9 +11,8 @@ from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.tick_counts import TickCounts
 from tachometry.hdl.methods.track_machine import TrackMachine
-from tachometry.hdl.wires.ports import follow
+from tachometry.hdl.wires.ports import drive, follow, only_if
 from tachometry.spec import TrackTachometer
-from tachometry.spec.formats.tracking import PLACE_BITS
 from tachometry.spec.formats.tracking_code import SMOOTH_DELAY_BITS
 
 
@@ -31,13 +32,22 @@ class TrackMethod(wiring.Component):
 
     def __init__(self, spec: TrackTachometer) -> None:
         self._spec = spec
-        self.tick_counts = TickCounts(spec.form, spec.timing.max_ticks)
+        self._reads = spec.encoder.sampled is not None
+        self.tick_counts = None if self._reads else TickCounts(spec.form, spec.timing.max_ticks)
         self.machine = TrackMachine(spec.program)
         self.left = SamplingClock(spec.latency.datapath - 1)
         super().__init__(
             {
                 **datapath_members(spec),
-                "step": In(signed(2)),  # as late as `tick`
+                **only_if(not self._reads, step=In(signed(2))),  # as late as `tick`
+                **only_if(
+                    self._reads,
+                    number=In(1),
+                    times=In(spec.form.times_bits),
+                    silent=In(range(spec.timing.max_ticks + 1)),
+                    elapsed=In(range(spec.timing.max_ticks + 1)),
+                    length=In(range(spec.tick.longest + 1)),
+                ),  # see `SampledPosition`
                 "position": In(signed(spec.position_width)),  # valid with `tick`
             }
         )
@@ -45,7 +55,8 @@ class TrackMethod(wiring.Component):
     @property
     def probes(self) -> dict[str, Value]:
         """Signals of the inside that a waveform should show."""
-        return {"counts_number": self.tick_counts.number, "counts_times": self.tick_counts.times}
+        source: Any = self.tick_counts or self
+        return {"counts_number": source.number, "counts_times": source.times}
 
     @property
     def idle(self) -> tuple[Idle, ...]:
@@ -56,7 +67,6 @@ class TrackMethod(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         spec = self._spec
-        m.submodules.tick_counts = counts = self.tick_counts
         m.submodules.machine = machine = self.machine
         position = Signal.like(self.position)
         # All ways through the program take as long.
@@ -68,11 +78,10 @@ class TrackMethod(wiring.Component):
             m.d.sync += awaited.eq(0)
         with m.If(self.tick):
             m.d.sync += [position.eq(self.position), awaited.eq(1)]
-        m.d.comb += [counts.tick.eq(self.tick), counts.step.eq(self.step), machine.begin.eq(self.tick)]
-        names = ("number", "times", "places", "last", "moved", "length", "kind", "end", "down")
-        follow(m, machine, counts, names)
+        m.d.comb += machine.begin.eq(self.tick)
+        elapsed = self._take_counts(m)
         new = self.updates.p
-        shift = PLACE_BITS - spec.position_fine_bits
+        shift = spec.form.moved_shift - spec.position_fine_bits
         m.d.sync += self.updates.valid.eq(ready)
         if spec.smooth:
             delay = delay_of(machine.smooth_delay, spec.form.time_bits)
@@ -88,8 +97,20 @@ class TrackMethod(wiring.Component):
                     + (machine.position_fine >> shift)
                     + machine.position_fine[shift - 1]
                 ),
-                new.interval.eq(counts.elapsed),
-                new.forced.eq(~counts.number.any()),
-                new.standstill.eq(machine.standstill & ~counts.number.any()),
+                new.interval.eq(elapsed),
+                new.forced.eq(~machine.number.any()),
+                new.standstill.eq(machine.standstill & ~machine.number.any()),
             ]
         return m
+
+    def _take_counts(self, m: Module) -> Value:
+        """Give the machine the counts of a tick, or its read; return the ticks since the one before."""
+        if (counts := self.tick_counts) is None:
+            follow(m, self.machine, self, ("number", "times", "length"))
+            drive(m, self.machine, {"moved": self.pulse_count, "last": self.silent})
+            return Value.cast(self.elapsed)
+        m.submodules.tick_counts = counts
+        m.d.comb += [counts.tick.eq(self.tick), counts.step.eq(self.step)]
+        names = ("number", "times", "places", "last", "moved", "length", "kind", "end", "down")
+        follow(m, self.machine, counts, names)
+        return Value.cast(counts.elapsed)

@@ -115,7 +115,7 @@ class TrackMachine(wiring.Component):
                 "number": In(form.number_bits),
                 "times": In(form.times_bits),
                 "places": In(signed(form.places_bits)),
-                "last": In(range(form.longest_tick)),
+                "last": In(range(form.most_last + 1)),
                 "moved": In(signed(form.moved_bits)),
                 "length": In(range(form.longest_tick + 1)),
                 "kind": In(2),  # of the last count's edge
@@ -365,8 +365,8 @@ class TrackMachine(wiring.Component):
 
     def _inputs(self) -> list[Value]:
         """Return the inputs of the tick as words."""
-        t = self._program.form.time_bits
-        shifts = {"counts": PLACE_BITS, "places": _PLACES_BITS, "times": t, "last": t, "moved": PLACE_BITS, "length": t}
+        t, moved = self._program.form.time_bits, self._program.form.moved_shift
+        shifts = {"counts": PLACE_BITS, "places": _PLACES_BITS, "times": t, "last": t, "moved": moved, "length": t}
         ports = by_name(self, (name for name in INPUTS if name != "counts")) | {"counts": self.number}
         return [ports[name] << shifts.get(name, 0) for name in INPUTS]
 

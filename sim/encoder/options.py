@@ -32,6 +32,14 @@ def _line_fault(what: str, text: str) -> LineFault:
     return LineFault.parse(what, text)
 
 
+def _interpolation(what: str, text: str) -> tuple[float, int]:
+    """Return the LSB of an interpolation error, and its periods in a turn."""
+    lsb, _, periods = text.partition(":")
+    if not periods.strip().isdecimal() or not 1 <= int(periods) <= 1 << 20:
+        raise ParameterError(what, f"must be LSB:PERIODS, as 0.15:1024, with 1 to {1 << 20} periods, not {text!r}")
+    return number_reader(FRACTION)(what, lsb), int(periods)
+
+
 def _seed(what: str, text: str) -> int:
     try:
         return int(text)
@@ -46,6 +54,9 @@ def _time(what: str, text: str) -> float:
 def _fault(help: str, metavar: str, parse: Callable[[str, str], float], name: str = "") -> float:
     found: float = option(None, help, text="0", name=name, metavar=metavar, parse=parse)
     return found
+
+
+_MOST_NOISE = 1000  # LSB
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,6 +164,23 @@ class EncoderOptions:
         metavar="TIME",
         parse=_time,
     )
+    noise: float = _fault(
+        "Noise of sampled positions: standard deviation in LSB. At most 1000.",
+        "LSB",
+        number_reader(FRACTION),
+    )
+    interpolation: tuple[float, int] | None = option(
+        None,
+        "Interpolation error of sampled positions, such as 0.15:1024. A sine of LSB with PERIODS a turn.",
+        metavar="LSB:PERIODS",
+        parse=_interpolation,
+    )
+    frame_errors: float = _fault(
+        "Probability that a read of a sampled position is wrong. The frame says so.",
+        "PROBABILITY",
+        number_reader(FRACTION),
+        name="frame-errors",
+    )
     seed: int = option(0, "Seed of all random numbers; equal seeds give equal files.", metavar="N", parse=_seed)
 
     def __post_init__(self) -> None:
@@ -160,7 +188,10 @@ class EncoderOptions:
             value = getattr(self, name)
             if not 0 <= value < 0.5:
                 raise ParameterError(name, f"must be from 0 to less than 0.5, not {value}")
-        for name, value in (("illegal", self.illegal), ("lost", self.lost)):
+        if not 0 <= self.noise <= _MOST_NOISE:
+            raise ParameterError("noise", f"must be from 0 to {_MOST_NOISE}, not {self.noise}")
+        for name in ("illegal", "lost", "frame_errors"):
+            value = getattr(self, name)
             if not 0 <= value <= 1:
                 raise ParameterError(name, f"must be from 0 to 1, not {value}")
         for name, value in (("phase_error_deg", self.phase_error_deg), ("duty_error_deg", self.duty_error_deg)):

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.encoder.imperfections import pulsed
+from tachometry.sim.encoder.sampled import stress_reads
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.axes import AxesTrace, Trace
 from tachometry.sim.signals.recording import PinTrace, merged, quadrature
@@ -21,6 +22,8 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     There are `n_edges` at each of six speeds.
     """
     rng, sensor = np.random.default_rng(seed), spec.encoder.kind
+    if spec.encoder.sampled is not None:
+        return _ticked(spec, stress_reads(spec, seed, n_edges), rng)
     cycles, longest = spec.timing.tick_cycles, spec.timing.tick_cycles * spec.timing.max_ticks
     gaps, turns = [], []
     steps = not sensor.cycle  # each is a pulse
@@ -48,13 +51,18 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     a, b, c = (level >> np.uint8(line) & np.uint8(1) for line in range(3))
     trace = PinTrace(clock, a, b, n_clocks, z, c=c if "c" in sensor.lines else None)
     trace = _probed(spec, trace, np.interp(clock, edge, counts).astype(np.int64), seed)
-    trace = _open(spec, trace, seed)
+    return _ticked(spec, _controlled(spec, _open(spec, trace, seed), rng), rng)
+
+
+def _controlled(spec: TachometerSpec, trace: PinTrace, rng: np.random.Generator) -> PinTrace:
+    """Return the trace with rises of the inputs that move the position or arm the index."""
+    n_clocks = trace.n_clocks
     for name in spec.front_end.controls:
         few = 30 if name == "preset" else 6
         high = spec.filter_clocks + int(rng.integers(1, 30))
         apart = rng.integers(high + spec.filter_clocks + 1, n_clocks // few + high + spec.filter_clocks + 2, few)
         trace = trace.with_pulses(name, np.cumsum(apart), high)
-    return _ticked(trace, cycles, rng) if spec.external_tick else trace
+    return trace
 
 
 def _levels(
@@ -75,8 +83,11 @@ def _levels(
     return clock, VirtualEncoder.of(spec.encoder).patterned(level, place)
 
 
-def _ticked(trace: PinTrace, cycles: int, rng: np.random.Generator) -> PinTrace:
-    """Return the trace with external ticks, some early, some late, some missing."""
+def _ticked(spec: TachometerSpec, trace: PinTrace, rng: np.random.Generator) -> PinTrace:
+    """Return the trace with external ticks if there are any, some early, some late, some missing."""
+    if not spec.external_tick:
+        return trace
+    cycles = spec.timing.tick_cycles
     apart = np.full(trace.n_clocks // cycles + 1, cycles)
     apart[500:1000] += rng.integers(-cycles // 2, cycles, len(apart[500:1000]))
     apart[700:710] *= 4

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.index_state import in_state, passed_by
+from tachometry.sim.golden.sampled import Reads
 from tachometry.sim.golden.sorted_lookup import places
 from tachometry.sim.golden.tooth_wheel import Teeth, filled
 from tachometry.sim.signals.recording import PinTrace, merged, packed
@@ -208,7 +209,10 @@ def _indices(
 
 
 def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
-    """Return conditioned and decoded lines."""
+    """Return conditioned and decoded lines; of an encoder that is read, the clocks of wrong reads."""
+    if spec.encoder.sampled is not None:
+        none = _none()
+        return Steps(none, none, Reads.of(spec, trace).errors, none, none)
     returned = [np.empty(0, dtype=np.int64)]
     encoder = spec.encoder
 

@@ -141,9 +141,14 @@ AXES: tuple[tuple[str, ...], ...] = (
     _axes_words(3, 120, 4, "--unit", "rpm", "--velocity-width", "24", "--external-tick", "--filter", "5"),
 )
 
-# A pattern of teeth goes with one sensor and one number of pulses.
+# Cores of sensors that go with few options: teeth, and positions that are read.
 _WHEEL = "--method s --ppr 12 --clock 48000000 --tick 96clk --max-time 960clk --sensor pulses --decoding 1"
-WHEELS = ((*_WHEEL.split(), "--teeth", "12-2"),)
+_READ = "--clock 48000000 --sensor sampled --bits"
+WHEELS = (
+    (*_WHEEL.split(), "--teeth", "12-2"),
+    (*f"--method m {_READ} 3+9 --tick 40clk --max-time 400clk --average 3 --external-tick --reverse".split(),),
+    (*f"--method track {_READ} 17 --tick 900clk --max-time 9000clk --unit rad/s".split(),),
+)
 
 
 def core_of(words: tuple[str, ...]) -> CoreSpec:

@@ -131,6 +131,8 @@ class Plans:
     @staticmethod
     def of(spec: TachometerSpec, greatest: float = math.inf) -> "Plans":
         """Return those of a core alone, over the range that is of interest, up to a greatest speed in rad/s."""
+        if spec.encoder.sampled is not None:
+            raise ParameterError("sensor", "must not be sampled for a plan, which is for edges")
         low, high = default_range(spec)
         return Plans(spec, {}, low, min(high, greatest))
 

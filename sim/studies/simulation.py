@@ -161,7 +161,8 @@ def _axis(core: CoreSpec, run: Run, number: int, recording: Recording, truth: En
         counts_in = int(truth.true_position(sampled, spec.encoder.decoding))
         error = velocity_error(held, truth.true_speed)
     # What sets the position does not undo what has been counted.
-    counts_out = int(run.ticks.pulse_count.sum() if spec.front_end.moves_position else run.ticks.position[-1])
+    moves = spec.front_end.moves_position and spec.encoder.sampled is None
+    counts_out = int(run.ticks.pulse_count.sum() if moves else run.ticks.position[-1])
     n_merged = recording.n_merged(spec.timing.clock_hz, run.n_clocks)
     return Axis(spec, run, recording, truth, n_merged, counts_in, counts_out, held, error)
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tachometry.sim import golden
 from tachometry.sim.encoder.imperfections import Bounce
 from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.sampled import encoder_of
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.axes import AxesTrace
 from tachometry.sim.signals.recording import PinTrace, Recording, check_ticks
@@ -109,6 +110,10 @@ def usual_motion(spec: TachometerSpec, seed: int = 1, most: int = _MOVING) -> Re
     It makes the tours of extras before that. It moves for at most `most` clocks. The rest
     outlasts the maximum time, so that the core reads zero, if that takes at most five times as many; else it is short.
     """
+    usual = _usual_form(spec, most, backward=seed % 2 == 0)
+    if spec.encoder.sampled is not None:
+        read = encoder_of(spec, noise=0.5, frame_errors=0.01, seed=seed)
+        return read.record(parse_motion(usual)).recording
     bounces = spec.filter_clocks and spec.encoder.sensor in ("quadrature", "pulses", "hall")
     encoder = VirtualEncoder.of(
         spec.encoder,
@@ -120,13 +125,14 @@ def usual_motion(spec: TachometerSpec, seed: int = 1, most: int = _MOVING) -> Re
         index=spec.index is not None,
         index_state=spec.front_end.index_place,
     )
-    usual = _usual_form(spec, most, backward=seed % 2 == 0)
     tours = [part for extra in spec.extras for part in _tour(spec, extra.tour(spec), 5 * most)]
     return encoder.record(parse_motion("+".join([*tours, usual]))).recording
 
 
 def _fastest(spec: TachometerSpec) -> float:
     """Return counts per tick that the lines can have: an edge in two clocks, slower with a filter."""
+    if spec.encoder.sampled is not None:
+        return float(spec.tick.max_count) / 2
     edges = 12 if spec.encoder.sensor == "hall" else 8
     return spec.timing.tick_cycles * spec.encoder.decoding / edges / (1 + max(spec.filter_clocks, spec.blanking_clocks))
 

@@ -4,7 +4,9 @@ import math
 from fractions import Fraction
 
 from tachometry.spec.core.core import Core
+from tachometry.spec.core.extras.extra import refuse
 from tachometry.spec.core.front_end import OF_CONTROLS
+from tachometry.spec.core.sampled import Sampled
 from tachometry.spec.core.timing import MAX_TICK_CYCLES
 from tachometry.spec.formats.low_pass import MAX_EXTRA_BITS
 from tachometry.spec.formats.velocity_output import NATIVE
@@ -18,6 +20,8 @@ _LONGEST_FILTER = Fraction(100, 1000)  # s; reed contacts and relays bounce for 
 def check(spec: Core) -> None:
     """Check what is asked for; ParameterError if a parameter is out of range."""
     check_options(spec)
+    if spec.encoder.sampled:
+        _check_sampled(spec)
     _check_ticks(spec)
     _check_velocity(spec)
     _check_lines(spec)
@@ -33,6 +37,20 @@ def check(spec: Core) -> None:
         _check_edge_error(spec)
     if spec.lowpass is not None:
         _check_lowpass(spec, spec.lowpass)
+
+
+def _check_sampled(spec: Core) -> None:
+    """Refuse what needs edges."""
+    if not spec.facts.takes_reads:
+        raise ParameterError("method", f"must be track or m with --sensor sampled, not {spec.method}", "needs edges")
+    absent = {"filter_clocks": 0, "blanking_clocks": 0, "index": None, "preset": None, "position_modulo": None}
+    for name, none in absent.items():
+        if getattr(spec, name) != none:
+            raise ParameterError(name, "must be left out with --sensor sampled: it is for edges")
+    refuse(spec.extras, "sampled")
+    age, most = spec.encoder.sample_age, Sampled.most_age(spec.tick.longest)
+    if age is not None and not 0 <= age <= most:
+        raise ParameterError("sample_age", f"must be from 0 to {most} clocks, two ticks, not {age}")
 
 
 def _check_lines(spec: Core) -> None:

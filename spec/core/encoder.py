@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from tachometry.spec.core.sensors import SENSORS, Sensor
+from tachometry.spec.core.sampled import Sampled, parse_bits
+from tachometry.spec.core.sensors import KINDS, Sensor
 from tachometry.spec.core.tooth_wheel import parts_of
-from tachometry.spec.language.option import REQUIRED, Option, ParameterError, check_options, option, parse_whole
+from tachometry.spec.language.option import Option, ParameterError, check_options, option, parse_whole
 
 _MOST = 1 << 24  # counts
 _INVERTIBLE = ("a", "b", "c", "z")
@@ -16,7 +17,7 @@ _OF_TURN: dict[str, Any] = {"metavar": "N", "parse": parse_whole}
 
 
 def _of_counts(what: str, text: str, known: Mapping[str, Any]) -> int:
-    sensor = SENSORS.get(known["sensor"], SENSORS["quadrature"])
+    sensor = KINDS.get(known["sensor"], KINDS["quadrature"])
     counts, decoding = parse_whole(what, text), int(known["decoding"] or sensor.decodings[0])
     if not decoding <= counts <= _MOST:
         raise ParameterError(what, f"must be from {decoding} to {_MOST}, not {counts}")
@@ -79,7 +80,7 @@ class Encoder:
 
     _group = "Encoder"
     pulses_per_rev: int = option(
-        REQUIRED,
+        None,
         "Pulses per revolution: periods of line A in one turn. The data sheet of the encoder has it.",
         name="ppr",
         metavar="N",
@@ -116,8 +117,8 @@ class Encoder:
         "Kind of the encoder lines. quadrature: A and B. pulses: A alone, of a tooth wheel, fan or flow "
         "meter, always forward. step-dir: each rise of A is a step, with --decoding 2 each edge, forward "
         "while B is high. up-down: each rise of A counts up, each rise of B down. hall: A, B and C of a "
-        "motor, 120 electrical degrees apart.",
-        choices=tuple(SENSORS),
+        "motor, 120 electrical degrees apart. sampled: an absolute position of --bits, read once a tick.",
+        choices=tuple(KINDS),
         tests=("", "hall", "pulses", "step-dir", "up-down"),
         tacit=True,
     )
@@ -152,9 +153,29 @@ class Encoder:
         tests=(),
         tacit=True,
     )
+    bits: str | None = option(
+        None,
+        "Bits of a sampled position (instead of --ppr). M+B: M of turns and B of a turn, as 12+17, or B alone.",
+        metavar="M+B",
+        parse=parse_bits,
+        fits=lambda spec: spec.facts.takes_reads,
+        tests=(),
+        tacit=True,
+    )
+    sample_age: int | None = option(
+        None,
+        "Age of each sampled position, in clocks. It is the time since the shaft was there; without it, "
+        "input sample_age has it.",
+        metavar="N",
+        parse=parse_whole,
+        fits=lambda spec: spec.facts.takes_reads,
+        tests=(),
+        tacit=True,
+    )
 
     def __post_init__(self) -> None:
         check_options(self)
+        self._check_sampled()
         if self.decoding is None:
             object.__setattr__(self, "decoding", 1 if self.teeth else self.kind.decodings[0])
         self._check_decoding()
@@ -173,6 +194,23 @@ class Encoder:
             raise ParameterError("invert", f"must be of {lines} for {self.sensor}, not {wrong[0]}")
         if self.teeth:
             self._check_teeth(parts_of(_teeth("teeth", self.teeth)))
+
+    def _check_sampled(self) -> None:
+        for name in ("bits", "sample_age"):
+            if self.sensor != "sampled" and getattr(self, name) is not None:
+                raise ParameterError(name, f"must be given with --sensor sampled, not {self.sensor}")
+        if self.sensor != "sampled":
+            if self.pulses_per_rev is None:
+                raise ParameterError("ppr", "must be given, or --lines, or --cpr, or --pole-pairs")
+            return
+        if self.bits is None:
+            raise ParameterError("bits", "must be given with --sensor sampled, as 17, or 12+17 with 12 of turns")
+        object.__setattr__(self, "bits", parse_bits("bits", self.bits))
+        counts = 1 << Sampled.of(self.bits, self.sample_age).bits
+        if self.pulses_per_rev not in (None, counts):
+            rest = f"must be left out with --sensor sampled, not {self.pulses_per_rev}: type --bits"
+            raise ParameterError("ppr", rest)
+        object.__setattr__(self, "pulses_per_rev", counts)
 
     def _check_decoding(self) -> None:
         if self.decoding in self.kind.decodings:
@@ -195,7 +233,12 @@ class Encoder:
     @property
     def kind(self) -> Sensor:
         """Facts of the sensor."""
-        return SENSORS[self.sensor]
+        return KINDS[self.sensor]
+
+    @property
+    def sampled(self) -> Sampled | None:
+        """Facts of a position that is read; None: edges are counted."""
+        return None if self.bits is None else Sampled.of(self.bits, self.sample_age)
 
     @property
     def inverted(self) -> frozenset[str]:

@@ -15,6 +15,7 @@ class Facts:
     update_by: str  # what makes its updates
     interval: str  # what the output of this name is
     forced: str = "No count caused this update: the maximum time passed, or the velocity decayed."
+    takes_reads: bool = False  # whether it takes positions that are read once a tick
     own_ticks: bool = False  # whether it ends the ticks itself, by what it counts
     bounds: bool = True  # whether its windows can have bounds
     last_at_rest: bool = False  # whether the 0 that the maximum time forces is the last update before the next count

@@ -90,7 +90,8 @@ class FrontEnd:
     @property
     def moves_position(self) -> bool:
         """Whether something else than counts changes the position."""
-        return self.index_resets or self.asked.preset is not None
+        sampled = self.asked.encoder.sampled is not None  # whose first read is absolute
+        return self.index_resets or self.asked.preset is not None or sampled
 
     @property
     def index_resets(self) -> bool:

@@ -22,8 +22,11 @@ class Latency:
 
     @property
     def pin_to_count(self) -> int:
-        """Clocks from the sampling of a level to its step: the two synchroniser flip-flops and the filter."""
-        return 2 + self.asked.filter_clocks
+        """Clocks from the sampling of a level to its step: the two synchroniser flip-flops and the filter.
+
+        A position that is read is synchronous to the clock.
+        """
+        return 0 if self.asked.encoder.sampled else 2 + self.asked.filter_clocks
 
     @property
     def serial(self) -> bool:

@@ -39,6 +39,9 @@ def ports_of(spec: Core, own: Iterable[Port]) -> Iterator[Port]:
     text = "pulse_count was saturated at the maximum speed; position is exact all the same."
     yield held(TICK, "overflow", help=text)
     yield held(spec.facts.rests_with, "standstill", help=_RESTS[spec.facts.rests_with])
+    if spec.encoder.sampled:
+        text = "position is that of a good read; it falls when none has come for the maximum time."
+        yield held(TICK, "position_valid", help=text)
     if spec.velocity.output:
         yield held(UPDATE, "velocity_overflow", help="This velocity was saturated to the width of the port.")
     if spec.age:
@@ -81,6 +84,8 @@ def _inputs(spec: Core) -> Iterator[Port]:
     yield pin("rst", "Synchronous reset, active high.")
     for line, help in zip(spec.encoder.kind.lines, spec.encoder.kind.pins, strict=True):
         yield pin(line, help)
+    if spec.encoder.sampled:
+        yield from spec.encoder.sampled.ports(spec.tick.longest)
     if "z" in front.lines:
         yield pin("z", "Index line, asynchronous; the index captures the position.")
     yield from (pin.port for pin in front.pins if pin.of)

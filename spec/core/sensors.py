@@ -110,7 +110,9 @@ _SENSORS = (
         "all lines became equal, or more than one changed from one state to another; nothing was counted.",
     ),
 )
-SENSORS = {sensor.name: sensor for sensor in _SENSORS}
+SENSORS = {sensor.name: sensor for sensor in _SENSORS}  # whose edges are counted
+_READ = Sensor("sampled", (), (1,), (), (), "a read was wrong or older than two ticks, and was not taken.")
+KINDS = {**SENSORS, _READ.name: _READ}
 
 
 def parse_state(what: str, text: str) -> str:

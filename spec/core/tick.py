@@ -36,12 +36,12 @@ class Tick:
 
     @property
     def max_count(self) -> int:
-        """Largest |m_e|: ⌈max_speed/ω_u⌉, for the longest tick, at most one count per clock."""
-        fastest = self.asked.max_speed
+        """Largest |m_e|: ⌈max_speed/ω_u⌉, for the longest tick, at most one count per clock, or half a turn if read."""
+        fastest, sampled = self.asked.max_speed, self.asked.encoder.sampled
+        most = sampled.most_moved if sampled else self.longest
         if fastest is None:
-            return self.longest
-        counts = fastest.ceil_counts(self.asked.encoder.counts_per_rev, self.seconds(self.longest))
-        return min(self.longest, counts)
+            return most
+        return min(most, fastest.ceil_counts(self.asked.encoder.counts_per_rev, self.seconds(self.longest)))
 
 
 @dataclass(frozen=True)

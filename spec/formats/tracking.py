@@ -17,6 +17,7 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from typing import ClassVar
 
 from tachometry.spec.language.units import ceil_log2
 
@@ -69,6 +70,8 @@ class Tracking:
     velocity_std: Fraction  # LSB of the deviation that is shown, in one count per clock
     std_bits: int  # of it
 
+    sampled: ClassVar[bool] = False  # whether positions are read in place of counted edges
+
     @cached_property
     def factor_bits(self) -> int:
         """Bits of the second factor of a product: all those of a tick."""
@@ -88,6 +91,16 @@ class Tracking:
     def most_number(self) -> int:
         """Most counts of an event."""
         return (1 << self.number_bits) - 1
+
+    @property
+    def moved_shift(self) -> int:
+        """Fraction bits of the way of a tick in the unit of its input, as a place."""
+        return PLACE_BITS
+
+    @property
+    def most_last(self) -> int:
+        """The greatest time from the last count of a tick to its end, in clocks."""
+        return self.longest_tick - 1
 
     @property
     def times_bits(self) -> int:

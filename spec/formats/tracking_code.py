@@ -167,18 +167,26 @@ class Code:
 
 
 @cache
-def assembled(listing: str = LISTING, apart: int = 2, ports: int = 1, *, smooth: bool = False) -> Code:
+def assembled(
+    listing: str = LISTING, apart: int = 2, ports: int = 1, *, smooth: bool = False, sampled: bool = False
+) -> Code:
     """Return the instructions of a listing, with some that do nothing where a word would be read too early.
 
     The one that reads a word is `apart` instructions behind one that stores it, or more. Each reads `ports` words.
     """
     code: list[Instruction] = []
     labels: dict[str, int] = {}
-    wanted = {"block": ports > 1, "serial": ports == 1, "smooth": smooth}
+    wanted = {"block": ports > 1, "serial": ports == 1, "smooth": smooth, "edges": not sampled, "reads": sampled}
+    within = True
     for line in re.sub("#.*", "", listing).replace(";", "\n").splitlines():
         words = line.split()
-        if words and words[0] in wanted:
+        while words and words[0] in wanted:
+            if words[1] == "{":
+                within = wanted[words[0]]
             words = words[1:] if wanted[words[0]] else []
+        within |= words == ["}"]
+        if words in (["{"], ["}"]) or not within:
+            continue
         if not words:
             continue
         if words[0].endswith(":"):
@@ -274,15 +282,15 @@ def _same(stored: str, read: str) -> bool:
 
 
 @cache
-def _longest(times: Times, output: str = "", *, smooth: bool = False) -> int:
+def _longest(times: Times, output: str = "", **kind: bool) -> int:
     """Return the clocks of the longest way to an output or, without one, to the last instruction."""
-    return max(_longest_of(counts, times, output, smooth) for counts in range(3))
+    return max(_longest_of(counts, times, output, kind) for counts in range(3))
 
 
-def _longest_of(counts: int, times: Times, output: str, smooth: bool) -> int:
+def _longest_of(counts: int, times: Times, output: str, kind: Mapping[str, bool]) -> int:
     """Return them for no count, one, or several; nothing else of how ways exclude each other is known."""
     known = {Jump.ALWAYS: True, Jump.END: True, Jump.EMPTY: counts == 0, Jump.ONE: counts == 1}
-    made = assembled(apart=times.apart, ports=times.ports, smooth=smooth)
+    made = assembled(apart=times.apart, ports=times.ports, **kind)
     code, labels = made.instructions, made.labels
     entry: dict[int, tuple[int, int]] = {labels["tick"]: (0, 0)}  # clock, and when the unit has finished
     longest, open_ = 0, {labels["tick"]}
@@ -325,7 +333,11 @@ class Program:
     @cached_property
     def code(self) -> Code:
         """The instructions."""
-        return assembled(apart=self.times.apart, ports=self.times.ports, smooth=self.smooth)
+        return assembled(apart=self.times.apart, ports=self.times.ports, **self._kind)
+
+    @property
+    def _kind(self) -> dict[str, bool]:
+        return {"smooth": self.smooth, "sampled": self.form.sampled}
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -340,12 +352,12 @@ class Program:
     @cached_property
     def clocks(self) -> int:
         """Clocks from the tick until the last output holds, by the longest way."""
-        return _longest(self.times, "acceleration", smooth=self.smooth) + self.times.fetch_clocks
+        return _longest(self.times, "acceleration", **self._kind) + self.times.fetch_clocks
 
     @cached_property
     def all_clocks(self) -> int:
         """Clocks from a tick until the next may come."""
-        return _longest(self.times, smooth=self.smooth) + self.times.fetch_clocks
+        return _longest(self.times, **self._kind) + self.times.fetch_clocks
 
     @cached_property
     def constants(self) -> dict[str, int]:

@@ -12,20 +12,23 @@ what is begun with the sum`.
     keep          the sign of the sum         log, exp      begin log2|sum|, 2^sum       out name      an output
     gain k        begin: log of the gain of p (0), v (1), a (2)  block, serial  before a line: for that machine only
     smooth        before a line: for a core with --smooth only
+    edges, reads  before a line, or before several in braces: where edges are counted, or positions are read
     by            the factor of products      product name  begin: sum·factor/2^shift of that name
     over n        begin: shift right by n     over by       by ⌊log2⌋ of the factor's whole part
 """
 
 LISTING = """
 reset:                                  # before the first tick
-    D = quarter log
-    noises = noises_first; turn = zero; o0 = zero; o1 = zero
-    o2 = zero; o3 = zero; p = zero; phase = minus_two
-    limit = order + ~ + ~
-    doubt = log_8; quiet = zero; after = minus_one
+    edges D = quarter log; reads D = least_noise log
+    noises = noises_first; turn = zero; edges o0 = zero; edges o1 = zero
+    edges o2 = zero; edges o3 = zero; p = zero; phase = minus_two
+    limit = order + ~ + ~; doubt = log_8; edges quiet = zero; after = minus_one
 tick:
     if empty goto silent
-    $number log; if one goto single
+    reads {; tau = $times               # the place is that of the end of the tick
+    since = $length + since min most_since; dt = sum - tau max clock log
+    turn = turn + one chance; moved = $moved; c = sum; block dt by; phase; }
+    edges {; $number log; if one goto single
     t = o@m1 + o@m2 + o@m3              # about the mean time, by logarithms; what is left goes into e
     minus_log_n = zero - ~
     $times log
@@ -49,26 +52,25 @@ tick:
     dt log
     turn chance
     c = raw
-    phase
+    phase; }
 known:
     if neg goto young
     log_dt = ~
     serial dt by
     a product half_velocity
-    e = raw - edge keep
-    share = log_dt - log_T
+    edges e = raw - edge keep; share = log_dt - log_T
     w = sum lo+ growing
     block step = zero
     block t = v + ~ product place
-    block $number by
+    edges block $number by
     block V = t - v + t
     serial t = v + ~
     serial V = sum + ~
     serial step = zero
     serial t product place
-    minus_sixteenth s+ e; if pos goto event
+    edges {; minus_sixteenth s+ e; if pos goto event
     ~ keep                              # the same edge again: no event, unless it moved
-    minus_quarter s+ ~; if neg goto same
+    minus_quarter s+ ~; if neg goto same; }
 event:
     P = p + ~
     w exp                               # memory grows by g·min(dt, T), if it grows or 8192·dt ≥ T
@@ -76,7 +78,7 @@ event:
     share + log_8192 - growth; if neg goto grown
     step = zero s+ ~
 grown:
-    serial $number by
+    edges {; serial $number by
     if one goto lone
     left keep
     P product mean
@@ -93,9 +95,10 @@ grown:
     log_64 + minus_log_n + ~ exp
     edge = raw - moved
     smooth of_v out velocity_smooth
-    e = zero s+ ~ keep log
+    e = zero s+ ~ keep log; }
+    reads goto lone
 heard:
-    $counts + slack - one s- e; if neg goto slip
+    edges $counts + slack - one s- e; edges if neg goto slip
     log_e = ~
     e - mu over 2
     minus_D4 s+ e; if pos goto alone
@@ -165,13 +168,12 @@ place:                                  # and the place at the end of the tick
     vs + ~ product place
     block tick by
     v = zero s+ t
-    least = one
-    if empty goto seen
+    least = one; edges if empty goto seen
     p + ~ out position_fine
 shown:
     serial tick by
     velocity product shown
-    w = doubt + log_X - slips hi+ slips     # D·√X, more if errors keep a sign
+    edges w = doubt + log_X - slips hi+ slips; reads w = doubt + log_X  # D·√X, more if errors keep a sign
     triple = step + D
     t = ~
     limit + w over 1
@@ -186,8 +188,7 @@ shown:
     after - one; if neg goto fewer
 learn:                                  # nothing below is in a hurry
     e - lag keep log
-    lost = slips hi+ lost               # counts were lost or added, and now the place is right
-    log_X + log_3_2 + ~ exp
+    edges lost = slips hi+ lost; log_X + log_3_2 + ~ exp    # counts were lost or added; now the place is right
     noises = noises max noises_first    # an upset may have made it less
     block sum min noises_offset by
     lag = lag s+ ~
@@ -199,13 +200,13 @@ learn:                                  # nothing below is in a hurry
 short:
     serial noises min noises_offset by
     before = e
-    slips = slips lo+ fade max none
+    edges slips = slips lo+ fade max none
     zero s+ t - D min triple over by
     a keep
     t = zero s+ a min most
     D = D + ~ min most_noise max least_noise
     a = zero s+ t
-    if one goto offsets
+    edges if one goto offsets
 ready:                                  # growth of the memory and noise, for the next event
     smooth a keep log; smooth log_T - of_slope + ~ exp  # in the middle of the memory
     smooth of_v = v s- ~; smooth tick by; smooth of_v product shown
@@ -216,18 +217,19 @@ ready:                                  # growth of the memory and noise, for th
     limit = order + ~ + ~
     lag log
     w = order_lag - log_X - limit
-    slack = half
+    edges slack = half
     trouble = ~ + w + ~                 # lag² over 7/2 U
     D over 2
     log_X + log_256; if neg goto long
-    log_X + log_64; if neg goto some
+    edges {; log_X + log_64; if neg goto some
     w = minus_Ds min minus_sixteenth    # −D_a
     log_X + past_8; if neg goto scaled
-    slack = half - minus_Ds - minus_Ds
+    slack = half - minus_Ds - minus_Ds; }
 scaled:
     doubt = trouble + log_9_4 hi+ log_8
-    minus_D3 = w + w + w
-    minus_D4 = sum + w
+    edges minus_D3 = w + w + w; edges minus_D4 = sum + w
+    reads {; w = minus_Ds + minus_Ds + minus_Ds; minus_D4 = sum + minus_Ds min minus_change
+    minus_D3 = w min minus_mean; }
 judged:
     trouble; if neg goto grows
     sum - log_4; if neg goto shrinks
@@ -245,24 +247,25 @@ halves:
 shrinks:
     growth = zero - count; growing = log_T + log_half
     end
-some:
+edges {; some:
     w = minus_Ds - ~ min minus_sixteenth
-    goto five
+    goto five; }
 long:
     trouble = trouble - log_9_4
     minus_Ds = minus_Ds - ~ - ~
-    w = sum min minus_sixteenth
+    edges w = sum min minus_sixteenth
 five:
     doubt = trouble + log_9_4 hi+ log_8
-    minus_D3 = w + w + w
-    minus_D4 = sum + w + w              # five of them
+    edges minus_D3 = w + w + w; edges minus_D4 = sum + w + w    # five of them
+    reads {; w = minus_Ds + minus_Ds + minus_Ds; minus_D4 = sum + minus_Ds + minus_Ds min minus_change
+    minus_D3 = w min minus_mean; }
     goto judged
 grows:
     growing = log_T
     T - slow_T; if pos goto end
     growing = log_T + log_eighth
     end
-single:
+edges {; single:
     $places keep
     tau = $times
     raw = zero s+ half
@@ -285,16 +288,15 @@ offsets:
     o1 = o1 s- ~
     o2 = o2 s- ~
     o3 = o3 s- ~
-    goto ready
+    goto ready; }
 lone:
     e = c - P keep log
-    edge = raw - moved; smooth since + of_e out smooth_delay; smooth of_v out velocity_smooth; since = tau
+    edges edge = raw - moved; smooth since + of_e out smooth_delay; smooth of_v out velocity_smooth; since = tau
     memory = T + step min most_memory max clock
     P = P - moved
     goto heard
 alone:
-    mu = mu + ~
-    slips = slips min zero
+    mu = mu + ~; edges slips = slips min zero
     block log_dt + log_8 exp
     since + ahead by
     serial log_dt + log_8 exp
@@ -304,15 +306,15 @@ alone:
 calm:
     T = memory log
     goto sized
-slip:                                   # counts were lost or added, or the offset was upset
+edges {; slip:                          # counts were lost or added, or the offset was upset
     o@last = o@last min quarter max minus_quarter
     slips = slips hi+ one
     sum - three; if pos goto begin
     log_dt + log_4 - log_T - one; if pos goto begin
     p = c - moved
-    goto show
+    goto show; }
 first:
-    p = c - moved; edge = raw - moved; since = tau
+    p = c - moved; edges edge = raw - moved; since = tau
     phase = minus_one
     goto nothing
 young:
@@ -320,35 +322,35 @@ young:
     smooth zero + zero out smooth_delay; smooth sum out velocity_smooth
     phase + one; if neg goto first
 begin:
-    e = c - p keep log
-    slips = none; lost = zero; edge = raw - moved
+    e = c - p keep log; edges slips = none; edges lost = zero; edges edge = raw - moved
     of_velocity - log_dt + ~ exp
     phase = zero; since = tau; p = c - moved
     v = zero s+ ~
     vs = sum; a = zero; as = zero; mu = zero; lag = zero
     before = zero; slow_T = zero; T = dt; log_T = log_dt
     log_X = log_quarter; after = zero; velocity_std = of_curve
-    if one goto show
+    edges {; if one goto show
     log_T = log_dt - log_64 - log_half exp     # means of many counts are by logarithms: they are forgotten
-    T = ~
+    T = ~; }
     goto show
-same:
+edges {; same:
     smooth since + of_e out smooth_delay; smooth of_v out velocity_smooth
     edge = edge - moved; p = p - moved
-    goto show
+    goto show; }
 silent:
     since = $length + since min most_since
-    quiet = $length + quiet max zero min most
-    sum - max_time out standstill + max_time - forget; if pos goto rest
-    phase; if neg goto nothing
+    edges quiet = $length + quiet max zero min most
+    edges sum - max_time out standstill + max_time - forget; edges if pos goto rest
+    reads $last - most_silent out standstill; reads if pos goto rest; phase; if neg goto nothing
     smooth since + of_e out smooth_delay; smooth of_v out velocity_smooth
+    reads $last - carried; reads if neg goto show; reads as = zero
 show:
     since + ahead by
     as product velocity
     block since by
     velocity = vs + ~
     goto place
-seen:
+edges {; seen:
     P = p + ~ keep
     if neg goto below
     sum + o@up
@@ -384,7 +386,7 @@ still:
     P out position_fine
     quiet - max_time; if neg goto shown
     velocity = zero
-    goto quiet
+    goto quiet; }
 rest:
     phase = minus_two; since = zero; p = zero
 nothing:

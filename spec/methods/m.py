@@ -97,6 +97,7 @@ class MTachometer(TachometerSpec):
         update_by="tick",
         interval="the number of averaged ticks",
         forced="Never high: every tick has its update.",
+        takes_reads=True,
     )
 
     @cached_property

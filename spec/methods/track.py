@@ -17,6 +17,7 @@ from tachometry.spec.core.words import Words
 from tachometry.spec.formats.carrying import Carrying
 from tachometry.spec.formats.tracking import MOST_MEMORY, RESULT_BITS, WIDTH, Tracking
 from tachometry.spec.formats.tracking_code import SMOOTH, SMOOTH_DELAY_BITS, Program
+from tachometry.spec.formats.tracking_sampled import SampledTracking
 from tachometry.spec.formats.tracking_units import BLOCK, Serial
 from tachometry.spec.formats.velocity_output import NATIVE, VelocityOutput
 from tachometry.spec.language.option import ParameterError, option, parse_whole
@@ -36,6 +37,7 @@ class Acceleration:
     asked: Asked
     scale: Scale
     form_bits: int  # fraction bits of the acceleration of the recursion, in counts per clock²
+    shift: int = 0  # s, if a count of the recursion is 2^s of the core
 
     width = 32
 
@@ -53,7 +55,7 @@ class Acceleration:
     @property
     def of_form(self) -> Fraction:
         """One LSB of the acceleration of the recursion in the unit."""
-        return self.per_count * self.asked.timing.tick_cycles**2 / (1 << self.form_bits)
+        return self.per_count * self.asked.timing.tick_cycles**2 * (1 << self.shift) / (1 << self.form_bits)
 
     @cached_property
     def frac_bits(self) -> int:
@@ -119,6 +121,7 @@ class TrackTachometer(TachometerSpec):
         update_by="tick",
         interval="ticks since the last one with counts",
         forced="The tick held no count.",
+        takes_reads=True,
         bounds=False,
         awaits_count=True,
         rests_with=UPDATE,
@@ -127,8 +130,8 @@ class TrackTachometer(TachometerSpec):
 
     @cached_property
     def velocity(self) -> Velocity:
-        greatest = self.tick.max_count
-        lsb = NOISE * 2000 / self.encoder.counts_per_rev / Fraction(self.scale.unit_velocity) * self.scale.per_count
+        greatest, count = self.tick.max_count, self.scale.per_count * (1 << self._shift)
+        lsb = NOISE * 2000 / self.encoder.counts_per_rev / Fraction(self.scale.unit_velocity) * count
         return Velocity(
             self,
             self.scale,
@@ -139,28 +142,38 @@ class TrackTachometer(TachometerSpec):
             more_rounding=0.5,  # what is below an LSB may round up, whatever it is
         )
 
+    @property
+    def _shift(self) -> int:
+        """Bits of a count that are a fraction of one of the recursion."""
+        return self.encoder.sampled.shift if self.encoder.sampled else 0
+
     @cached_property
     def _recursion(self) -> Tracking:
         """Formats of the recursion, whatever is shown of its acceleration."""
-        return Tracking(
+        count, most = 1 << self._shift, self.tick.max_count
+        common: dict[str, Any] = dict(
             clock_hz=self.timing.clock_hz,
             tick_cycles=self.timing.tick_cycles,
             longest_tick=self.tick.longest,
             external=self.external_tick,
-            max_count=self.tick.max_count,
-            counts_per_rev=self.encoder.counts_per_rev,
+            max_count=-(-most // count),
+            counts_per_rev=self.encoder.counts_per_rev / Fraction(count) if count > 1 else self.encoder.counts_per_rev,
             max_memory=None if self.max_memory is None else Fraction(self.max_memory, self.timing.clock_hz),
             max_time=self.timing.max_ticks * self.timing.tick_cycles,
-            velocity_out=self.velocity.native_frac_bits,
+            velocity_out=self.velocity.native_frac_bits + self._shift,
             slope=Fraction(1, 2),
-            velocity_std=self.timing.tick_cycles * self.velocity.lsb_per_count,
+            velocity_std=self.timing.tick_cycles * self.velocity.lsb_per_count * count,
             std_bits=min(self.velocity.width - 1, RESULT_BITS),
         )
+        if (sampled := self.encoder.sampled) is None:
+            return Tracking(**common)
+        age, max_ticks = sampled.most_age(self.tick.longest), self.timing.max_ticks
+        return SampledTracking(**common, shift=self._shift, most_moved=most, most_age=age, max_ticks=max_ticks)
 
     @cached_property
     def acceleration(self) -> Acceleration:
         """The format of the acceleration."""
-        return Acceleration(self, self.scale, self._recursion.acceleration_bits)
+        return Acceleration(self, self.scale, self._recursion.acceleration_bits, self._shift)
 
     @cached_property
     def form(self) -> Tracking:
@@ -244,7 +257,8 @@ class TrackTachometer(TachometerSpec):
         if self.timing.tick_cycles < shortest:
             given = written_time(self.timing.tick_cycles, self.timing.clock_hz)
             typed = next_written_time(shortest, self.timing.clock_hz)
-            other = "--multiplier block" if self.multiplier == "serial" else "--method mt"
+            other = "--method m" if self.encoder.sampled else "--method mt"
+            other = "--multiplier block" if self.multiplier == "serial" else other
             raise ParameterError(
                 "tick",
                 f"must be longer for method {self.method}, which takes {short_time(self.tick.seconds(shortest))} at "

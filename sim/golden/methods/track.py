@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from tachometry.sim import build
 from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.methods.track_recursion import Recursion
+from tachometry.sim.golden.methods.track_sampled import SampledRecursion
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TrackTachometer
 from tachometry.spec.formats import tracking
-from tachometry.spec.formats.tracking import LOGS, PLACE_BITS, POWERS, Tracking
+from tachometry.spec.formats.tracking import LOGS, POWERS, Tracking
 from tachometry.spec.formats.tracking_code import SMOOTH, SMOOTH_DELAY_BITS
+from tachometry.spec.formats.tracking_sampled import SampledTracking
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,12 @@ class Windows:
             length=np.diff(last, prepend=begin),
         )
 
+    @classmethod
+    def of_reads(cls, ticks: Table) -> "Windows":
+        """Return the reads of ticks; `end` then has the ticks since one."""
+        none, number = np.zeros(len(ticks), dtype=np.int64), ticks.number.astype(np.int64)
+        return cls(number, ticks.times, none, none, ticks.pulse_count, none, none, ticks.silent, ticks.length)
+
     def rows(self) -> Iterator[tuple[int, ...]]:
         """Yield what `Recursion.tick` takes, tick by tick."""
         yield from zip(*(column.tolist() for column in vars(self).values()), strict=True)
@@ -93,6 +101,8 @@ _PIECE = 1 << 16  # ticks at a time, for which memory is needed beside that of t
 def rows(form: Tracking, lead: int) -> Rows:
     """Return the Python model after a reset."""
     state = Recursion(form, lead, smooth=True)
+    if isinstance(form, SampledTracking):
+        state = SampledRecursion(form, lead, smooth=True)
     return lambda windows: np.array([state.tick(*row) for row in windows.rows()], dtype=np.int64).reshape(-1, COLUMNS)
 
 
@@ -147,8 +157,10 @@ class Model:
     def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
         """Return all updates below `n_clocks` clocks, with the velocity in counts per tick as the datapath has it."""
         spec = self._spec
-        shown = (compiled(tuple(constants_of(spec.form, spec.program.ahead))) or rows)(spec.form, spec.program.ahead)
-        unused, shift = 64 - spec.position_width - spec.position_fine_bits, PLACE_BITS - spec.position_fine_bits
+        begin_rows = spec.encoder.sampled is None and compiled(tuple(constants_of(spec.form, spec.program.ahead)))
+        shown = (begin_rows or rows)(spec.form, spec.program.ahead)
+        fine_bits = spec.position_fine_bits
+        unused, shift = 64 - spec.position_width - fine_bits, spec.form.moved_shift - fine_bits
         n, most = len(ticks), spec.timing.max_ticks
         names = ["velocity", "interval", "forced", "acceleration", "velocity_std", "position_fine", "standstill"]
         names += SMOOTH if spec.smooth else ()
@@ -158,7 +170,10 @@ class Model:
         for first in range(0, n, _PIECE):
             piece = slice(first, first + _PIECE)
             last = ticks.clock[piece] - spec.latency.tick
-            windows = Windows.of(steps, last, spec.form.most_number, begin, reached)
+            if spec.encoder.sampled is None:
+                windows = Windows.of(steps, last, spec.form.most_number, begin, reached)
+            else:
+                windows = Windows.of_reads(ticks.rows(piece))
             begin, reached = int(last[-1]), reached + int(windows.moved.sum())
             velocity, place, velocity_std, acceleration, standstill, smooth, delay = shown(windows).T
             fine = (ticks.position[piece] << spec.position_fine_bits) + ((place + (1 << shift - 1)) >> shift)

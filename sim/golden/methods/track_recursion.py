@@ -1,5 +1,7 @@
 """The tracking recursion in integers, tick by tick: docs/concepts/track.md has its rules, track.h its twin in C++."""
 
+from typing import NamedTuple
+
 from tachometry.spec.formats.tracking import (
     CHANCE_BITS,
     EXP_INDEX,
@@ -35,6 +37,15 @@ def factor(x: int, bits: int) -> tuple[int, int]:
     return ((x << CHANCE_BITS) >> (k + CHANCE_BITS)) & ((1 << bits) - 1) if x > 0 else 0, k
 
 
+class Expected(NamedTuple):
+    """Place and velocity at an event as the state has them, and the memory with it."""
+
+    p: int
+    v: int
+    memory: int
+    log_dt: int
+
+
 class Recursion:
     """Keeps the state, and changes it in every tick; all numbers are as `spec.formats.tracking` describes them.
 
@@ -52,7 +63,7 @@ class Recursion:
         self.since = self.quiet = 0
         self.standstill = False
         self.noise = self.sure = self.certain = k["quarter"]  # D, D_s, D_a
-        self.alarm, self.slack, self.lost = 4 * self.certain, 0, 0
+        self.alarm, self.mean_alarm, self.slack, self.lost = 4 * self.certain, 0, 0, 0
         self.error = self.mean = self.lag = self.edge = self.slips = 0
         self.log_share = -k["log_4"]
         self.offsets = [0] * 4
@@ -102,7 +113,7 @@ class Recursion:
         self.quiet = min(self.quiet + (length << bits), k["most"])
         velocity, age = self.middle
         self.held = (velocity, self.since + age) if self.phase == TRACKS else (0, 0)
-        self._moved = moved << PLACE_BITS
+        self._moved = moved << self._form.moved_shift
         self.standstill = not number and self.quiet >= k["max_time"]
         if number:
             self.quiet = last << bits
@@ -123,37 +134,26 @@ class Recursion:
             left = times - self._product(tau, n, "time")
             total = (places << 13) - self._round(off, 6)
             at = raw = self._power(log2(total) + k["log_64"] - log_n, -1 if total < 0 else 1)
-        self.turn = (self.turn + 1) & ((1 << CHANCE_BITS) - 1)
-        self._chance = int(f"{self.turn:0{CHANCE_BITS}b}"[::-1], 2)
+        self._count_event()
         if self.phase == REST:
             return self._first(at, raw, tau)
         dt = max(self.since - tau, k["clock"])
         log_dt = log2(dt)
         if self.phase == ONE:
             return self._begin(n, at, raw, tau, dt, log_dt)
-        h = self._product(self.a, dt, "half_velocity")
-        v = self.v + h + h
-        way = self._product(self.v + h, dt, "place")
-        if abs(raw - self.edge) < k["sixteenth"] and abs(way) < k["quarter"]:
+        expected = self._expected(dt, log_dt)
+        if abs(raw - self.edge) < k["sixteenth"] and abs(expected.p - self.p) < k["quarter"]:
             self.edge -= self._moved
             self.p -= self._moved
             return self._emit(self._ahead())
-        p = self.p + way
         self.edge = raw - self._moved
-        e = at - p
-        # Memory.
-        log_step = min(log_dt - self.log_memory, 0) + self.log_memory + self.log_growth
-        step = self._power(log_step)
-        if log_dt - self.log_memory + k["log_8192"] < 0 <= self.grows:
-            step = 0
-        memory = max(min(self.memory + (step if self.grows >= 0 else -step), k["most_memory"]), k["clock"])
+        e = at - expected.p
         self.since = tau
         if n > 1:
-            rest_of = total - self._product(p, n, "mean")
-            more = self._product(v, abs(left), "place_64")
+            rest_of = total - self._product(expected.p, n, "mean")
+            more = self._product(expected.v, abs(left), "place_64")
             rest_of += more if left >= 0 else -more
             e = self._power(log2(rest_of) + k["log_64"] - log_n, -1 if rest_of < 0 else 1)
-        log_e = log2(e)
         if abs(e) >= self.slack + (n << PLACE_BITS):
             self.slips = max(self.slips, 0) + 1
             self.offsets[kind] = max(-k["quarter"], min(self.offsets[kind], k["quarter"]))
@@ -161,13 +161,35 @@ class Recursion:
                 return self._begin(n, at, raw, tau, dt, log_dt)
             self.p = at - self._moved
             return self._emit(self._ahead())
+        return self._take(e, expected, n, kind)
+
+    def _count_event(self) -> None:
+        """Let the number of the event, its bits reversed, decide how results are rounded."""
+        self.turn = (self.turn + 1) & ((1 << CHANCE_BITS) - 1)
+        self._chance = int(f"{self.turn:0{CHANCE_BITS}b}"[::-1], 2)
+
+    def _expected(self, dt: int, log_dt: int) -> Expected:
+        """Return the state at an event that comes `dt` after the one before."""
+        k = self._k
+        h = self._product(self.a, dt, "half_velocity")
+        step = self._power(min(log_dt - self.log_memory, 0) + self.log_memory + self.log_growth)
+        if log_dt - self.log_memory + k["log_8192"] < 0 <= self.grows:
+            step = 0
+        memory = max(min(self.memory + (step if self.grows >= 0 else -step), k["most_memory"]), k["clock"])
+        return Expected(self.p + self._product(self.v + h, dt, "place"), self.v + h + h, memory, log_dt)
+
+    def _take(self, e: int, expected: Expected, n: int = 0, kind: int = 0) -> Row:
+        """Take an event of `n` counts that is e beyond its expected place."""
+        k = self._k
+        p, v, memory, log_dt = expected
+        log_e = log2(e)
         # A change of the speed leaves 8 or 45 events.
         quarter = self._round(e - self.mean, 2)
         self.mean += quarter
         sudden = abs(e) >= self.alarm
         if sudden:
             self.slow_until, memory = 0, min(memory, self._power(log_dt + k["log_8"]))
-        elif 2 * abs(self.mean) >= 3 * self.certain:
+        elif 2 * abs(self.mean) >= self.mean_alarm:
             self.slow_until, memory = 0, min(memory, self._power(log_dt + k["log_45"]))
             if self.log_share + k["log_256"] < 0:
                 half = self._round(e, 1)
@@ -236,17 +258,10 @@ class Recursion:
             most = k["most_shown"]
             self.middle = max(-most, min(velocity, most)), self._lead + self._round(self.memory, 1)
         self.log_limit = 2 * log2(self.noise) + k["order"]
-        self.sure = self.certain = self.noise
-        lagging, times = self.log_share + self.log_limit - k["order_lag"], 4
-        quarter = self._round(self.noise, 2)
-        if self.log_share + k["log_256"] < 0:
-            self.sure = self.certain = self.noise + 2 * quarter
-            lagging, times = lagging + k["log_9_4"], 5
-        elif self.log_share + k["log_64"] < 0:
-            self.certain, times = self.certain + quarter, 5
-        self.certain = max(self.certain, k["sixteenth"])
-        self.alarm = times * self.certain
-        self.slack = k["half"] + (2 * self.sure if self.log_share + k["past_8"] >= 0 else 0)
+        lagging = self.log_share + self.log_limit - k["order_lag"]
+        if long := self.log_share + k["log_256"] < 0:
+            lagging += k["log_9_4"]
+        self._set_alarms(long=long)
         self.grows, self.log_growth = 1, 0
         self.trouble = 2 * log2(self.lag) - lagging
         if self.trouble >= 0:
@@ -257,6 +272,17 @@ class Recursion:
                 self.log_growth = -k["log_half"]
         elif self.memory < self.slow_until:
             self.log_growth = k["log_eighth"]
+
+    def _set_alarms(self, *, long: bool) -> None:
+        """Find the noise that errors of the next event are compared with."""
+        k, quarter, times = self._k, self._round(self.noise, 2), 5
+        self.sure = self.certain = self.noise + 2 * quarter * long
+        if not long:
+            some = self.log_share + k["log_64"] < 0
+            self.certain, times = self.noise + quarter * some, 4 + some
+        self.certain = max(self.certain, k["sixteenth"])
+        self.alarm, self.mean_alarm = times * self.certain, 3 * self.certain
+        self.slack = k["half"] + (2 * self.sure if self.log_share + k["past_8"] >= 0 else 0)
 
     def _first(self, at: int, raw: int, tau: int) -> Row:
         self.phase, self.since = ONE, tau

@@ -80,7 +80,11 @@ class ElectricalAngle(Extra):
         return ((self.pole_pairs << SHOWN_BITS) // spec.encoder.counts_per_rev).bit_length()
 
     def missing(self) -> Mapping[str, str]:
-        return {"axes": "does not work with --axes", "loop": "does not work with --loop"}
+        return {
+            "axes": "does not work with --axes",
+            "loop": "does not work with --loop",
+            "sampled": "must be left out with --sensor sampled: it needs edges",
+        }
 
     def check(self, spec: Numbers) -> None:
         if spec.encoder.sensor == "hall" and self.pole_pairs != (pairs := spec.encoder.pulses_per_rev):

@@ -43,7 +43,7 @@ class Extra:
         return texts
 
     def missing(self) -> Mapping[str, str]:
-        """Return the refusals of kinds of core that cannot have it: axes, demo, loop or rio."""
+        """Return the refusals of kinds of core that cannot have it: axes, demo, loop, rio or sampled."""
         return {}
 
     def check(self, spec: Numbers) -> None:

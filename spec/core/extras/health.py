@@ -97,7 +97,10 @@ class Health(Extra):
         check_options(self)
 
     def missing(self) -> Mapping[str, str]:
-        return {"axes": "must be left out with --axes: what watches the lines is for one axis"}
+        return {
+            "axes": "must be left out with --axes: what watches the lines is for one axis",
+            "sampled": "must be left out with --sensor sampled: it needs edges",
+        }
 
     def check(self, spec: Numbers) -> None:
         if not self.on:

@@ -107,6 +107,8 @@ def test_every_option_does_what_it_says() -> None:
     )
     assert {about.name for about in (*common_options(), *own_options("s"))} - {
         "dt",
+        "bits",
+        "sample-age",
         "frac-bits",
         "lines",
         "cpr",

@@ -1,0 +1,47 @@
+"""A core whose encoder is read, in place of one whose edges are counted."""
+
+from amaranth import Module, Value
+from amaranth.lib import wiring
+
+from tachometry.hdl.core.tachometer import Tachometer
+from tachometry.hdl.front_end.sampled_position import SampledPosition
+from tachometry.hdl.output.update import update_layout
+from tachometry.hdl.wires.ports import by_name, drive, follow
+from tachometry.spec import TachometerSpec
+
+
+class SampledTachometer(Tachometer):
+    """Takes reads of a position, gives position and velocity; see `Tachometer`."""
+
+    _skipped = ("datapath",)
+
+    def _make_front(self, spec: TachometerSpec) -> None:
+        self.reader = SampledPosition(spec)
+        self.controls, self.modulo_counter, self.index_capture = {}, None, None
+
+    @property
+    def settable(self) -> tuple[wiring.Component, ...]:
+        return tuple(self.extras.values())
+
+    def _place_front(self, m: Module) -> None:
+        m.submodules.reader = self.reader
+
+    def _count(self, m: Module) -> dict[str, Value]:
+        reader, sampled = self.reader, self._spec.encoder.sampled
+        assert sampled is not None
+        follow(m, reader, self, (port.name for port in sampled.ports(self._spec.tick.longest)))
+        drive(m, reader, {"last": self.sampling_clock.last})
+        shown = ("tick", "pulse_count", "overflow", "position", "position_valid", "decode_error")
+        follow(m, self, reader, shown)
+        names = ("coming", "next_count", "number", "times", "silent", "elapsed", "length")
+        return by_name(reader, names)
+
+    def _taps(self, m: Module) -> dict[str, Value]:
+        updates = self.datapath.updates
+        shown = {f"native_{name}": updates.p[name] for name in update_layout(self._spec).members}
+        return {"native_valid": updates.valid, **shown}
+
+
+def tachometer_of(spec: TachometerSpec) -> Tachometer:
+    """Return the core of one axis."""
+    return Tachometer(spec) if spec.encoder.sampled is None else SampledTachometer(spec)

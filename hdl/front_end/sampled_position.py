@@ -1,0 +1,106 @@
+"""Positions that are read once a tick, in place of a decoder and its counters."""
+
+from amaranth import Cat, Module, Mux, Signal, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from tachometry.hdl.arithmetic.saturate import saturate
+from tachometry.hdl.wires.ports import by_name
+from tachometry.spec import TachometerSpec
+
+
+class SampledPosition(wiring.Component):
+    """Takes the last good read of each tick: gives the position, and its difference from the read before as m_e.
+
+    Latency: `tick` is high two clocks after the window's last clock, as in `PulseCounter`; a read in that last clock
+    still belongs to the window. All outputs but `coming`, `next_count` and `decode_error` change with `tick` alone.
+
+    The lower bits of the position are the read; the upper ones count how often that wraps.
+    """
+
+    def __init__(self, spec: TachometerSpec) -> None:
+        sampled = spec.encoder.sampled
+        assert sampled is not None
+        longest = spec.tick.longest
+        self._spec, self._sampled = spec, sampled
+        self._most_age = sampled.most_age(longest)
+        count = signed(spec.widths.count)
+        super().__init__(
+            {
+                **{port.name: In(port.width) for port in sampled.ports(longest)},
+                "last": In(1),  # high in the last clock of a window
+                "tick": Out(1),
+                "pulse_count": Out(count),  # counts since the read before; 0 without a read, or without one before
+                "overflow": Out(1),  # it was saturated
+                "coming": Out(1),  # `tick` is high in the next clock
+                "next_count": Out(count),  # what `pulse_count` is then
+                "position": Out(signed(spec.position_width)),
+                "position_valid": Out(1),
+                "decode_error": Out(1),  # a read is not taken
+                "number": Out(1),  # of reads that were taken in the tick: the last one, or none
+                "times": Out(range(self._most_age + longest)),  # clocks from when the shaft was there to its end
+                "length": Out(range(longest + 1), init=spec.timing.tick_cycles),  # clocks of the tick
+                "silent": Out(range(spec.timing.max_ticks + 1), init=spec.timing.max_ticks),  # ticks since a read
+                "elapsed": Out(range(spec.timing.max_ticks + 1), init=spec.timing.max_ticks),  # from the read before
+            }
+        )
+        # Of the window that has not ended.
+        self.open_number = Signal()
+        self.open_sample = Signal(sampled.width)
+        self.open_times = Signal.like(self.times)
+        self.sample_before = Signal(sampled.width)
+        self.turns = Signal(signed(max(spec.position_width - sampled.width, 1)))
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        sampled = self._sampled
+        age = by_name(self, ("sample_age",))["sample_age"] if sampled.age is None else sampled.age
+        taken = Signal()
+        m.d.comb += [
+            taken.eq(self.sample_valid & self.sample_ok & (1 if sampled.age is not None else age <= self._most_age)),
+            self.decode_error.eq(self.sample_valid & ~taken),
+        ]
+        m.d.sync += [self.coming.eq(self.last), self.tick.eq(self.coming), self.open_times.eq(self.open_times + 1)]
+        with m.If(self.coming):
+            m.d.sync += self.open_number.eq(0)
+        with m.If(taken):
+            read = (-self.sample)[: sampled.width] if self._spec.encoder.reverse else self.sample
+            m.d.sync += [self.open_number.eq(1), self.open_sample.eq(read), self.open_times.eq(age)]
+        if self._spec.external_tick:
+            length = Signal.like(self.length, name="open_length", init=1)
+            m.d.sync += length.eq(length + 1)
+            with m.If(self.coming):
+                m.d.sync += [self.length.eq(length), length.eq(1)]
+        self._close(m)
+        return m
+
+    def _close(self, m: Module) -> None:
+        """Take the read of a window that has ended."""
+        width, most_ticks = self._sampled.width, self._spec.timing.max_ticks
+        known = self.position_valid & self.open_number
+        off = Signal(width + 1)
+        moved = Signal(signed(width))
+        m.d.comb += [
+            off.eq(self.open_sample - self.sample_before),
+            moved.eq(Mux(known, off[:width], 0)),
+            self.position_valid.eq(self.silent != most_ticks),
+            self.position.eq(Cat(self.sample_before, self.turns)),
+        ]
+        held, overflow = saturate(m, moved, self._spec.widths.max_pulse_count)
+        m.d.comb += self.next_count.eq(held)
+        waited = self.silent + self.position_valid
+        forward, backward = off[-1] & ~off[width - 1], ~off[-1] & off[width - 1]
+        with m.If(self.coming):
+            m.d.sync += [
+                self.pulse_count.eq(held),
+                self.overflow.eq(overflow),
+                self.number.eq(self.open_number),
+                self.times.eq(self.open_times),
+                self.elapsed.eq(waited),
+                self.silent.eq(Mux(self.open_number, 0, waited)),
+            ]
+            with m.If(self.open_number):
+                m.d.sync += [
+                    self.sample_before.eq(self.open_sample),
+                    self.turns.eq(Mux(known, self.turns + forward - backward, 0)),
+                ]

@@ -1,0 +1,119 @@
+"""Encoders that are read: their reads of a shaft, and reads that visit what every core must survive."""
+
+import math
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tachometry.sim.encoder import imperfections
+from tachometry.sim.encoder.imperfections import NOISE, WRONG_READS
+from tachometry.sim.encoder.motion import Motion, sin2pi
+from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
+from tachometry.sim.signals.recording import MAX_EDGES, PinTrace, Recording
+from tachometry.spec import TachometerSpec
+from tachometry.spec.core.sampled import Sampled
+from tachometry.spec.language.option import ParameterError
+
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class ReadEncoding(Encoding):
+    """Reads of a shaft, and the truth about it: its position is that of the latest read."""
+
+    # shape (n,): when each read ends, in seconds, and its position, without wrapping
+    read_time: NDArray[np.float64] = field(kw_only=True)
+    read: Ints = field(kw_only=True)
+
+    def true_position(self, t: ArrayLike, decoding: int = 4) -> Ints:
+        found: Ints = np.append(0, self.read)[np.searchsorted(self.read_time, t, side="right")]
+        return found
+
+
+@dataclass(frozen=True)
+class SampledEncoder(VirtualEncoder):
+    """An absolute encoder that is read once in each nominal tick of a core, shortly before it ends."""
+
+    core: TachometerSpec | None = None
+
+    def record(self, motion: Motion) -> ReadEncoding:
+        assert self.core is not None
+        sampled = self.core.encoder.sampled
+        assert sampled is not None
+        timing, cycles = self.core.timing, self.core.timing.tick_cycles
+        n_ticks = math.floor(motion.duration * timing.clock_hz / cycles)
+        if n_ticks > MAX_EDGES:
+            raise ParameterError("motion", f"must last for at most {MAX_EDGES} ticks, not {n_ticks}")
+        age = cycles // 4 if sampled.age is None else sampled.age
+        clock = np.arange(1, n_ticks + 1) * cycles - 2 - cycles // 8
+        clock = clock[clock >= max(age, 1)]
+        time = clock / timing.clock_hz
+        shaft = Encoding(self, motion, Recording.of_level(np.zeros(1), np.zeros(1, np.uint8), 1.0), 0, 0)
+        turn = shaft.true_angle((clock - age) / timing.clock_hz) / (2 * math.pi) * float(Fraction(self.ratio or 1))
+        place = self._disturbed(-turn if self.reverse else turn, len(clock), 1 << sampled.bits)
+        wrong = imperfections.uniform(self._stream(WRONG_READS), len(clock)) < self.frame_errors
+        lines = read_lines(sampled, place, np.full(len(clock), age), (~wrong).astype(np.int64))
+        at = np.stack([time, (clock + 1) / timing.clock_hz], axis=1).ravel()
+        zero = {name: np.append(0, values) for name, values in lines.items()}
+        none = np.zeros(len(at) + 1, dtype=np.uint8)
+        recording = Recording(np.append(0.0, at), none, none, motion.duration, more=zero)
+        read = (-place if self.reverse else place)[~wrong]
+        read = read - (read[:1] & -1 << sampled.width).sum()
+        return ReadEncoding(self, motion, recording, 0, 0, read_time=time[~wrong], read=read)
+
+    def _disturbed(self, turn: NDArray[np.float64], n: int, counts: int) -> Ints:
+        """Return what the encoder reads at these places."""
+        place = turn * counts
+        if self.interpolation is not None:
+            lsb, periods = self.interpolation
+            place = place + lsb * sin2pi(turn * periods)
+        if self.noise:
+            place = place + self.noise * imperfections.gaussian(self._stream(NOISE), n)
+        return np.floor(place).astype(np.int64)
+
+
+def encoder_of(spec: TachometerSpec, **values: Any) -> VirtualEncoder:
+    """Return the encoder that a core is made for, see `VirtualEncoder.of_core`."""
+    if spec.encoder.sampled is None:
+        return VirtualEncoder.of_core(spec, **values)
+    return SampledEncoder.of(spec.encoder, core=spec, **values)
+
+
+def read_lines(sampled: Sampled, sample: Ints, age: Ints, right: Ints) -> dict[str, Ints]:
+    """Return the lines of a core from one read to the next, each level twice: with the strobe, and without."""
+    lines = {"sample": sample & (1 << sampled.width) - 1, "sample_ok": right}
+    found = {name: np.repeat(values, 2) for name, values in (lines | {"sample_age": age}).items()}
+    if sampled.age is not None:
+        del found["sample_age"]
+    return found | {"sample_valid": np.tile([1, 0], len(sample))}
+
+
+def stress_reads(spec: TachometerSpec, seed: int, n_edges: int) -> PinTrace:
+    """Return reads of a shaft that creeps, turns, reverses, jumps and rests, some late, wrong or missing."""
+    sampled, cycles = spec.encoder.sampled, spec.timing.tick_cycles
+    assert sampled is not None
+    rng = np.random.default_rng(seed)
+    n_ticks = 6 * n_edges
+    speeds = np.array([0, 0.3, 3, 100, sampled.most_moved / 3, 1.2 * spec.tick.max_count])
+    speed = np.repeat(rng.choice(speeds, n_ticks // 30 + 1) * rng.choice([-1, 1], n_ticks // 30 + 1), 30)[:n_ticks]
+    place = np.cumsum(speed + rng.normal(0, 1 + np.abs(speed) / 100)) + rng.integers(0, 1 << sampled.width)
+    place += np.where(rng.random(n_ticks) < 0.01, rng.integers(-1 << 15, 1 << 15, n_ticks), 0)
+    near = rng.choice([0, 0, 0, 1, cycles // 2], n_ticks)  # in the last clock of a tick, in others, and twice in one
+    clock = np.cumsum(cycles + rng.choice([0, 0, 0, 0, 1, -1, cycles, -cycles // 2], n_ticks)) - 1 - near
+    gone = (rng.random(n_ticks) < 0.02) | (np.repeat(rng.random(n_ticks // 20 + 1) < 0.05, 20)[:n_ticks])
+    longest = spec.timing.max_ticks * cycles
+    clock[n_ticks // 2 :] += longest + 3 * cycles  # all is forgotten
+    clock = np.maximum.accumulate(np.maximum(clock, 1)) + 2 * np.arange(n_ticks)
+    clock, place = clock[~gone], place[~gone]
+    most = sampled.most_age(spec.tick.longest)
+    late = np.clip(rng.integers(-3, 3, len(clock)) + most, 0, (1 << most.bit_length()) - 1)
+    age = np.where(rng.random(len(clock)) < 0.03, late, rng.integers(0, max(cycles // 3, 1), len(clock)))
+    right = (rng.random(len(clock)) > 0.02).astype(np.int64)
+    lines = read_lines(sampled, np.floor(place).astype(np.int64), age, right)
+    at = np.stack([clock, clock + 1], axis=1).ravel()
+    zero = {name: np.append(0, values) for name, values in lines.items()}
+    none = np.zeros(len(at) + 1, dtype=np.uint8)
+    return PinTrace.of_lines(np.append(0, at), int(at[-1]) + longest + 20 * cycles, {"a": none, "b": none} | zero)

@@ -1,0 +1,72 @@
+"""The golden front end of positions that are read: what each tick takes of the reads in it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import Table
+from tachometry.spec import TachometerSpec
+
+
+@dataclass(frozen=True)
+class Reads:
+    """Reads that are taken, and the clocks of those that are not."""
+
+    # shape (n,): clock, position and age in clocks of each
+    clock: NDArray[np.int64]
+    sample: NDArray[np.int64]
+    age: NDArray[np.int64]
+    errors: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, spec: TachometerSpec, trace: PinTrace) -> "Reads":
+        """Return the reads of a trace: there is one in every clock in which sample_valid is high."""
+        sampled = spec.encoder.sampled
+        assert sampled is not None
+        lasts = np.diff(trace.clock, append=trace.n_clocks) * (trace.lines["sample_valid"] != 0)
+        row = np.repeat(np.arange(len(lasts)), lasts)
+        clock = trace.clock[row] + np.arange(len(row)) - np.repeat(np.cumsum(lasts) - lasts, lasts)
+        sample, right = (trace.lines[name][row].astype(np.int64) for name in ("sample", "sample_ok"))
+        age = np.full(len(row), sampled.age) if sampled.age is not None else trace.lines["sample_age"][row]
+        taken = (right != 0) & (age <= sampled.most_age(spec.tick.longest))
+        if spec.encoder.reverse:
+            sample = -sample & (1 << sampled.width) - 1
+        return cls(clock[taken], sample[taken], age[taken].astype(np.int64), clock[~taken])
+
+
+def ticks_of(spec: TachometerSpec, reads: Reads, last: NDArray[np.int64]) -> Table:
+    """Return pulse numbers and positions of all ticks, with what the tracking method takes of each.
+
+    - `last`: Last clock of each window.
+    """
+    sampled = spec.encoder.sampled
+    assert sampled is not None
+    half, most, number = 1 << sampled.width - 1, spec.timing.max_ticks, np.arange(len(last))
+    through = np.searchsorted(reads.clock, last, side="right")
+    has = np.diff(through, prepend=0) > 0
+    row = np.maximum(through - 1, 0)  # of the read that a tick takes
+    latest = np.maximum.accumulate(np.where(has, number, -most))  # the tick of the latest read
+    silent = np.minimum(number - latest, most)
+    before = np.append(most, silent[:-1])
+    sample = reads.sample[row] if len(reads.sample) else np.zeros_like(last)
+    way = (np.diff(sample, prepend=0) + half & 2 * half - 1) - half
+    known = has & (before < most)
+    moved = np.where(known, way, 0)
+    begun = np.maximum.accumulate(np.where(has & ~known, number, 0))  # the tick of the read that is absolute
+    total = np.cumsum(moved)
+    position = np.where(through > 0, sample[begun] + total - total[begun], 0)
+    limit, wrap = spec.widths.max_pulse_count, 1 << spec.position_width - 1
+    columns = {
+        "pulse_count": np.clip(moved, -limit, limit),
+        "position": (position + wrap & 2 * wrap - 1) - wrap,
+        "overflow": np.abs(moved) > limit,
+        "position_valid": silent < most,
+        "number": has,
+        "times": last - reads.clock[row] + reads.age[row] if len(reads.sample) else np.zeros_like(last),
+        "silent": silent,
+        "elapsed": np.minimum(before + 1, most),
+        "length": np.diff(last, prepend=-1),
+    }
+    return Table(last + spec.latency.tick, columns)

@@ -1,0 +1,56 @@
+"""Formats of the tracking recursion where positions are read: a count is 2^s LSB of the read.
+
+So the words of places, velocity and acceleration are those of a disc of 8192 counts, and the s lower bits of a read are
+fraction bits of the place.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from tachometry.spec.formats.tracking import PLACE_BITS, Tracking
+
+_CARRIED = 8  # ticks without a read for which the acceleration is still taken into account
+
+
+@dataclass(frozen=True, kw_only=True)
+class SampledTracking(Tracking):
+    """Formats and constants of a tracking recursion of reads."""
+
+    shift: int  # s
+    most_moved: int  # most counts between two reads, in LSB
+    most_age: int  # clocks
+    max_ticks: int  # ticks without a read after which all is forgotten
+
+    sampled = True
+    number_bits = 1
+
+    @property
+    def moved_shift(self) -> int:
+        return PLACE_BITS - self.shift
+
+    @property
+    def moved_bits(self) -> int:
+        return self.most_moved.bit_length() + 1
+
+    @property
+    def times_bits(self) -> int:
+        return (self.most_age + self.longest_tick - 1).bit_length()
+
+    @property
+    def most_last(self) -> int:
+        """The greatest number of ticks since a read."""
+        return self.max_ticks
+
+    @cached_property
+    def constants(self) -> dict[str, int]:
+        lsb, t = 1 << self.moved_shift, self.time_bits
+        shown = self.most_moved << self.velocity_out - self.shift
+        return super().constants | {
+            "least_noise": round(lsb / 3),  # that of rounding alone
+            "minus_change": -3 * lsb // 2,
+            "minus_mean": -2 * lsb,  # of twice a mean
+            "most_silent": self.max_ticks << t,
+            "carried": (_CARRIED + 1) << t,
+            "most_shown": shown,
+            "least_shown": -shown,
+        }

@@ -1,0 +1,187 @@
+"""Cores whose encoder is read: hardware against golden model, exported Verilog, and what each read does."""
+
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from amaranth import Module
+from support.nightly import only
+
+from tachometry.hdl.export import export
+from tachometry.hdl.front_end import sampled_position
+from tachometry.sim import golden
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.sampled import encoder_of, read_lines, stress_reads
+from tachometry.sim.engines.cxxrtl import Cxxrtl
+from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import Run
+from tachometry.sim.studies.lockstep import lockstep
+from tachometry.spec import ParameterError, TachometerSpec, of_options, of_texts
+
+BASE = {"sensor": "sampled", "bits": "17", "clock": "48MHz", "tick": "40clk", "max-time": "400clk"}
+SLOW = {"tick": "900clk", "max-time": "9000clk"}
+CASES = {
+    "m": {},
+    "m of turns": {
+        "bits": "3+9",
+        "average": "3",
+        "external-tick": "yes",
+        "position-width": "8",
+        "max-speed": "2e5rad/s",
+        "reverse": "yes",
+    },
+    "m fixed": {"bits": "12", "sample-age": "7", "position-width": "48", "lowpass": "20kHz", "age": "yes"},
+    "track": SLOW,
+    "track fine": SLOW
+    | {"bits": "16+24", "multiplier": "block", "smooth": "yes", "external-tick": "yes", "position-width": "48"},
+    "track coarse": SLOW | {"bits": "5", "unit": "rpm", "sample-age": "100", "reverse": "yes", "max-memory": "5ms"},
+}
+
+
+def core(case: str) -> TachometerSpec:
+    return of_texts(case.split()[0], BASE | CASES[case])
+
+
+def trace_of(spec: TachometerSpec, reads: list[tuple[int, int, int, int]], n_clocks: int) -> PinTrace:
+    """Return the trace of reads: clock, sample, age and whether it is right."""
+    assert spec.encoder.sampled is not None
+    clock, sample, age, right = (np.array(column, dtype=np.int64) for column in zip(*reads, strict=True))
+    lines = read_lines(spec.encoder.sampled, sample, age, right)
+    at = np.append(0, np.stack([clock, clock + 1], axis=1).ravel())
+    none = np.zeros(len(at), dtype=np.uint8)
+    zero: dict[str, Any] = {name: np.append(0, values) for name, values in lines.items()}
+    return PinTrace.of_lines(at, n_clocks, {"a": none, "b": none} | zero)
+
+
+def both(spec: TachometerSpec, reads: list[tuple[int, int, int, int]], n_clocks: int) -> Run:
+    found = lockstep(spec, trace_of(spec, reads, n_clocks), PySim())
+    assert found.n_mismatches == 0, found.first
+    return found.actual
+
+
+# A core of track is compiled for this.
+@pytest.mark.parametrize("case", only([*[*CASES][:3], "track fine"], CASES))
+def test_gates_and_golden_model_agree_on_every_read(case: str) -> None:
+    spec = core(case)
+    few = case.startswith("track")
+    found = lockstep(spec, stress_reads(spec, 1, 100 if few else 30).completed(spec), Cxxrtl() if few else PySim())
+    assert found.n_mismatches == 0, found.first
+    run = found.actual
+    assert len(run.errors) > 1
+    assert {0, 1} == {*run.ticks.position_valid.tolist()}
+    assert len({*run.ticks.position.tolist()}) > 50
+
+
+def test_the_first_read_is_absolute_and_later_ones_wrap() -> None:
+    spec = of_texts("m", BASE | {"bits": "2+9", "position-width": "16"})
+    reads = [(20, 2040, 0, 1), (60, 5, 0, 1), (100, 2030, 0, 1), (140, 1030, 0, 1), (180, 7, 0, 1), (220, 1031, 0, 1)]
+    run = both(spec, reads, 300)
+    assert run.ticks.position[:6].tolist() == [2040, 2053, 2030, 1030, 7, 7 - 1024]
+    assert run.ticks.pulse_count[:6].tolist() == [0, 13, -23, -256, -256, -256]
+    assert run.ticks.overflow[:6].tolist() == [0, 0, 0, 1, 1, 1]
+
+
+@pytest.mark.parametrize("reverse", ["no", "yes"])
+def test_a_position_is_that_of_the_last_good_read_of_a_tick(reverse: str) -> None:
+    """A read in the last clock of a tick belongs to it; wrong and old ones are reported, and not taken."""
+    spec = of_texts("m", BASE | {"bits": "9", "reverse": reverse})
+    reads = [(10, 100, 0, 1), (39, 101, 0, 1), (41, 110, 80, 1), (60, 400, 81, 1), (70, 400, 0, 0), (159, 120, 3, 1)]
+    run = both(spec, reads, 1000)
+    sign, off = (-1, 512) if reverse == "yes" else (1, 0)
+    expected = [101, 110, 110, 120, 120]
+    assert run.ticks.position[:5].tolist() == [off + sign * place for place in expected]
+    assert run.ticks.pulse_count[:5].tolist() == [0, sign * 9, 0, sign * 10, 0]
+    assert run.errors.tolist() == [60, 70]
+    valid = run.ticks.position_valid
+    assert np.flatnonzero(valid).tolist() == [*range(13)]  # ten ticks without a read end it
+
+
+def test_after_the_maximum_time_the_next_read_is_absolute() -> None:
+    spec = of_texts("m", BASE | {"bits": "9"})
+    run = both(spec, [(20, 500, 0, 1), (60, 5, 0, 1), (1020, 7, 0, 1), (1060, 8, 0, 1)], 1200)
+    assert run.ticks.position[[0, 1, 24, 25, 26]].tolist() == [500, 517, 517, 7, 8]
+    assert run.ticks.pulse_count.sum() == 17 + 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("known = self.position_valid & self.open_number", "known = self.open_number"),
+        ("forward, backward = off[-1] & ~off[width - 1]", "forward, backward = off[-1] & off[width - 1]"),
+        ("age <= self._most_age", "age < self._most_age"),
+        ("self.silent.eq(Mux(self.open_number, 0, waited))", "self.silent.eq(Mux(self.open_number, 1, waited))"),
+    ],
+)
+def test_a_wrong_reader_is_seen(monkeypatch: pytest.MonkeyPatch, old: str, new: str) -> None:
+    spec = core("m" if "forward" in old else "m of turns")
+    text = Path(sampled_position.__file__).read_text(encoding="utf-8")
+    assert text.count(old) == 1
+    wrong: dict[str, Any] = {"__name__": "wrong"}
+    exec(compile(text.replace(old, new), "wrong", "exec"), wrong)
+    reader = sampled_position.SampledPosition
+    monkeypatch.setattr(reader, "elaborate", lambda self, platform: _elaborate(wrong["SampledPosition"], self))
+    monkeypatch.setattr(reader, "_close", lambda self, m: wrong["SampledPosition"]._close(self, m))
+    found = lockstep(spec, stress_reads(spec, 1, 30).completed(spec), PySim())
+    assert found.n_mismatches > 0
+
+
+def _elaborate(wrong: Any, reader: sampled_position.SampledPosition) -> Module:
+    module: Module = wrong.elaborate(reader, None)
+    return module
+
+
+@pytest.mark.parametrize("case", only(["m of turns"], [*CASES]))
+def test_exported_verilog_reads_in_icarus(case: str, tmp_path: Path) -> None:
+    for name, text in export(core(case), "spindle").items():
+        (tmp_path / name).write_text(text)
+    subprocess.run(["iverilog", "-g2012", "-o", "tb", "spindle.v", "spindle_tb.sv"], cwd=tmp_path, check=True)
+    said = subprocess.run([tmp_path / "tb"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+    assert "PASS: position 24" in said
+
+
+@pytest.mark.parametrize("reverse", ["no", "yes"])
+def test_the_virtual_encoder_reads_what_the_core_tracks(reverse: str) -> None:
+    texts = {"tick": "100us", "max-time": "10ms", "clock": "10MHz", "bits": "2+17", "reverse": reverse}
+    spec = of_texts("track", BASE | texts | {"unit": "rad/s"})
+    encoder = encoder_of(spec, noise=0.3, interpolation=(0.15, 1024), frame_errors=0.01, start_angle_rad=1.0, seed=3)
+    truth = encoder.record(parse_motion("constant:20rad/s:300ms+ramp:20rad/s:-20rad/s:300ms"))
+    run = golden.run(spec, PinTrace.of(truth.recording, spec))
+    assert run.ticks.position[-1] == truth.true_position(run.ticks.clock[-1] / spec.timing.clock_hz)
+    time = (run.updates.clock + 1) / spec.timing.clock_hz
+    off = run.updates.velocity * spec.velocity.rad_per_s_per_lsb - truth.true_speed(time)
+    assert np.sqrt(np.mean(off[1000:2900] ** 2)) < 0.001
+    assert np.sqrt(np.mean(off[4000:] ** 2)) < 0.02
+    assert 20 < len(run.errors) < 100
+
+
+def test_a_core_is_made_again_from_its_options() -> None:
+    spec = core("track coarse")
+    assert of_options(spec.options) == spec
+
+
+@pytest.mark.parametrize(
+    ("method", "more", "message"),
+    [
+        ("s", {}, "bits must not be given with method s"),
+        ("m", {"bits": "25"}, "bits must be bits of turns and of a turn, as 12\\+17"),
+        ("m", {"ppr": "3"}, "ppr must be left out with --sensor sampled, not 3: type --bits"),
+        ("m", {"index": "yes"}, "index must be left out with --sensor sampled: it is for edges"),
+        ("m", {"filter": "3"}, "filter_clocks must be left out with --sensor sampled: it is for edges"),
+        ("m", {"sample-age": "81"}, "sample_age must be from 0 to 80 clocks, two ticks, not 81"),
+        ("m", {"health": "yes"}, "health must be left out with --sensor sampled: it needs edges"),
+        ("m", {"sensor": "hall"}, "bits must be given with --sensor sampled, not hall"),
+        ("m", {"decoding": "4"}, "decoding must be 1 for sampled, not 4"),
+        ("auto", {"tick": "2us"}, "tick must be longer for method track"),
+    ],
+)
+def test_what_has_no_meaning_is_refused(method: str, more: dict[str, str], message: str) -> None:
+    with pytest.raises(ParameterError, match=f"^{message}"):
+        of_texts(method, BASE | {"max-time": "100us"} | more if method == "auto" else BASE | more)
+
+
+def test_bits_must_be_given() -> None:
+    with pytest.raises(ParameterError, match=r"^bits must be given with --sensor sampled, as 17"):
+        of_texts("m", {name: text for name, text in BASE.items() if name != "bits"})
