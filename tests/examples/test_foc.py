@@ -35,16 +35,16 @@ def test_the_vector_stays_aligned(
 
 
 def test_the_voltages_are_those_of_the_rotor() -> None:
-    """The angle is 0 when the rotor is aligned, and 5.04 degrees after eight counts."""
+    """The angle is 0 when the rotor is aligned, and 2.52 degrees after four counts."""
     names: dict[str, Any] = {"__name__": "foc"}
     exec(block("python"), names)
-    counts = [min(max(clock - 4000, 0) // 1000, 8) for clock in range(18_000)]
+    counts = [min(max(clock - 1500, 0) // 1000, 4) for clock in range(11_000)]
     rows = [
         {"aligned": clock == 100, "d": 10_000, "q": 1000, "a": count % 4 in (1, 2), "b": count % 4 in (2, 3)}
         for clock, count in enumerate(counts)
     ]
     seen = clock_by_clock(names["InversePark"](), rows, ["alpha", "beta"])
-    for clock, expected in ((2000, 0), (17_999, 5.04)):
+    for clock, expected in ((1500, 0), (10_999, 2.52)):
         angle = math.degrees(math.atan2(seen[clock]["beta"], seen[clock]["alpha"]) - math.atan2(1000, 10_000))
         assert angle == pytest.approx(expected, abs=0.4)
         assert math.hypot(seen[clock]["alpha"], seen[clock]["beta"]) == pytest.approx(10_050, abs=3)
