@@ -122,7 +122,10 @@ class ModuleWriter(Scope):
         read = (one for one in self.constants.items() if one[0] in written)
         constants = [f"localparam {span(width)}{name} = {value};" for name, (width, value) in read]
         memories = [[*self._contents(cell)] for cell in self.memories]
-        boxes = [[*self._instance(*instance)] for instance in self.instances]
+        boxes = []
+        for writer, _, name in self.instances:
+            links = [f"    .{port.name}({self.text(port.value)})," for port in writer.ports]
+            boxes.append([f"\0{writer.index}\0 {name} (", *links[:-1], links[-1][:-1], ");"])
         blocks = [[*constants, *self.declared], *memories, wires, *clocked, *boxes, ends]
         body = [f"    {line}" if line else "" for block in blocks if block for line in ("", *block)][1:]
         return [*self._port_lines(), ");", *(part for line in body for part in wrapped(line)), "endmodule"]
@@ -136,10 +139,6 @@ class ModuleWriter(Scope):
                     self.declared.append(f"wire {span(len(port.value))}{wire};")
         own = plain(name)
         self.instances.append((writer, name, self.unique(f"{own}_unit" if own in self.taken else own)))
-
-    def _instance(self, writer: ModuleWriter, _: str, name: str) -> Iterator[str]:
-        links = [f"    .{port.name}({self.text(port.value)})," for port in writer.ports]
-        yield from (f"\0{writer.index}\0 {name} (", *links[:-1], links[-1].rstrip(","), ");")
 
     def _wires(self, choices: set[int | None]) -> Iterator[str]:
         """Yield definitions of what is computed between registers, each before its use."""

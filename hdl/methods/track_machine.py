@@ -6,7 +6,6 @@ from operator import and_, or_
 
 from amaranth import Array, C, Cat, Module, Mux, Signal, Value, signed
 from amaranth.lib import data, wiring
-from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleBox
@@ -135,10 +134,12 @@ class TrackMachine(wiring.Component):
         self._states = at = states_of(len(program.code.instructions).bit_length())
         code = dict(zip(at, enumerate(program.code.instructions), strict=False))
         places = [code.get(place) for place in range(len(at) + 1)]
-        texts = [f"{one[0]}: {one[1].text}" if one else "" for one in places]
+        texts = [f"instruction {one[0]}: {one[1].text}" if one else "" for one in places]
         words = [_encoded(program, one[1], layout, at) if one else 0 for one in places]
         self._rom = CommentedMemory(texts, shape=layout.size, depth=len(places), init=words)
-        self._words = Memory(
+        named = {place: name for name, place in program.addresses.items()}
+        self._words = CommentedMemory(
+            [named.get(place % (1 << ADDRESS_BITS), "") for place in range(len(self._axes) << ADDRESS_BITS)],
             shape=signed(WIDTH),
             depth=1 << ((len(self._axes) - 1).bit_length() + ADDRESS_BITS),
             init=self._contents(),
