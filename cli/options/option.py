@@ -7,6 +7,7 @@ import re
 import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -21,7 +22,7 @@ from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.spec import METHODS, ParameterError, common_options, own_options
 from tachometry.spec.language import option as declaration
 from tachometry.spec.language.option import options_of, read_options
-from tachometry.spec.language.units import QUANTITY
+from tachometry.spec.language.units import ANGLE, FREQUENCY, QUANTITY, SPEED, TIME
 
 # What a message says that a quantity is.
 _NUMBER = re.compile(r", not (-?[\d.]+(?:e[+-]?\d+)?)( (?:rad/s|rev/s|rpm|Hz|Nm|s))?(?=$|[:;,])")
@@ -135,6 +136,7 @@ def later(name: str, make: Callable[[], Sequence[click.Option]]) -> Callable[[Co
     return click.option(f"--{name}", cls=Later, make=make, hidden=True)
 
 
+_UNITS = {name for units in (TIME, FREQUENCY, SPEED, ANGLE) for name in units}
 RESEARCH = "Research"  # the group of options for those who study methods
 LONG = "tachometry.long"  # of a context: its help has all sentences
 _MOST_LINES = 100  # of --help
@@ -175,6 +177,7 @@ class GroupedCommand(click.Command):
         self.params.append(SHORT)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        words = [*args]  # which the parser takes out of `args`
         try:
             *_, order = self.make_parser(ctx).parse_args(list(args))  # of two values the first would be left out unseen
             for one in () if ctx.resilient_parsing else order:
@@ -188,6 +191,9 @@ class GroupedCommand(click.Command):
             message = f"No such option {error.option_name!r}." + (f" Did you mean {' or '.join(near)}?" if near else "")
             raise click.UsageError(message, error.ctx or ctx) from None
         except click.UsageError as error:
+            for number, unit in pairwise(words):
+                if re.fullmatch(r"[\d.]+", number) and unit in _UNITS:
+                    error.message = f"A number and its unit are one word: type {number}{unit}."
             error.ctx = error.ctx or ctx  # the parser does not say of which command an option has no argument
             raise
 
