@@ -143,7 +143,7 @@ class Encoder:
     )
     teeth: str | None = option(
         None,
-        "Teeth of a crank wheel: 60-2, 36-2-2-2, or 24+1 for one extra. It needs --sensor pulses and --ppr N. "
+        "Teeth of a crank wheel, as 60-2, 36-2-2-2 or 24+1, one extra. It needs --sensor pulses and --ppr N. "
         "Gaps are evenly spread, or listed with the teeth before them, as 15-2,3-2,18-2; the core takes any. "
         "Missing teeth count where they would be once the place is known, extra ones do not. With --index "
         "the first tooth after the gap, after the longest row of teeth, or after the extra tooth is the index, and "

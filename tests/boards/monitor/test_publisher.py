@@ -1,4 +1,4 @@
-"""What is published is read by clients that others wrote, also when the broker comes back; no value is invented."""
+"""Clients that others wrote read published telemetry, also when the broker comes back; no value is invented."""
 
 import json
 import queue
