@@ -193,7 +193,8 @@ class GroupedCommand(click.Command):
         except click.UsageError as error:
             for number, unit in pairwise(words):
                 if re.fullmatch(r"[\d.]+", number) and unit in _UNITS:
-                    error.message = f"A number and its unit are one word: type {number}{unit}."
+                    text = f"A number and its unit are one word: type {number}{unit}."
+                    raise click.UsageError(text, error.ctx or ctx) from None
             error.ctx = error.ctx or ctx  # the parser does not say of which command an option has no argument
             raise
 
