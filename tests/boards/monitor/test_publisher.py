@@ -41,7 +41,11 @@ def heard(port: int, topic: str) -> Iterator["queue.Queue[tuple[str, str]]"]:
     messages: queue.Queue[tuple[str, str]] = queue.Queue()
     client = Client(CallbackAPIVersion.VERSION2)
     client.reconnect_delay_set(1, 1)
-    client.on_connect = lambda *_: client.subscribe(f"{topic}/#")
+
+    def subscribe(*_: Any) -> None:
+        client.subscribe(f"{topic}/#")
+
+    client.on_connect = subscribe
     client.on_message = lambda _, __, message: messages.put((message.topic, message.payload.decode()))
     client.connect("127.0.0.1", port)
     client.loop_start()
