@@ -54,7 +54,7 @@ class Unit(wiring.Component):
         self.chance = Signal(CHANCE_BITS)  # the number of the event, its bits reversed
         self.operand = self.sum  # in the clock after the start
         self.with_sum = self.doing  # what begins with `sum`
-        values = program.tables
+        values = program.form.tables
         self.tables = Memory(shape=TABLE_BITS, depth=1 << (len(values) - 1).bit_length(), init=values)
         self.table = self.tables.read_port()
 
@@ -90,7 +90,8 @@ class Unit(wiring.Component):
         place = (~self.operand)[_GAIN_LOW : _GAIN_LOW + 9]
         beyond = place[8] | (place[7] & place[5:7].any())  # beyond the last
         gain = Mux(beyond, GAINS_FROM - 1, place[: GAINS.bit_length() - 1])
-        return Cat(gain, (self.how_done[:2] + len(POWERS) // GAINS)[:3])
+        last = self.how_done[:2].all() if len(self._program.form.gains) > 3 else C(0, 0)  # behind all else
+        return Cat(gain, (self.how_done[:2] + len(POWERS) // GAINS)[:3], last)
 
     def _work(self, m: Module) -> None:
         raise NotImplementedError

@@ -71,6 +71,8 @@ def plan_at(spec: TachometerSpec, speed: ArrayLike | None = None) -> Plan:
 
     A method that has none there has NaN for times and resolution.
     """
+    if spec.encoder.sampled is not None:
+        raise ParameterError("sensor", "must not be sampled for a plan, which is for edges")
     speed = np.atleast_1d(np.asarray(default_range(spec) if speed is None else speed, dtype=np.float64))
     tick_seconds = float(spec.timing.tick_seconds)
     found = PERFORMANCES.get(spec.method, unknown)(spec, speed)
@@ -131,8 +133,6 @@ class Plans:
     @staticmethod
     def of(spec: TachometerSpec, greatest: float = math.inf) -> "Plans":
         """Return those of a core alone, over the range that is of interest, up to a greatest speed in rad/s."""
-        if spec.encoder.sampled is not None:
-            raise ParameterError("sensor", "must not be sampled for a plan, which is for edges")
         low, high = default_range(spec)
         return Plans(spec, {}, low, min(high, greatest))
 

@@ -211,6 +211,20 @@ class Tracking:
         found = zip(*map(all_of, range(GAINS)), strict=True)
         return tuple(tuple(fixed_log(math.log2(gain)) for gain in gains) for gains in found)
 
+    @property
+    def tables(self) -> tuple[int, ...]:
+        """The tables of the unit: powers, gains, logarithms; those again, each twice.
+
+        The serial unit has the leading one at a bit or one above. So in both cases all bits are an address.
+        """
+        gains = (gain for number in range(3) for gain in self._turned(number))
+        return (*POWERS, *gains, *LOGS, *(log for log in LOGS for _ in range(2)))
+
+    def _turned(self, number: int) -> tuple[int, ...]:
+        """Return a table of gains whose index is one of log2."""
+        gains = self.gains[number]
+        return (*gains[-GAINS_FROM:], *gains[:-GAINS_FROM])
+
 
 # Of 1 + (i + ½)/128, and of 2^((i + ½)/256).
 LOGS = tuple(fixed_log(math.log2(1 + (i + 0.5) / 2**LOG_INDEX)) for i in range(2**LOG_INDEX))

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cache, cached_property
 
-from tachometry.spec.formats.tracking import GAINS_FROM, LOGS, POWERS, Tracking
+from tachometry.spec.formats.tracking import Tracking
 from tachometry.spec.formats.tracking_listing import LISTING
 from tachometry.spec.formats.tracking_units import Start, Times
 
@@ -167,17 +167,15 @@ class Code:
 
 
 @cache
-def assembled(
-    listing: str = LISTING, apart: int = 2, ports: int = 1, *, smooth: bool = False, sampled: bool = False
-) -> Code:
+def assembled(listing: str = LISTING, apart: int = 2, ports: int = 1, **kind: bool) -> Code:
     """Return the instructions of a listing, with some that do nothing where a word would be read too early.
 
     The one that reads a word is `apart` instructions behind one that stores it, or more. Each reads `ports` words.
     """
     code: list[Instruction] = []
     labels: dict[str, int] = {}
-    wanted = {"block": ports > 1, "serial": ports == 1, "smooth": smooth, "edges": not sampled, "reads": sampled}
-    within = True
+    wanted = {"block": ports > 1, "serial": ports == 1, "smooth": False, "reads": False, **kind}
+    within, wanted["edges"] = True, not wanted["reads"]
     for line in re.sub("#.*", "", listing).replace(";", "\n").splitlines():
         words = line.split()
         while words and words[0] in wanted:
@@ -337,7 +335,7 @@ class Program:
 
     @property
     def _kind(self) -> dict[str, bool]:
-        return {"smooth": self.smooth, "sampled": self.form.sampled}
+        return {"smooth": self.smooth, "reads": self.form.sampled}
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -396,17 +394,6 @@ class Program:
             return int(one.how)
         shift = self._shift(one)
         return BY_FACTOR if one.how == "by" else self.shifts.index(shift) if shift else 0
-
-    @cached_property
-    def tables(self) -> tuple[int, ...]:
-        """The tables of the unit: powers, gains, logarithms; those again, each twice.
-
-        The serial unit has the leading one at a bit or one above. So in both cases all bits are an address.
-        """
-        turned = (
-            gains[-GAINS_FROM:] + gains[:-GAINS_FROM] for gains in self.form.gains
-        )  # so their index is one of log2
-        return (*POWERS, *(gain for gains in turned for gain in gains), *LOGS, *(log for log in LOGS for _ in range(2)))
 
 
 HOW_BITS = 4

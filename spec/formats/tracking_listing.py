@@ -11,8 +11,7 @@ what is begun with the sum`.
     o@m1, o@m2, o@m3       of the last count if n mod 4 ≥ 1, of that before if ≥ 2, of the third if = 3, else 0
     keep          the sign of the sum         log, exp      begin log2|sum|, 2^sum       out name      an output
     gain k        begin: log of the gain of p (0), v (1), a (2)  block, serial  before a line: for that machine only
-    smooth        before a line: for a core with --smooth only
-    edges, reads  before a line, or before several in braces: where edges are counted, or positions are read
+    smooth, edges, reads   before a line, or several in braces: with --smooth, of counted edges, of read positions
     by            the factor of products      product name  begin: sum·factor/2^shift of that name
     over n        begin: shift right by n     over by       by ⌊log2⌋ of the factor's whole part
 """
@@ -157,9 +156,14 @@ curved:
 placed:
     e keep
     of_e + ~ exp
-    block since by
-    noises = noises + noises_one min noises_most
+    edges block since by; noises = noises + noises_one min noises_most
     p = P s+ ~
+    reads {; e - lag keep log; more = zero; log_X + log_3_2 + ~ exp
+    lag = lag s+ ~ keep log             # half of it is shown as well, where an acceleration is
+    block since by; velocity_std - of_curve; if neg goto place
+    w = log_half + ~; log_X gain 3; w + log_X - log_dt + of_velocity + ~ exp
+    vs = vs s+ ~; velocity = velocity s+ ~; log_X gain 0; w + log_X + ~ exp
+    more = zero s- ~; lag over 1; more = more + ~; block since by; }
 place:                                  # and the place at the end of the tick
     serial since by
     as product half_velocity
@@ -169,13 +173,12 @@ place:                                  # and the place at the end of the tick
     block tick by
     v = zero s+ t
     least = one; edges if empty goto seen
-    p + ~ out position_fine
+    edges p + ~ out position_fine; reads p + more + ~ out position_fine
 shown:
     serial tick by
     velocity product shown
     edges w = doubt + log_X - slips hi+ slips; reads w = doubt + log_X  # D·√X, more if errors keep a sign
-    triple = step + D
-    t = ~
+    triple = step + D; t = ~
     limit + w over 1
     block slope by
     velocity_std - log_T + ~ exp
@@ -187,11 +190,11 @@ shown:
     ~ out acceleration
     after - one; if neg goto fewer
 learn:                                  # nothing below is in a hurry
-    e - lag keep log
-    edges lost = slips hi+ lost; log_X + log_3_2 + ~ exp    # counts were lost or added; now the place is right
+    edges {; e - lag keep log; lost = slips hi+ lost    # counts were lost or added, and now the place is right
+    log_X + log_3_2 + ~ exp; }
     noises = noises max noises_first    # an upset may have made it less
     block sum min noises_offset by
-    lag = lag s+ ~
+    edges lag = lag s+ ~
     e over 1
     t = e - before keep
     log_X + log_256; if pos goto short
@@ -322,7 +325,7 @@ young:
     smooth zero + zero out smooth_delay; smooth sum out velocity_smooth
     phase + one; if neg goto first
 begin:
-    e = c - p keep log; edges slips = none; edges lost = zero; edges edge = raw - moved
+    e = c - p keep log; reads more = zero; edges slips = none; edges lost = zero; edges edge = raw - moved
     of_velocity - log_dt + ~ exp
     phase = zero; since = tau; p = c - moved
     v = zero s+ ~
@@ -359,21 +362,18 @@ below:
     zero - P - o@down
 beyond:
     max zero
-    t = sum - half
-    if neg goto still
+    t = sum - half; if neg goto still
     P = P s- t                          # at the next edge
     w = minus_D3 + minus_Ds + minus_Ds
     half - slack; if pos goto sure
     w = zero - half - quarter max w
 sure:
-    t = t + w
-    if neg goto still
+    t = t + w; if neg goto still
     zero - lost; if pos goto trusted
     t = t - count - count - count - count
     if neg goto still
 trusted:
-    quiet + ahead log
-    w = zero
+    quiet + ahead log; w = zero
     t - half; if neg goto whole
     w = log_5_8
 whole:

@@ -4,10 +4,11 @@ So the words of places, velocity and acceleration are those of a disc of 8192 co
 fraction bits of the place.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
-from tachometry.spec.formats.tracking import PLACE_BITS, Tracking
+from tachometry.spec.formats.tracking import GAIN_STEPS, GAINS, PLACE_BITS, Tracking, fixed_log
 
 _CARRIED = 8  # ticks without a read for which the acceleration is still taken into account
 
@@ -40,6 +41,20 @@ class SampledTracking(Tracking):
     def most_last(self) -> int:
         """The greatest number of ticks since a read."""
         return self.max_ticks
+
+    @cached_property
+    def gains(self) -> tuple[tuple[int, ...], ...]:
+        """Also that by which the lag adds to the velocity: α − β/2 + γ/12, over X."""
+
+        def of_lag(number: int) -> float:
+            x = 2 ** (-2 - (number + 0.5) / GAIN_STEPS)
+            return (9 - 27 * x + 20 * x * x) / ((1 + x) * (1 + 2 * x))
+
+        return (*super().gains, tuple(fixed_log(math.log2(of_lag(number))) for number in range(GAINS)))
+
+    @property
+    def tables(self) -> tuple[int, ...]:
+        return (*super().tables, *[0] * (5 * GAINS), *self._turned(3))
 
     @cached_property
     def constants(self) -> dict[str, int]:

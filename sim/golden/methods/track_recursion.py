@@ -236,14 +236,17 @@ class Recursion:
         self.noise = max(self.noise, k["least_noise"])
         most = k["most"]
         self.v, self.a = max(-most, min(self.v, most)), max(-most, min(self.a, most))
-        off = e - self.lag
-        self.lag += self._power(log2(off) + x + k["log_3_2"], -1 if off < 0 else 1)
+        self._learn_lag(e)
         if n == 1 and x + k["past_4"] < 0:
             size = min(abs(e), k["half"])
             quarter = self._round(size, self._shift(max(self.noises, k["noises_least"])))
             quarter = -quarter if e < 0 else quarter
             self.offsets[kind] += 4 * quarter
             self.offsets = [offset - quarter for offset in self.offsets]
+
+    def _learn_lag(self, e: int) -> None:
+        off = e - self.lag
+        self.lag += self._power(log2(off) + self.log_share + self._k["log_3_2"], -1 if off < 0 else 1)
 
     def _shift(self, noises: int) -> int:
         """Return ⌊log2⌋ of a number of events, by which what is learned is shifted."""
