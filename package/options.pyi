@@ -16,6 +16,7 @@ class CoreOptions(TypedDict, total=False):
     command: Value | None
     control_period: Value | None
     cpr: Value | None
+    crc: Value | None
     current_limit: Value | None
     current_width: Value | None
     decoding: Value | None
@@ -24,11 +25,13 @@ class CoreOptions(TypedDict, total=False):
     edge_error: Value | None
     electrical: Value | None
     electrical_offset: Value | None
+    encoder_clock: Value | None
     estimate: Value | None
     external_tick: bool | None
     filter: Value | None
     frac_bits: Value | None
     gains: Value | None
+    gray: bool | None
     health: bool | None
     health_edges: Value | None
     health_errors: Value | None
@@ -41,6 +44,7 @@ class CoreOptions(TypedDict, total=False):
     kp: Value | None
     kv: Value | None
     lead: Value | None
+    line_delay: Value | None
     lines: Value | None
     loop: bool | None
     loop_multiplier: Value | None
@@ -68,6 +72,7 @@ class CoreOptions(TypedDict, total=False):
     pwm: Value | None
     ratio: Value | None
     reciprocal: Value | None
+    repeat: bool | None
     reverse: bool | None
     sample_age: Value | None
     sensor: Value | None

@@ -5,8 +5,10 @@ from amaranth.lib import wiring
 
 from tachometry.hdl.core.tachometer import Tachometer
 from tachometry.hdl.front_end.sampled_position import SampledPosition
+from tachometry.hdl.front_end.sampling_clock import SamplingClock
+from tachometry.hdl.front_end.serial_encoder import SerialEncoder
 from tachometry.hdl.output.update import update_layout
-from tachometry.hdl.wires.ports import by_name, drive, follow
+from tachometry.hdl.wires.ports import by_name, drive, follow, hand_through
 from tachometry.spec import TachometerSpec
 
 
@@ -17,6 +19,7 @@ class SampledTachometer(Tachometer):
 
     def _make_front(self, spec: TachometerSpec) -> None:
         self.reader = SampledPosition(spec)
+        self.master = None if spec.reads is None else SerialEncoder(spec.reads)
         self.controls, self.modulo_counter, self.index_capture = {}, None, None
 
     @property
@@ -29,12 +32,21 @@ class SampledTachometer(Tachometer):
     def _count(self, m: Module) -> dict[str, Value]:
         reader, sampled = self.reader, self._spec.encoder.sampled
         assert sampled is not None
-        follow(m, reader, self, (port.name for port in sampled.ports(self._spec.tick.longest)))
+        inputs = [port.name for port in sampled.ports(self._spec.tick.longest)]
+        follow(m, reader, self if self.master is None else self._read(m, self.master), inputs)
         drive(m, reader, {"last": self.sampling_clock.last})
         shown = ("tick", "pulse_count", "overflow", "position", "position_valid", "decode_error")
         follow(m, self, reader, shown)
         names = ("coming", "next_count", "number", "times", "silent", "elapsed", "length")
         return by_name(reader, names)
+
+    def _read(self, m: Module, master: SerialEncoder) -> SerialEncoder:
+        """Let the master read once in each tick, so that the answer comes before it ends, or after an external one."""
+        m.submodules.master = master
+        hand_through(m, self, master, ("encoder_clock", "encoder_data"))
+        clock = self.sampling_clock
+        m.d.comb += master.start.eq(clock.early if isinstance(clock, SamplingClock) else clock.last)
+        return master
 
     def _taps(self, m: Module) -> dict[str, Value]:
         updates = self.datapath.updates

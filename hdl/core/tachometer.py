@@ -59,7 +59,7 @@ class Tachometer(wiring.Component):
         elif spec.external_tick:
             self.sampling_clock = ExternalTick(spec.times.min_tick_cycles, spec.tick.longest, spec.latency.tick)
         else:
-            self.sampling_clock = SamplingClock(spec.timing.tick_cycles)
+            self.sampling_clock = SamplingClock(spec.timing.tick_cycles, spec.reads.longest if spec.reads else 0)
         layout = update_layout(spec)
         clears = spec.facts.last_at_rest
         self.low_pass = None if spec.lowpass is None else LowPass(spec.velocity.low_pass, layout, clears=clears)

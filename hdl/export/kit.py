@@ -55,11 +55,12 @@ def _help(port: Port) -> str:
 
 def _synchronizers(spec: AnySpec, bus: Bus | None) -> dict[str, list[str]]:
     """Return where the synchroniser of each pin is in the core: the boxes from the outermost to itself."""
-    box = {"tick_in": ["sampling_clock"]} if spec.axes is None else {}
+    box = {"tick_in": ["sampling_clock"], "encoder_data": ["master"]} if spec.axes is None else {}
     default = ["conditioner"] if spec.axes is None else []
     tacho = spec.tachometer
     complements = [f"{line}_n" for line in tacho.front_end.complemented]
     pins = (*tacho.front_end.lines, *complements, *tacho.front_end.sensed, *["tick_in"] * tacho.external_tick)
+    pins += ("encoder_data",) if tacho.reads else ()
     boxes = {pin: box.get(pin, default) for pin in pins}
     boxes |= {line: ["bridge"] for line in (bus.asynchronous if bus else ())}
     return {pin: [*path, f"sync_{pin}"] for pin, path in boxes.items()}
@@ -69,6 +70,8 @@ def _first_levels(spec: AnySpec) -> dict[str, int]:
     """Return levels of the sensor's lines before it turns, those that are not 0, and of an index that is inverted."""
     encoder, all_ones = spec.tachometer.encoder, (1 << (spec.axes or 1)) - 1
     first = dict(zip(encoder.kind.lines, encoder.kind.legal[0], strict=encoder.sampled is None)) | {"z": 0}
+    if spec.tachometer.reads is not None:
+        first["encoder_data"] = 1
     at_pins = {line: level ^ (line in encoder.inverted) for line, level in first.items()}
     at_pins |= {f"{line}_n": 1 - at_pins[line] for line in spec.tachometer.front_end.complemented}
     return {line: all_ones for line, level in at_pins.items() if level}
@@ -87,6 +90,8 @@ def _turned(encoder: Encoder, turns: tuple[int, int]) -> tuple[dict[str, str], i
     elif encoder.sensor == "pulses":
         levels = {"a": levels["a"]}
         counts = sum(turns) * encoder.decoding // 4 * (-1 if encoder.reverse else 1)
+    elif encoder.sampled is not None and encoder.sensor != "sampled":  # by a model of the encoder
+        levels, counts = {}, moved
     elif encoder.sampled is not None:
         age = {} if encoder.sample_age is not None else {"sample_age": "0"}
         levels, counts = {"sample": "quarter", "sample_valid": "1'b1", "sample_ok": "1'b1", **age}, moved
@@ -120,7 +125,7 @@ def _bench(tacho: TachometerSpec) -> dict[str, object]:
         "hold": hold,
         "turns": turns,
         "levels": _wired(tacho, levels),
-        "ends": {} if encoder.kind.cycle else low,
+        "ends": {} if encoder.kind.cycle or tacho.reads else low,
         "places": 6 if encoder.sensor == "hall" else 4,
         "place_bits": encoder.sampled.width if encoder.sampled else 3 if encoder.sensor == "hall" else 2,
         "velocity": "velocity",

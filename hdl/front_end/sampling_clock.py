@@ -5,6 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
+from tachometry.hdl.wires.ports import only_if
 
 # Bits whose parity makes a shift register of so many bits go through all states but one (Alfke, XAPP 052).
 _TAPS = {5: (5, 3), 6: (6, 5), 7: (7, 6), 8: (8, 6, 5, 4), 9: (9, 5), 10: (10, 7), 11: (11, 9), 12: (12, 6, 4, 1)}
@@ -36,15 +37,18 @@ class SamplingClock(wiring.Component):
     takes fewer cells. Whatever state an upset brings, it comes to the last one of a window.
 
     - `tick_cycles`: T, clocks in a window.
+    - `lead`: Clocks before the last one of a window in which `early` is high; 0: it has no such output.
 
     It raises ValueError if `tick_cycles` is less than 1.
     """
 
-    def __init__(self, tick_cycles: int) -> None:
+    def __init__(self, tick_cycles: int, lead: int = 0) -> None:
         if tick_cycles < 1:
             raise ValueError(f"tick_cycles must be at least 1, not {tick_cycles}")
         self._tick_cycles = tick_cycles
-        super().__init__({"last": Out(1)})  # high in the last clock of every window
+        self._lead = lead
+        # `last` is high in the last clock of every window.
+        super().__init__({"last": Out(1), **only_if(lead, early=Out(1))})
 
     @property
     def states(self) -> tuple[int, ...]:
@@ -54,6 +58,8 @@ class SamplingClock(wiring.Component):
     @property
     def idle(self) -> tuple[Idle, ...]:
         """Counters that a simulation may skip: `IdleCounter`."""
+        if self._lead:
+            return ()
         if self.states:
             return (IdleCounter("state", order=self.states),)
         # Of two clocks none is worth skipping, and one bit goes by the name of what it is connected to.
@@ -71,6 +77,8 @@ class SamplingClock(wiring.Component):
             # Also of ones alone.
             m.d.comb += self.last.eq(state[:-1].all())
             m.d.sync += state.eq(state_after(state))
+            if self._lead:
+                m.d.comb += self.early.eq(state == states[-1 - self._lead])
             with m.If(self.last):
                 m.d.sync += state.eq(first)
             return m
@@ -79,6 +87,8 @@ class SamplingClock(wiring.Component):
         left = Signal(signed(start.bit_length() + 1), init=start)
         m.d.comb += self.last.eq(left[-1])
         m.d.sync += left.eq(left - Const(1, left.shape()))
+        if self._lead:
+            m.d.comb += self.early.eq(left == self._lead - 1)
         with m.If(self.last):
             m.d.sync += left.eq(start)
         return m

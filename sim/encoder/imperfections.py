@@ -22,7 +22,7 @@ Rows = NDArray[np.intp]
 Levels = NDArray[np.uint8]
 
 # Streams of random numbers, children of the seed.
-NONUNIFORMITY, JITTER, ILLEGAL, LOST, BOUNCE, NOISE, WRONG_READS = range(7)
+NONUNIFORMITY, JITTER, ILLEGAL, LOST, BOUNCE, NOISE, WRONG_READS, FLIPS = range(8)
 
 MAX_BOUNCES = 1000
 

@@ -1,7 +1,7 @@
 """Encoders that are read: their reads of a shaft, and reads that visit what every core must survive."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tachometry.sim.encoder import imperfections
-from tachometry.sim.encoder.imperfections import NOISE, WRONG_READS
+from tachometry.sim.encoder.absolute import Answers, answer, frames
+from tachometry.sim.encoder.imperfections import FLIPS, NOISE, WRONG_READS
 from tachometry.sim.encoder.motion import Motion, sin2pi
 from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
 from tachometry.sim.signals.recording import MAX_EDGES, PinTrace, Recording
 from tachometry.spec import TachometerSpec
+from tachometry.spec.core.reads import Reads
 from tachometry.spec.core.sampled import Sampled
 from tachometry.spec.language.option import ParameterError
 
@@ -49,17 +51,28 @@ class SampledEncoder(VirtualEncoder):
             raise ParameterError("motion", f"must last for at most {MAX_EDGES} ticks, not {n_ticks}")
         age = cycles // 4 if sampled.age is None else sampled.age
         clock = np.arange(1, n_ticks + 1) * cycles - 2 - cycles // 8
+        if (reads := self.core.reads) is not None:
+            start, age = np.array(self.core.read_starts(n_ticks * cycles)), reads.oldest
+            clock = start + reads.longest
         clock = clock[clock >= max(age, 1)]
         time = clock / timing.clock_hz
         shaft = Encoding(self, motion, Recording.of_level(np.zeros(1), np.zeros(1, np.uint8), 1.0), 0, 0)
         turn = shaft.true_angle((clock - age) / timing.clock_hz) / (2 * math.pi) * float(Fraction(self.ratio or 1))
         place = self._disturbed(-turn if self.reverse else turn, len(clock), 1 << sampled.bits)
         wrong = imperfections.uniform(self._stream(WRONG_READS), len(clock)) < self.frame_errors
-        lines = read_lines(sampled, place, np.full(len(clock), age), (~wrong).astype(np.int64))
-        at = np.stack([time, (clock + 1) / timing.clock_hz], axis=1).ravel()
-        zero = {name: np.append(0, values) for name, values in lines.items()}
-        none = np.zeros(len(at) + 1, dtype=np.uint8)
-        recording = Recording(np.append(0.0, at), none, none, motion.duration, more=zero)
+        if reads is not None:
+            sent = Answers(place & (1 << sampled.width) - 1, reads.delay)
+            begin = np.where(wrong, imperfections.uniform(self._stream(FLIPS), len(clock)), -1)
+            at, level = answer(reads, start, replace(sent, flip=np.floor(begin * frames(reads, sent).shape[1])))
+            at = at[at < n_ticks * cycles]
+            none = np.zeros(len(at), dtype=np.uint8)
+            more = {"encoder_data": level[: len(at)]}
+        else:
+            lines = read_lines(sampled, place, np.full(len(clock), age), (~wrong).astype(np.int64))
+            at = np.append(0, np.stack([clock, clock + 1], axis=1).ravel())
+            none = np.zeros(len(at), dtype=np.uint8)
+            more = {name: np.append(0, values) for name, values in lines.items()}
+        recording = Recording(at / timing.clock_hz, none, none, motion.duration, more=more)
         read = (-place if self.reverse else place)[~wrong]
         read = read - (read[:1] & -1 << sampled.width).sum()
         return ReadEncoding(self, motion, recording, 0, 0, read_time=time[~wrong], read=read)
@@ -97,10 +110,9 @@ def stress_reads(spec: TachometerSpec, seed: int, n_edges: int) -> PinTrace:
     assert sampled is not None
     rng = np.random.default_rng(seed)
     n_ticks = 6 * n_edges
-    speeds = np.array([0, 0.3, 3, 100, sampled.most_moved / 3, 1.2 * spec.tick.max_count])
-    speed = np.repeat(rng.choice(speeds, n_ticks // 30 + 1) * rng.choice([-1, 1], n_ticks // 30 + 1), 30)[:n_ticks]
-    place = np.cumsum(speed + rng.normal(0, 1 + np.abs(speed) / 100)) + rng.integers(0, 1 << sampled.width)
-    place += np.where(rng.random(n_ticks) < 0.01, rng.integers(-1 << 15, 1 << 15, n_ticks), 0)
+    if spec.reads is not None:
+        return _stress_answers(spec, spec.reads, rng, n_ticks)
+    place = _restless(spec, rng, n_ticks)
     near = rng.choice([0, 0, 0, 1, cycles // 2], n_ticks)  # in the last clock of a tick, in others, and twice in one
     clock = np.cumsum(cycles + rng.choice([0, 0, 0, 0, 1, -1, cycles, -cycles // 2], n_ticks)) - 1 - near
     gone = (rng.random(n_ticks) < 0.02) | (np.repeat(rng.random(n_ticks // 20 + 1) < 0.05, 20)[:n_ticks])
@@ -112,8 +124,31 @@ def stress_reads(spec: TachometerSpec, seed: int, n_edges: int) -> PinTrace:
     late = np.clip(rng.integers(-3, 3, len(clock)) + most, 0, (1 << most.bit_length()) - 1)
     age = np.where(rng.random(len(clock)) < 0.03, late, rng.integers(0, max(cycles // 3, 1), len(clock)))
     right = (rng.random(len(clock)) > 0.02).astype(np.int64)
-    lines = read_lines(sampled, np.floor(place).astype(np.int64), age, right)
+    lines = read_lines(sampled, place, age, right)
     at = np.stack([clock, clock + 1], axis=1).ravel()
     zero = {name: np.append(0, values) for name, values in lines.items()}
     none = np.zeros(len(at) + 1, dtype=np.uint8)
     return PinTrace.of_lines(np.append(0, at), int(at[-1]) + longest + 20 * cycles, {"a": none, "b": none} | zero)
+
+
+def _restless(spec: TachometerSpec, rng: np.random.Generator, n_ticks: int) -> Ints:
+    """Return the place of a shaft in each tick."""
+    sampled = spec.encoder.sampled
+    assert sampled is not None
+    speeds = np.array([0, 0.3, 3, 100, sampled.most_moved / 3, 1.2 * spec.tick.max_count])
+    speed = np.repeat(rng.choice(speeds, n_ticks // 30 + 1) * rng.choice([-1, 1], n_ticks // 30 + 1), 30)[:n_ticks]
+    place = np.cumsum(speed + rng.normal(0, 1 + np.abs(speed) / 100)) + rng.integers(0, 1 << sampled.width)
+    place += np.where(rng.random(n_ticks) < 0.01, rng.integers(-1 << 15, 1 << 15, n_ticks), 0)
+    return np.floor(place).astype(np.int64)
+
+
+def _stress_answers(spec: TachometerSpec, reads: Reads, rng: np.random.Generator, n_ticks: int) -> PinTrace:
+    """Return the answers of an encoder, some late, wrong or missing, for longer than the maximum time as well."""
+    n_clocks = n_ticks * spec.timing.tick_cycles
+    sent = Answers(_restless(spec, rng, n_ticks) & (1 << reads.width) - 1, reads.delay, rng.integers(0, 3, n_ticks))
+    gone = (rng.random(n_ticks) < 0.02) | (np.abs(np.arange(n_ticks) - n_ticks // 2) < spec.timing.max_ticks)
+    wrong = np.where(rng.random(n_ticks) < 0.02, rng.integers(0, frames(reads, sent).shape[1], n_ticks), -1)
+    sent = replace(sent, flip=wrong, error=rng.random(n_ticks) < 0.02, warning=rng.random(n_ticks) < 0.02, silent=gone)
+    at, level = answer(reads, np.array(spec.read_starts(n_clocks)), sent)
+    none = np.zeros(len(at), dtype=np.uint8)
+    return PinTrace.of_lines(at, n_clocks, {"a": none, "b": none, "encoder_data": level})

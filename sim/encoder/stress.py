@@ -23,7 +23,8 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     """
     rng, sensor = np.random.default_rng(seed), spec.encoder.kind
     if spec.encoder.sampled is not None:
-        return _ticked(spec, stress_reads(spec, seed, n_edges), rng)
+        trace = stress_reads(spec, seed, n_edges)
+        return trace.completed(spec) if spec.reads else _ticked(spec, trace, rng)
     cycles, longest = spec.timing.tick_cycles, spec.timing.tick_cycles * spec.timing.max_ticks
     gaps, turns = [], []
     steps = not sensor.cycle  # each is a pulse

@@ -19,14 +19,14 @@ from tachometry.sim.encoder.motion import FloatArray, Motion, Vibration, sin2pi
 from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.sim.signals.recording import MAX_EDGES, Recording, packed, quadrature
 from tachometry.spec import Encoder, TachometerSpec
-from tachometry.spec.core.sensors import KINDS, SENSORS
+from tachometry.spec.core.sensors import KINDS, READ, SENSORS
 from tachometry.spec.core.tooth_wheel import parts_of
 from tachometry.spec.language.option import ParameterError
 
 MAX_PULSES_PER_REV = 1 << 26
 MAX_UNEVEN_PULSES = 1 << 20  # of a disc whose edges are all displaced: each takes memory
 # Edges in a period of the disc, where these are not those of quadrature; and sensors that may have a fault.
-_EDGES = {"step-dir": 1, "up-down": 1, "hall": 6, "sampled": 1}
+_EDGES = {"step-dir": 1, "up-down": 1, "hall": 6} | dict.fromkeys(READ, 1)
 _WITH_EDGES = ("quadrature", "pulses", "step-dir", "up-down", "hall")
 _FAULTS_OF = {
     "phase_error_deg": ("quadrature",),
@@ -37,7 +37,7 @@ _FAULTS_OF = {
     "bounce": ("quadrature", "pulses", "hall"),
     "lost": ("quadrature", "pulses"),
     **dict.fromkeys(("jitter", "nonuniformity", "eccentricity", "index_skew_s"), _WITH_EDGES),
-    **dict.fromkeys(("noise", "interpolation", "frame_errors"), ("sampled",)),
+    **dict.fromkeys(("noise", "interpolation", "frame_errors"), tuple(READ)),
 }
 
 

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim.golden.encoder_read import Line, records
+from tachometry.sim.golden.sampling import windows
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
@@ -22,18 +24,42 @@ class Reads:
 
     @classmethod
     def of(cls, spec: TachometerSpec, trace: PinTrace) -> "Reads":
-        """Return the reads of a trace: there is one in every clock in which sample_valid is high."""
+        """Return the reads of a trace: there is one in every clock in which sample_valid is high, or in every tick."""
         sampled = spec.encoder.sampled
         assert sampled is not None
+        if spec.reads is not None:
+            begin = windows(spec, trace)[0] if spec.external_tick else np.array(spec.read_starts(trace.n_clocks))
+            level = trace.lines["encoder_data"]
+            changed = np.append(True, level[1:] != level[:-1])
+            found = records(spec.reads, begin, Line(trace.clock[changed], level[changed]))
+            return cls.those(spec, found.clock, found.sample, found.age, found.reason == 0)
         lasts = np.diff(trace.clock, append=trace.n_clocks) * (trace.lines["sample_valid"] != 0)
         row = np.repeat(np.arange(len(lasts)), lasts)
         clock = trace.clock[row] + np.arange(len(row)) - np.repeat(np.cumsum(lasts) - lasts, lasts)
         sample, right = (trace.lines[name][row].astype(np.int64) for name in ("sample", "sample_ok"))
-        age = np.full(len(row), sampled.age) if sampled.age is not None else trace.lines["sample_age"][row]
-        taken = (right != 0) & (age <= sampled.most_age(spec.tick.longest))
+        age = (
+            np.full(len(row), sampled.age)
+            if sampled.age is not None
+            else trace.lines["sample_age"][row].astype(np.int64)
+        )
+        return cls.those(spec, clock, sample, age, right != 0)
+
+    @classmethod
+    def those(
+        cls,
+        spec: TachometerSpec,
+        clock: NDArray[np.int64],
+        sample: NDArray[np.int64],
+        age: NDArray[np.int64],
+        right: NDArray[np.bool_],
+    ) -> "Reads":
+        """Return reads of these places and ages: right ones that are not too old are taken."""
+        sampled = spec.encoder.sampled
+        assert sampled is not None
+        taken = right & (age <= sampled.most_age(spec.tick.longest))
         if spec.encoder.reverse:
             sample = -sample & (1 << sampled.width) - 1
-        return cls(clock[taken], sample[taken], age[taken].astype(np.int64), clock[~taken])
+        return cls(clock[taken], sample[taken], age[taken], clock[~taken])
 
 
 def ticks_of(spec: TachometerSpec, reads: Reads, last: NDArray[np.int64]) -> Table:

@@ -2,11 +2,13 @@
 
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 from typing import ClassVar
 
 from tachometry.spec.core.encoder import Encoder
 from tachometry.spec.core.facts import Facts
 from tachometry.spec.core.index import Index
+from tachometry.spec.core.reads import Reads
 from tachometry.spec.core.sensors import parse_modulo
 from tachometry.spec.core.timing import Timing, parse_clocks, parse_filter
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS, parse_lsb
@@ -161,6 +163,17 @@ class Asked:
     # Unit that speeds are shown in, of those without a unit of their own; None: that of --max-speed, or rad/s. It is
     # what a motion was typed in, and makes no other core.
     shown: str | None = field(default=None, compare=False, repr=False)
+
+    @cached_property
+    def reads(self) -> Reads | None:
+        """Reads of the encoder that the core makes; None: it makes none."""
+        return self.encoder.reads(self.timing.clock_hz, self.timing.tick_cycles)
+
+    def read_starts(self, n_clocks: int) -> range:
+        """Return the clocks in which reads begin, with ticks that are nominal."""
+        assert self.reads is not None
+        lead = 0 if self.external_tick else self.reads.longest
+        return range(self.timing.tick_cycles - 1 - lead, n_clocks, self.timing.tick_cycles)
 
     # Name of the method, and what sets it apart.
     method: ClassVar[str]

@@ -48,6 +48,11 @@ def _check_sampled(spec: Core) -> None:
         if getattr(spec, name) != none:
             raise ParameterError(name, "must be left out with --sensor sampled: it is for edges")
     refuse(spec.extras, "sampled")
+    if (reads := spec.reads) is not None:
+        least = reads.least_tick
+        if spec.timing.tick_cycles < least:
+            rest = f"must be at least {least} clocks for a read, {format_time(Fraction(least, spec.timing.clock_hz))}"
+            raise ParameterError("tick_cycles", f"{rest}, not {spec.timing.tick_cycles}")
     age, most = spec.encoder.sample_age, Sampled.most_age(spec.tick.longest)
     if age is not None and not 0 <= age <= most:
         raise ParameterError("sample_age", f"must be from 0 to {most} clocks, two ticks, not {age}")

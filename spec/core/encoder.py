@@ -4,15 +4,30 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from math import ceil
 from typing import Any
 
+from tachometry.spec.core.reads import BISS_CRC, Reads
 from tachometry.spec.core.sampled import Sampled, parse_bits
-from tachometry.spec.core.sensors import KINDS, Sensor
+from tachometry.spec.core.sensors import KINDS, READ, Sensor
 from tachometry.spec.core.tooth_wheel import parts_of
 from tachometry.spec.language.option import Option, ParameterError, check_options, option, parse_whole
+from tachometry.spec.language.units import parse_frequency, parse_time
 
 _MOST = 1 << 24  # counts
 _INVERTIBLE = ("a", "b", "c", "z")
+_FASTEST_LINE = 10_000_000  # Hz
+_SERIAL = ("ssi", "biss")
+# Options that only some sensors have.
+_OF_SENSORS = {
+    "bits": tuple(READ),
+    "sample_age": ("sampled",),
+    "encoder_clock": _SERIAL,
+    "line_delay": _SERIAL,
+    "crc": ("biss",),
+    "gray": _SERIAL,
+    "repeat": ("ssi",),
+}
 _OF_TURN: dict[str, Any] = {"metavar": "N", "parse": parse_whole}
 
 
@@ -71,6 +86,19 @@ def _teeth(what: str, text: str) -> str:
     return pattern
 
 
+def _polynomial(what: str, text: str) -> str:
+    word = text.strip().lower()
+    if word == "none":
+        return word
+    if not re.fullmatch(r"0x[0-9a-f]{1,9}", word) or not 1 << 3 <= int(word, 16) < 1 << 33 or not int(word, 16) & 1:
+        raise ParameterError(what, f"must be none, or a polynomial of degree 3 to 32, as 0x43, not {text!r}")
+    return hex(int(word, 16))
+
+
+def _takes_reads(spec: Any) -> bool:
+    return bool(spec.facts.takes_reads)
+
+
 @dataclass(frozen=True)
 class Encoder:
     """An incremental encoder, or another sensor of motion, and how its edges are counted.
@@ -117,7 +145,8 @@ class Encoder:
         "Kind of the encoder lines. quadrature: A and B. pulses: A alone, of a tooth wheel, fan or flow "
         "meter, always forward. step-dir: each rise of A is a step, with --decoding 2 each edge, forward "
         "while B is high. up-down: each rise of A counts up, each rise of B down. hall: A, B and C of a "
-        "motor, 120 electrical degrees apart. sampled: an absolute position of --bits, read once a tick.",
+        "motor, 120 electrical degrees apart. sampled: an absolute position of --bits, read once a tick. ssi, "
+        "biss: the same, read by the core itself from an encoder with SSI or BiSS-C.",
         choices=tuple(KINDS),
         tests=("", "hall", "pulses", "step-dir", "up-down"),
         tacit=True,
@@ -158,7 +187,7 @@ class Encoder:
         "Bits of a sampled position (instead of --ppr). M+B: M of turns and B of a turn, as 12+17, or B alone.",
         metavar="M+B",
         parse=parse_bits,
-        fits=lambda spec: spec.facts.takes_reads,
+        fits=_takes_reads,
         tests=(),
         tacit=True,
     )
@@ -168,7 +197,47 @@ class Encoder:
         "input sample_age has it.",
         metavar="N",
         parse=parse_whole,
-        fits=lambda spec: spec.facts.takes_reads,
+        fits=_takes_reads,
+        tests=(),
+        tacit=True,
+    )
+
+    encoder_clock: int | None = option(
+        None,
+        "Clock of an encoder with ssi or biss, at most 10 MHz. It is rounded down to an even number of clocks.",
+        shown="1MHz, with biss 5MHz",
+        metavar="FREQUENCY",
+        parse=parse_frequency,
+        fits=_takes_reads,
+        tests=(),
+        tacit=True,
+    )
+    line_delay: Fraction | None = option(  # noqa: RUF009
+        None,
+        "Delay of the lines to an encoder and back. With ssi each bit is read this much later; biss measures "
+        "it in every frame, and simulations take it.",
+        shown="0",
+        metavar="TIME",
+        parse=parse_time,
+        fits=_takes_reads,
+        tests=(),
+        tacit=True,
+    )
+    crc: str | None = option(
+        None,
+        "Polynomial of the CRC of biss, with its highest term. It begins with 0 and is sent inverted.",
+        shown="0x43, which is x^6 + x + 1",
+        metavar="[POLY|none]",
+        parse=_polynomial,
+        fits=_takes_reads,
+        tests=(),
+        tacit=True,
+    )
+    gray: bool = option(False, "The encoder sends Gray code.", fits=_takes_reads, tests=(), tacit=True)
+    repeat: bool = option(
+        False,
+        "Read an encoder with ssi twice, and take equal reads only. It must repeat its position.",
+        fits=_takes_reads,
         tests=(),
         tacit=True,
     )
@@ -196,21 +265,24 @@ class Encoder:
             self._check_teeth(parts_of(_teeth("teeth", self.teeth)))
 
     def _check_sampled(self) -> None:
-        for name in ("bits", "sample_age"):
-            if self.sensor != "sampled" and getattr(self, name) is not None:
-                raise ParameterError(name, f"must be given with --sensor sampled, not {self.sensor}")
-        if self.sensor != "sampled":
+        for name, sensors in _OF_SENSORS.items():
+            if self.sensor not in sensors and getattr(self, name) not in (None, False):
+                raise ParameterError(name, f"must be given with --sensor {' or '.join(sensors)}, not {self.sensor}")
+        if self.sensor not in READ:
             if self.pulses_per_rev is None:
                 raise ParameterError("ppr", "must be given, or --lines, or --cpr, or --pole-pairs")
             return
         if self.bits is None:
-            raise ParameterError("bits", "must be given with --sensor sampled, as 17, or 12+17 with 12 of turns")
+            rest = f"must be given with --sensor {self.sensor}, as 17, or 12+17 with 12 of turns"
+            raise ParameterError("bits", rest)
         object.__setattr__(self, "bits", parse_bits("bits", self.bits))
         counts = 1 << Sampled.of(self.bits, self.sample_age).bits
         if self.pulses_per_rev not in (None, counts):
-            rest = f"must be left out with --sensor sampled, not {self.pulses_per_rev}: type --bits"
+            rest = f"must be left out with --sensor {self.sensor}, not {self.pulses_per_rev}: type --bits"
             raise ParameterError("ppr", rest)
         object.__setattr__(self, "pulses_per_rev", counts)
+        if self.encoder_clock is not None and not 1 <= self.encoder_clock <= _FASTEST_LINE:
+            raise ParameterError("encoder_clock", f"must be from 1 Hz to 10 MHz, not {self.encoder_clock} Hz")
 
     def _check_decoding(self) -> None:
         if self.decoding in self.kind.decodings:
@@ -239,6 +311,22 @@ class Encoder:
     def sampled(self) -> Sampled | None:
         """Facts of a position that is read; None: edges are counted."""
         return None if self.bits is None else Sampled.of(self.bits, self.sample_age)
+
+    def reads(self, clock_hz: int, tick_cycles: int) -> Reads | None:
+        """Return the reads that a core makes itself, one in each tick; None: it makes none."""
+        if (sampled := self.sampled) is None or self.sensor == "sampled":
+            return None
+        biss = self.sensor == "biss"
+        return Reads(
+            sampled.width,
+            clock_hz,
+            self.encoder_clock or (5_000_000 if biss else 1_000_000),
+            ceil((self.line_delay or 0) * clock_hz),
+            biss=biss,
+            gray=self.gray,
+            repeat=self.repeat,
+            crc=0 if self.crc == "none" or not biss else int(self.crc or hex(BISS_CRC), 16),
+        ).within(tick_cycles)
 
     @property
     def inverted(self) -> frozenset[str]:

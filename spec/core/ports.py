@@ -42,6 +42,8 @@ def ports_of(spec: Core, own: Iterable[Port]) -> Iterator[Port]:
     if spec.encoder.sampled:
         text = "position is that of a good read; it falls when none has come for the maximum time."
         yield held(TICK, "position_valid", help=text)
+    if spec.reads is not None:
+        yield Port("encoder_clock", "output", help="Clock of the encoder; it is high between reads.")
     if spec.velocity.output:
         yield held(UPDATE, "velocity_overflow", help="This velocity was saturated to the width of the port.")
     if spec.age:
@@ -84,7 +86,9 @@ def _inputs(spec: Core) -> Iterator[Port]:
     yield pin("rst", "Synchronous reset, active high.")
     for line, help in zip(spec.encoder.kind.lines, spec.encoder.kind.pins, strict=True):
         yield pin(line, help)
-    if spec.encoder.sampled:
+    if spec.reads is not None:
+        yield pin("encoder_data", "Data of the encoder, asynchronous; it is high between reads.")
+    elif spec.encoder.sampled:
         yield from spec.encoder.sampled.ports(spec.tick.longest)
     if "z" in front.lines:
         yield pin("z", "Index line, asynchronous; the index captures the position.")

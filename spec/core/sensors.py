@@ -111,8 +111,10 @@ _SENSORS = (
     ),
 )
 SENSORS = {sensor.name: sensor for sensor in _SENSORS}  # whose edges are counted
-_READ = Sensor("sampled", (), (1,), (), (), "a read was wrong or older than two ticks, and was not taken.")
-KINDS = {**SENSORS, _READ.name: _READ}
+_NOT_TAKEN = "a read was wrong or older than two ticks, and was not taken."
+# Whose position is read: by what is around the core, or by the core itself.
+READ = {name: Sensor(name, (), (1,), (), (), _NOT_TAKEN) for name in ("sampled", "ssi", "biss")}
+KINDS = {**SENSORS, **READ}
 
 
 def parse_state(what: str, text: str) -> str:

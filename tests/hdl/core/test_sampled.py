@@ -173,7 +173,7 @@ def test_a_core_is_made_again_from_its_options() -> None:
         ("m", {"filter": "3"}, "filter_clocks must be left out with --sensor sampled: it is for edges"),
         ("m", {"sample-age": "81"}, "sample_age must be from 0 to 80 clocks, two ticks, not 81"),
         ("m", {"health": "yes"}, "health must be left out with --sensor sampled: it needs edges"),
-        ("m", {"sensor": "hall"}, "bits must be given with --sensor sampled, not hall"),
+        ("m", {"sensor": "hall"}, "bits must be given with --sensor sampled or ssi or biss, not hall"),
         ("m", {"decoding": "4"}, "decoding must be 1 for sampled, not 4"),
         ("auto", {"tick": "2us"}, "tick must be longer for method track"),
     ],

@@ -1,0 +1,99 @@
+"""Cores that read an encoder themselves: hardware against golden model, exported Verilog, and what is refused."""
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.nightly import only
+
+from tachometry.hdl.export import export
+from tachometry.sim import golden
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.sampled import encoder_of
+from tachometry.sim.encoder.stress import stress
+from tachometry.sim.engines.cxxrtl import Cxxrtl
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.studies.lockstep import lockstep
+from tachometry.spec import ParameterError, TachometerSpec, of_options, of_texts
+
+BASE = {"sensor": "biss", "bits": "17", "clock": "50MHz", "tick": "100us", "max-time": "2ms"}
+SSI = {"sensor": "ssi", "bits": "3+12", "encoder-clock": "2MHz"}
+CASES = {
+    "m": SSI | {"gray": "yes", "repeat": "yes", "line-delay": "300ns", "reverse": "yes"},
+    "m outside": {"bits": "8+12", "external-tick": "yes", "tick": "50us", "crc": "0x190d9"},
+    "m short": SSI | {"tick": "40us", "average": "3"},
+    "track": {},
+}
+
+
+def core(case: str) -> TachometerSpec:
+    return of_texts(case.split()[0], BASE | CASES[case])
+
+
+@pytest.mark.parametrize("case", only(["m", "m outside"], CASES))
+def test_gates_and_golden_model_agree_on_every_read(case: str) -> None:
+    spec = core(case)
+    found = lockstep(spec, stress(spec, 1, 30), Cxxrtl())
+    assert found.n_mismatches == 0, found.first
+    assert len(found.actual.errors) > 10
+    assert {0, 1} == {*found.actual.ticks.position_valid.tolist()}
+    assert len({*found.actual.ticks.position.tolist()}) > 40
+
+
+@pytest.mark.parametrize("case", only(["m"], [*CASES]))
+def test_exported_verilog_reads_a_model_in_icarus(case: str, tmp_path: Path) -> None:
+    for name, text in export(core(case), "spindle").items():
+        (tmp_path / name).write_text(text)
+    subprocess.run(["iverilog", "-g2012", "-o", "tb", "spindle.v", "spindle_tb.sv"], cwd=tmp_path, check=True)
+    said = subprocess.run([tmp_path / "tb"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+    assert "PASS: position 24" in said
+
+
+@pytest.mark.parametrize(("errors", "delay"), [(0, "0ns"), (0.05, "1us")])
+def test_a_core_follows_a_shaft_by_a_cable_with_wrong_bits(errors: float, delay: str) -> None:
+    spec = of_texts("m", BASE | {"bits": "4+17", "line-delay": delay, "unit": "rad/s"})
+    encoder = encoder_of(spec, frame_errors=errors, start_angle_rad=1.0, seed=3)
+    truth = encoder.record(parse_motion("constant:20rad/s:60ms+ramp:20rad/s:-20rad/s:60ms"))
+    run = golden.run(spec, PinTrace.of(truth.recording, spec))
+    read = run.ticks.position
+    # Shortly before the end of each tick, but of the ticks whose frame was wrong.
+    place = truth.true_angle(run.ticks.clock / spec.timing.clock_hz) / (2 * np.pi) * 2**17
+    off = np.abs(read - place)[10:]
+    assert np.median(off) < 40
+    assert (len(run.errors) > 20) == bool(errors)
+    assert read[-1] == truth.true_position(run.ticks.clock[-1] / spec.timing.clock_hz)
+
+
+def test_a_read_begins_so_that_it_ends_with_its_tick() -> None:
+    reads = core("track").reads
+    assert reads is not None
+    # 40 us for the start bit; 17 bits, 2 of state, 6 of CRC, start and CDS of 200 ns; two half periods; 20 us of rest.
+    assert reads.longest == 2000 + 10 * 26 + 5 + 1
+    assert core("track").read_starts(10_000) == range(4999 - reads.longest, 10_000, 5000)
+    short = of_texts("m", BASE | {"tick": "40us"}).reads
+    assert short is not None
+    assert short.longest + short.rest + 1 == 2000  # the wait is shorter where the tick is
+
+
+def test_a_core_is_made_again_from_its_options() -> None:
+    for case in CASES:
+        assert of_options(core(case).options) == core(case)
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"tick": "20us"}, "tick_cycles must be at least 1299 clocks for a read, 25.98us, not 1000"),
+        ({"crc": "67"}, "crc must be none, or a polynomial of degree 3 to 32, as 0x43, not '67'"),
+        ({"crc": "0x42"}, "crc must be none, or a polynomial of degree 3 to 32, as 0x43, not '0x42'"),
+        ({"repeat": "yes"}, "repeat must be given with --sensor ssi, not biss"),
+        ({"sensor": "ssi", "crc": "none"}, "crc must be given with --sensor biss, not ssi"),
+        ({"sample-age": "3"}, "sample_age must be given with --sensor sampled, not biss"),
+        ({"sensor": "sampled", "gray": "yes"}, "gray must be given with --sensor ssi or biss, not sampled"),
+        ({"encoder-clock": "20MHz"}, "encoder_clock must be from 1 Hz to 10 MHz, not 20000000 Hz"),
+    ],
+)
+def test_what_has_no_meaning_is_refused(more: dict[str, str], message: str) -> None:
+    with pytest.raises(ParameterError, match=f"^{message}$"):
+        of_texts("m", BASE | more)
