@@ -5,7 +5,7 @@ from typing import Any
 from unittest.mock import patch
 
 from proofs.formal.axes import COUNTS_OF_AXES, POSITIONS_OF_AXES
-from proofs.formal.buses import ON_BUSES, RECORDS
+from proofs.formal.buses import ON_BUSES, READ, RECORDS
 from proofs.formal.control import CONTROL
 from proofs.formal.outputs import OUTPUTS
 from proofs.formal.probes import STANDSTILL_PROBES, counting, within
@@ -241,6 +241,7 @@ QUICK = [
     "wishbone",
     "axi-lite",
     "stream",
+    "read",
     "control loop",
     "control loop, any gains",
     "outputs",
@@ -295,6 +296,7 @@ PROOFS = [
     *POSITIONS_OF_AXES,
     *ON_BUSES,
     RECORDS,
+    READ,
     *CONTROL,
     *OUTPUTS,
 ]
