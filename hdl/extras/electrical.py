@@ -195,18 +195,18 @@ class Gates(wiring.Component):
     def _settled(self, m: Module, between: Signal) -> Signal:
         """Return a place between counts; one that waits for a count goes to the middle as the velocity falls.
 
-        A place that is 3/8 count ahead begins to wait when the velocity has fallen to half of that at the last count.
+        A place that is 3/8 count away begins to wait when the velocity has fallen to half of that at the last count.
         Half a count is its limit then; the limit halves each time the velocity halves again.
         """
         half = 1 << self._angles.position_fine_bits - 1
         velocity = self.native_velocity >> self._angles.speed_shift
-        back = Signal()
+        back = between[-1]
         waits = Signal()
         limit = Signal(range(half + 1), init=half)
         mark = Signal(len(velocity) - 1)
         size = Signal.like(mark)
         slow = Signal()
-        ahead = Signal.like(between)
+        ahead = Signal(len(between) - 1)
         m.d.comb += [
             size.eq(velocity ^ velocity[-1].replicate(len(velocity))),
             slow.eq(size <= mark),
@@ -217,9 +217,9 @@ class Gates(wiring.Component):
             with m.If(slow):
                 m.d.sync += [limit.eq(limit >> 1), mark.eq(mark >> 1)]
         with m.Elif(self.native_valid):
-            m.d.sync += [waits.eq(0), limit.eq(half), mark.eq(size >> 1), back.eq(velocity[-1])]
+            m.d.sync += [waits.eq(0), limit.eq(half), mark.eq(size >> 1)]
         settled = Signal.like(between)
-        m.d.comb += settled.eq(Mux(waits & (ahead > limit), limit, ahead) ^ back.replicate(len(between)))
+        m.d.comb += settled.eq(Mux(waits & (ahead > limit), limit ^ back.replicate(len(between)), between))
         return settled
 
     def _counted(self, m: Module, step: Value, counted: Value, moves: Value, known: Value) -> tuple[Value, Signal]:

@@ -248,6 +248,13 @@ def test_a_stop_leaves_the_angle_in_the_middle_of_a_count(monkeypatch: pytest.Mo
     assert worst() > 0.5
 
 
+def test_a_reversal_that_does_not_come_leaves_the_angle_in_its_count() -> None:
+    """A shaft comes to rest within a count of halls: the velocity that is extrapolated passes 0."""
+    halls = {"pole-pairs": "7", "sensor": "hall"}
+    error = errors("track", "ramp:200rad/s:0:50ms+stop:50ms", halls, 600)
+    assert np.abs(error).max() < 32  # of a count of 60
+
+
 @pytest.mark.parametrize(
     ("encoder", "bits"), [("lines=1000", 7), ("lines=128", 10), ("lines=9000", 6), ("sensor=hall pole-pairs=7", 14)]
 )

@@ -154,17 +154,17 @@ def _tracked(extra: ElectricalAngle, view: View, counts: Table) -> Table:
 def _settled(angles: Angles, updates: Table, between: list[int]) -> list[int]:
     """Return places between counts; those that wait for a count go to the middle as the velocity falls."""
     half = 1 << angles.position_fine_bits - 1
-    sign, waits, limit, mark, settled = 0, False, half, 0, list[int]()
+    waits, limit, mark, settled = False, half, 0, list[int]()
     velocities = (updates["velocity"].astype(np.int64) >> angles.speed_shift).tolist()
     for velocity, silent, place in zip(velocities, updates["forced"].tolist(), between, strict=True):
         size = max(velocity, ~velocity)
         if silent:
             slow = size <= mark
-            waits |= place ^ sign >= half - (half >> 2) and (slow or limit < half)
+            waits |= max(place, ~place) >= half - (half >> 2) and (slow or limit < half)
             limit, mark = limit >> slow, mark >> slow
         else:
-            sign, waits, limit, mark = -1 if velocity < 0 else 0, False, half, size >> 1
-        settled.append(min(place ^ sign, limit) ^ sign if waits else place)
+            waits, limit, mark = False, half, size >> 1
+        settled.append(max(~limit, min(place, limit)) if waits else place)
     return settled
 
 
