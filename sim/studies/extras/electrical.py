@@ -52,8 +52,8 @@ def judged(
 ) -> list[tuple[FloatArray, FloatArray]]:
     """Return instants (s) and errors there (degrees) of angles at their use: of the position alone, and of each curve.
 
-    The zero is that of the disc, by all of its edges. Cores are read at their ticks. A float model has its latest
-    count, interpolated as in ODrive, and is carried on with its velocity to the instant of use.
+    The zero is that of the disc, by all of its edges; halls have their own. Cores are read at their ticks. A float
+    model has its latest count, interpolated as in ODrive, and is carried on with its velocity to the instant of use.
     """
     turns_per_count = extra.pole_pairs / float(steps.counts_per_rev)
     lead_s = extra.lead / spec.timing.clock_hz
@@ -63,7 +63,8 @@ def judged(
 
     place = np.append(0, np.cumsum(steps.step))
     middle = place[1:] - steps.step / 2
-    zero = float(np.mean(middle * turns_per_count - true(steps.time))) if len(middle) else 0.0
+    known = spec.encoder.sensor == "hall" or not len(middle)
+    zero = 0.0 if known else float(np.mean(middle * turns_per_count - true(steps.time)))
 
     def errors(time: FloatArray, turns: FloatArray) -> tuple[FloatArray, FloatArray]:
         kept = (time >= judge.begin) & (time < judge.end - lead_s)
