@@ -76,12 +76,11 @@ def judged(
     reads = judge.among(curves[0].reads)
     found = [errors(reads, place[np.searchsorted(steps.time, reads, side="right")] * turns_per_count)]
     for curve in curves:
+        at = judge.among(curve.reads)
         if curve.angle is None:
-            at = judge.among(curve.reads)
             found.append(errors(at, _carried(curve, steps, at, lead_s) * turns_per_count))
         else:
-            time, shown = curve.angle
-            found.append(errors(time, (shown - extra.offset) / 2**SHOWN_BITS))
+            found.append(errors(curve.angle[0], (curve.angle[1] - extra.offset) / 2**SHOWN_BITS))
     return found
 
 
