@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Any
 from unittest.mock import patch
 
+from proofs.formal.angle import ANGLES
 from proofs.formal.axes import COUNTS_OF_AXES, POSITIONS_OF_AXES
 from proofs.formal.buses import ON_BUSES, READ, RECORDS
 from proofs.formal.control import CONTROL
@@ -245,6 +246,7 @@ QUICK = [
     "control loop",
     "control loop, any gains",
     "outputs",
+    "2 pole pairs of 5 counts",
 ]
 
 PROOFS = [
@@ -299,4 +301,5 @@ PROOFS = [
     READ,
     *CONTROL,
     *OUTPUTS,
+    *ANGLES,
 ]

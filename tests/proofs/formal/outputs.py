@@ -1,5 +1,6 @@
 """These proofs are about what follows position and velocity, and what watches lines: a box each, side by side."""
 
+from collections.abc import Mapping
 from fractions import Fraction
 
 from amaranth import Module
@@ -30,23 +31,14 @@ _PROBES = {
 }
 
 
-class Outputs(wiring.Component):
-    """Has boxes that share nothing; a port has the name of its box in front."""
+class Boxes(wiring.Component):
+    """Has boxes that share nothing; a port has the name of its box in front.
 
-    def __init__(self) -> None:
-        # By the names in their modules, where a mutant takes its place.
-        self._boxes: dict[str, wiring.Component] = {
-            "modulo": modulo_counter.ModuloCounter(MODULUS),
-            "parted": modulo_counter.ModuloCounter(Fraction(PARTED, PARTS)),
-            "position": position_counter.PositionCounter(_WIDTH, preset=0),
-            "home": index_capture.IndexCapture(_WIDTH, once=True),
-            "probe": probe.Gates((1,), _WIDTH, 3),
-            "trip": over_speed.Gates(LIMIT, _WIDTH),
-            "open": open_circuit.OpenCircuit(OPEN),
-            "watch": health.Gates(second=6, edges=2, errors=1),
-            "compare": position_compare.Gates(Compare(1, APART, 2, "2clk"), PULSE, _WIDTH),
-            "both": position_compare.Gates(Compare(1, APART, 2, "2clk", "both"), PULSE, _WIDTH, aims=True),
-        }
+    - `boxes`: By the names in their modules, where a mutant takes its place.
+    """
+
+    def __init__(self, boxes: Mapping[str, wiring.Component]) -> None:
+        self._boxes = boxes
         super().__init__(
             {
                 f"{name}_{port}": flow
@@ -65,13 +57,30 @@ class Outputs(wiring.Component):
         return m
 
 
+def _boxes() -> Boxes:
+    return Boxes(
+        {
+            "modulo": modulo_counter.ModuloCounter(MODULUS),
+            "parted": modulo_counter.ModuloCounter(Fraction(PARTED, PARTS)),
+            "position": position_counter.PositionCounter(_WIDTH, preset=0),
+            "home": index_capture.IndexCapture(_WIDTH, once=True),
+            "probe": probe.Gates((1,), _WIDTH, 3),
+            "trip": over_speed.Gates(LIMIT, _WIDTH),
+            "open": open_circuit.OpenCircuit(OPEN),
+            "watch": health.Gates(second=6, edges=2, errors=1),
+            "compare": position_compare.Gates(Compare(1, APART, 2, "2clk"), PULSE, _WIDTH),
+            "both": position_compare.Gates(Compare(1, APART, 2, "2clk", "both"), PULSE, _WIDTH, aims=True),
+        }
+    )
+
+
 def _outputs(name: str, recovers: int = 0) -> Proof:
     """Return PO; from any state, once what an upset has changed is cleared, armed, set, or taken anew."""
     parameters = {"OPEN": OPEN, "MODULUS": MODULUS, "LIMIT": LIMIT, "APART": APART, "UPSET": int(recovers > 0)}
     parameters |= {"PARTED": PARTED, "PARTS": PARTS}
     spec = STachometer(encoder=Encoder(1))
     depth = 1 if recovers else OPEN + 4
-    return Proof(name, spec, "outputs", parameters, _PROBES, depth, box=Outputs, recovers=recovers)
+    return Proof(name, spec, "outputs", parameters, _PROBES, depth, box=_boxes, recovers=recovers)
 
 
 OUTPUTS = [_outputs("outputs"), _outputs("upset, outputs", recovers=10)]
