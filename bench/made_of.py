@@ -9,6 +9,7 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
+import angle
 import readme
 from amaranth.hdl import Fragment
 from amaranth.hdl._ir import PortDirection, build_netlist
@@ -90,6 +91,9 @@ MADE_OF: dict[str, Callable[[str], object]] = {
     "docs/guides/wheel.png": lambda _: estimates(),
     "docs/guides/wheel_methods.png": lambda _: estimates(),
     "docs/measured/tables/boards.csv": lambda _: [measured_core("demo"), measured_core("track")],
+    "docs/measured/angle.md": lambda _: [
+        f"{angle.errors(angle.core(one), next(iter(angle.MOTIONS)), SEED)[0]:.6f}" for one in angle.ENCODERS
+    ],
     "docs/measured/compare.png": lambda _: estimates(),
     "docs/measured/control.md": lambda _: tracking(),  # tests/cli/commands/test_loop_docs.py has the loops about S
     "docs/measured/control.png": lambda _: block(MEASURED / "control.md", "gains"),
