@@ -21,6 +21,8 @@ class CoreOptions(TypedDict, total=False):
     current_width: Value | None
     decoding: Value | None
     differential: Value | None
+    disc: Value | None
+    disc_table: Value | None
     dt: Value | None
     edge_error: Value | None
     electrical: Value | None

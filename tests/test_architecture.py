@@ -306,8 +306,8 @@ def has_a_broken_docstring(node: ast.AST) -> bool:
 
 # What may only fall, with the rule by which it is counted. A change that brings a capability raises lines alone.
 CEILING: dict[str, tuple[int, Callable[[], Counter[str]]]] = {
-    "lines of Python of the product": (52545, lambda: lines(*PRODUCT)),
-    "lines of Python of the tests": (43417, lambda: lines("tests")),
+    "lines of Python of the product": (53194, lambda: lines(*PRODUCT)),
+    "lines of Python of the tests": (43725, lambda: lines("tests")),
     "lines of Python of the benchmarks": (3256, lambda: lines("bench")),
     "functions over 40 lines": (16, lambda: every(is_long, *PRODUCT)),
     "functions with more than 6 parameters": (29, lambda: every(has_many_parameters, *PRODUCT)),
@@ -344,7 +344,8 @@ def names_of_extras() -> set[str]:
     ports = list[Port]()
     for test in (0, -1):
         for about in (about for extra in EXTRAS for about in options_of(extra)):
-            texts[about.name] = "yes" if about.flag else [*filter(None, about.tests or ())][test]
+            if values := ["yes"] if about.flag else [*filter(None, about.tests or ())]:
+                texts[about.name] = values[test]
         spec = of_texts("track", {"ppr": "25", "index": "yes", "max-speed": "100rad/s", **texts})
         ports += [port for extra in spec.extras for port in extra.ports(spec)]
         ports += [pin.port for pin in spec.front_end.pins if not pin.of]  # wiring has complements, too
@@ -366,4 +367,5 @@ def test_only_extras_name_an_extra() -> None:
     for layer in LAYERS:
         for file in (file for file in (ROOT / layer).rglob("*.py") if "extras" not in file.parts):
             place = file.relative_to(ROOT).as_posix()
-            assert names & named_in(file) - {"angle"} == OTHER_MEANINGS.get(place, set()), place  # of every shaft
+            found = names & named_in(file) - {"angle", "disc"}  # of every shaft and encoder
+            assert found == OTHER_MEANINGS.get(place, set()), place

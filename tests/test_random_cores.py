@@ -25,7 +25,7 @@ from tachometry.spec.registers.buses import BUSES
 
 CLOCKS_HZ, MOST_COUNTS = (100_000, 400_000_000), 1 << 24
 EDGES, TICKS, LEAST_CLOCKS, MOST_CLOCKS = 20, 30, 6000, 24_000  # of a motion
-_LAST = {"blanking", "electrical", "ratio", "teeth"}  # drawn by `_add_last`
+_LAST = {"blanking", "electrical", "ratio", "teeth", "disc-table"}  # drawn by `_add_last`
 _NUMBERS = "ppr clock tick max-time unit sensor decoding frac-bits velocity-width max-speed over-speed filter lowpass"
 _QUADRATURE = {"health", "index-at"}  # which few other sensors have
 
@@ -119,6 +119,8 @@ def _add_last(texts: dict[str, str], draw: _Draw) -> None:
         texts["teeth"] = draw.choice(["60-2", "36-2-2-2", "15-2,3-2,18-2", "12-1-1-2", "24+1"])
         texts["ppr"] = str(sum(int(part.partition("-")[0]) for part in texts["teeth"].replace("+", "-").split(",")))
     texts |= _ratio(draw)
+    if draw.often(0.1) and texts["method"] in ("t", "mt", "track"):
+        texts["disc-table"] = "edges"
 
 
 def _ratio(draw: _Draw) -> dict[str, str]:

@@ -29,6 +29,7 @@ from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput, Seria
 from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import follow, members
 from tachometry.spec import TachometerSpec
+from tachometry.spec.formats.displacement import DISPLACED
 from tachometry.spec.language.port import MISSED, TICK, UPDATE, WIDE
 
 
@@ -289,6 +290,13 @@ class Tachometer(wiring.Component):
         taps = self._taps(m)
         check_inputs(self._spec, self.extras, {*self.signature.members, *taps})
         place(m, self, self.extras, taps)
+        for box in self.extras.values():
+            follow(
+                m,
+                self.datapath,
+                box,
+                box.signature.members.keys() & self.datapath.signature.members.keys() & {*DISPLACED},
+            )
 
     def _taps(self, m: Module) -> dict[str, Value]:
         """Lead inputs of extras through the conditioner, and return what else they may be given, by name.
@@ -297,7 +305,7 @@ class Tachometer(wiring.Component):
         for each line; `equal_a` says that a line equals its complement; `preset_rises` sets the position, and `moves`
         is high when anything but a step changes it; `next_position` is `position` of the next clock;
         `native_velocity` and others are of an update as the method makes it; `index_rises` is a clock before
-        `index_valid`.
+        `index_valid`, and `index_seen` also of an index that is not taken.
         """
         decoder, box, counter, updates = self.decoder, self.conditioner, self.position_counter, self.datapath.updates
         moves = counter.clear if self._spec.preset is None else counter.clear | counter.load
@@ -307,7 +315,7 @@ class Tachometer(wiring.Component):
             name: getattr(decoder, name) for name in decoder.signature.members if name[:5] in ("level", "ready", "step")
         }
         if self.index_capture is not None:
-            taps["index_rises"] = self.index_capture.rises
+            taps |= {"index_rises": self.index_capture.rises, "index_seen": self.index_capture.seen}
         taps |= {f"{name}_rises": control.rises for name, control in self.controls.items()}
         for pin in self._spec.front_end.pins:
             name = pin.port.name

@@ -33,20 +33,20 @@ class IndexCapture(wiring.Component):
                 "index_valid": Out(1),  # one clock per index
             }
         )
+        self.seen = Signal(name="seen") if once else self.rises
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         level, ready = delay(m, self.level_z, self.ready, clocks=self._latency - 2)
         past_z = Signal()
-        seen = Signal(name="seen") if self._once else self.rises
         m.d.sync += [
             past_z.eq(level),
-            seen.eq(level & ~past_z & ready),
+            self.seen.eq(level & ~past_z & ready),
             self.index_valid.eq(self.rises),
         ]
         if self._once:
             armed = Signal()
-            m.d.comb += self.rises.eq(seen & armed)
+            m.d.comb += self.rises.eq(self.seen & armed)
             with m.If(self.arm):
                 m.d.sync += [armed.eq(1), self.homed.eq(0)]
             with m.Elif(self.rises):

@@ -15,8 +15,8 @@ class Datapath(Protocol):
     """Turns pulse numbers into updates.
 
     Among its members are `updates`, and those inputs that it needs: `tick` and `pulse_count`, `coming` and `next_count`
-    (the same a clock earlier), `step` (as late as `tick`), `step_before` (a clock earlier), or `step_now` (as early as
-    the decoder has it).
+    (the same a clock earlier), `step` (as late as `tick`), `step_before` (a clock earlier), `step_now` (as early as
+    the decoder has it), or `DISPLACED` (as late as `step`, and a clock earlier).
     """
 
     signature: wiring.Signature

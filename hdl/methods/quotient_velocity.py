@@ -42,8 +42,7 @@ class QuotientVelocity(wiring.Component):
             integer_bits=spec.form.quotient_bits - (f - 1),
             scale_bits=f - 1,
             nearest=True,
-            # Of 1½ counts, in half counts.
-            zeros=(spec.form.timer_periods & -spec.form.timer_periods).bit_length() - 1,
+            zeros=spec.form.zeros,
         )
         self.bound_dividers = {name: _bound_divider(spec) for name in (BOUNDS if spec.bounds else ())}
         super().__init__(

@@ -2,11 +2,12 @@
 
 from itertools import accumulate
 
-from amaranth import C, Cat, Module, Mux, Signal, Value, signed
+from amaranth import C, Cat, Module, Mux, Shape, Signal, Value, signed
 from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import In, Member, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleSum
+from tachometry.spec.formats.displacement import DISPLACED
 from tachometry.spec.formats.tracking import Tracking
 
 
@@ -34,6 +35,7 @@ class TickCounts(wiring.Component):
             {
                 "tick": In(1),  # the last clock of a tick
                 "step": In(signed(2)),
+                **({} if (off := form.displacement) is None else self._mapped(form, signed(off.width))),
                 "number": Out(form.number_bits),  # counts that an event takes: the first ones
                 "times": Out(form.times_bits),  # sum of the clocks from each of these to the end of the tick
                 # Sum of twice the places of their edges, in counts from the place at the beginning of the tick.
@@ -55,6 +57,12 @@ class TickCounts(wiring.Component):
         self.open_down = Signal.like(self.down)
         self.open_last = Signal.like(self.last)
         self.open_moved = Signal.like(self.moved)
+
+    @staticmethod
+    def _mapped(form: Tracking, displacement: Shape) -> dict[str, Member]:
+        """Return `DISPLACED`, the sum over the counts, and the displacements of the edges about the end."""
+        shown = {"displacements": Out(signed(form.number_bits + displacement.width))}
+        return dict.fromkeys(DISPLACED, In(displacement)) | shown | dict.fromkeys(("above", "below"), Out(displacement))
 
     @property
     def idle(self) -> tuple[Idle, ...]:
@@ -100,7 +108,24 @@ class TickCounts(wiring.Component):
                 self.elapsed.eq(Mux(self.number.any(), 1, waited)),
             ]
         self._show(m, fresh, position)
+        self._displace(m, counts, takes)
         return m
+
+    def _displace(self, m: Module, counts: Value, takes: Value) -> None:
+        """Add up the displacements of the counts, and keep those of the edges about the end of the tick."""
+        if self._form.displacement is None:
+            return
+        total = Signal.like(self.displacements)
+        coming = Signal.like(total)
+        was = Signal()  # the latest count went backward
+        m.d.comb += coming.eq(total + Mux(takes, self.displaced, 0))
+        m.d.sync += total.eq(coming)
+        with m.If(counts):
+            m.d.sync += was.eq(self.step[-1])
+        with m.If(self.tick):
+            latest, ahead = self.displaced_before, self.displaced
+            m.d.sync += [total.eq(0), self.displacements.eq(coming)]
+            m.d.sync += [self.above.eq(Mux(was, latest, ahead)), self.below.eq(Mux(was, ahead, latest))]
 
     def _show(self, m: Module, fresh: Signal, position: Signal) -> None:
         """Show the counts of the tick that has ended."""

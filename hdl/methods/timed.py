@@ -10,6 +10,7 @@ from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.gap_timer import GapTimer
 from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
 from tachometry.hdl.wires.ports import only_if
+from tachometry.spec.formats.displacement import DISPLACED
 from tachometry.spec.methods.timed import TimedTachometer
 
 
@@ -26,12 +27,18 @@ class TimedDatapath(wiring.Component):
         self.gap_timer = GapTimer(spec.form.max_periods, on_lattice=spec.form.on_lattice)
         self.quotient_velocity = QuotientVelocity(spec)
         if not spec.form.on_lattice:
-            self.count_way = CountWay(spec.form.timer_periods, decays=spec.form.decays, reversals=not spec.paper_exact)
+            self.count_way = CountWay(
+                spec.form.timer_periods,
+                decays=spec.form.decays,
+                reversals=not spec.paper_exact,
+                displacement=spec.displacement,
+            )
         members = {
             **datapath_members(spec),
             "coming": In(1),  # `pulse_count` is new in the next clock, and a tick has ended
             **only_if(spec.form.on_lattice, next_count=In(signed(spec.widths.count))),  # the next `pulse_count`
             **only_if(not spec.form.on_lattice, step_before=In(signed(2))),  # the step of the next clock
+            **(dict.fromkeys(DISPLACED, In(signed(form.width))) if (form := spec.displacement) else {}),
         }
         super().__init__({name: member for name, member in members.items() if name != "tick"})
         # On the lattice: the sign of the last count, and whether this count is from another edge than that.
@@ -58,9 +65,15 @@ class TimedDatapath(wiring.Component):
         raise NotImplementedError
 
     @property
+    def _moved(self) -> Value:
+        """The way of this count in half counts, times the timer periods in a tick."""
+        way, form = self.count_way.way, self._spec.displacement
+        return way if form is None else way + (self.displaced << form.low + 1)
+
+    @property
     def _way(self) -> Value:
         """The way of this count, times the timer periods in a tick."""
-        return self.count_way.way >> 1
+        return self._moved >> 1
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
@@ -104,7 +117,9 @@ class TimedDatapath(wiring.Component):
                 way.negative_before.eq(quotient.negative_before),
                 timer.count_before.eq(self.step_before[0]),  # there is a step
             ]
-            return way.way, way.negative
+            if self._spec.displacement is not None:
+                m.d.comb += way.displaced_before.eq(self.displaced_before)
+            return self._moved, way.negative
         negative, was_negative = self.pulse_count[-1], self._was_negative
         m.d.comb += [
             self._same.eq(1 if self._spec.paper_exact else negative == was_negative),

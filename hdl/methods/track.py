@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from amaranth import Module, ResetInserter, Signal, Value, signed
+from amaranth import Module, Mux, ResetInserter, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 
@@ -13,6 +13,7 @@ from tachometry.hdl.methods.tick_counts import TickCounts
 from tachometry.hdl.methods.track_machine import TrackMachine
 from tachometry.hdl.wires.ports import drive, follow, only_if
 from tachometry.spec import TrackTachometer
+from tachometry.spec.formats.displacement import DISPLACED
 from tachometry.spec.formats.tracking_code import SMOOTH_DELAY_BITS
 
 
@@ -49,6 +50,7 @@ class TrackMethod(wiring.Component):
                     length=In(range(spec.tick.longest + 1)),
                 ),  # see `SampledPosition`
                 "position": In(signed(spec.position_width)),  # valid with `tick`
+                **({} if (off := spec.displacement) is None else dict.fromkeys(DISPLACED, In(signed(off.width)))),
             }
         )
 
@@ -111,6 +113,17 @@ class TrackMethod(wiring.Component):
             return Value.cast(self.elapsed)
         m.submodules.tick_counts = counts
         m.d.comb += [counts.tick.eq(self.tick), counts.step.eq(self.step)]
-        names = ("number", "times", "places", "last", "moved", "length", "kind", "end", "down")
-        follow(m, self.machine, counts, names)
+        follow(m, self.machine, counts, ("number", "times", "last", "moved", "length", "kind", "end", "down"))
+        self._place(m, counts)
         return Value.cast(counts.elapsed)
+
+    def _place(self, m: Module, counts: TickCounts) -> None:
+        """Place the counts where their edges lie; without counts, give the machine the edge that it asks for."""
+        machine = self.machine
+        if self._spec.displacement is None:
+            follow(m, machine, counts, ["places"])
+            return
+        follow(m, counts, self, DISPLACED)
+        places = (counts.places << self._spec.form.fine_bits) + counts.displacements
+        edge = Mux(machine.sign, counts.below, counts.above)
+        m.d.comb += machine.places.eq(Mux(counts.number > 1, places, Mux(counts.number[0], places, edge) << 6))

@@ -113,7 +113,7 @@ class TrackMachine(wiring.Component):
                 "begin": In(1),
                 "number": In(form.number_bits),
                 "times": In(form.times_bits),
-                "places": In(signed(form.places_bits)),
+                "places": In(signed(form.placed_bits)),
                 "last": In(range(form.most_last + 1)),
                 "moved": In(signed(form.moved_bits)),
                 "length": In(range(form.longest_tick + 1)),
@@ -367,7 +367,8 @@ class TrackMachine(wiring.Component):
     def _inputs(self) -> list[Value]:
         """Return the inputs of the tick as words."""
         t, moved = self._program.form.time_bits, self._program.form.moved_shift
-        shifts = {"counts": PLACE_BITS, "places": _PLACES_BITS, "times": t, "last": t, "moved": moved, "length": t}
+        places = _PLACES_BITS - self._program.form.fine_bits
+        shifts = {"counts": PLACE_BITS, "places": places, "times": t, "last": t, "moved": moved, "length": t}
         ports = by_name(self, (name for name in INPUTS if name != "counts")) | {"counts": self.number}
         return [ports[name] << shifts.get(name, 0) for name in INPUTS]
 

@@ -46,6 +46,7 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
     than those of the trace if they are given.
     """
     steps = decoded(spec, trace) if steps is None else steps
+    steps = extras.displaced(extras.View(spec, trace, steps, {}))
     golden = model(spec)
     if spec.facts.own_ticks:
         last, beyond, nominal = golden.windows(steps, trace.n_clocks - spec.latency.tick)

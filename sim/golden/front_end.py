@@ -1,7 +1,7 @@
 """The golden front end turns sampled levels into steps, pulse numbers and positions."""
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -164,6 +164,11 @@ class Steps:
     wheel: Teeth | None = None  # of a wheel with missing teeth, the teeth
     # clocks from which levels of the lines of the sensor are seen, and these; only the last of a clock lasts
     levels: tuple[NDArray[np.int64], ...] = ()
+    # shape (n,): displacement of the edge of each step that an extra gives; empty if none does
+    displaced: NDArray[np.int64] = field(default_factory=_none)
+    fine_bits: int = 0  # of these below half a count
+    # displacements of the edges above and below the place at the end of ticks without a count, by their last clocks
+    around: Callable[[NDArray[np.int64]], tuple[NDArray[np.int64], NDArray[np.int64]]] | None = None
     # of each line of an extra the clocks from which its level is seen, and the levels; the first is no edge
     pins: Mapping[str, tuple[NDArray[np.int64], NDArray[np.uint8]]] = field(default_factory=dict)
 

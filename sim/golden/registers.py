@@ -253,6 +253,10 @@ class GoldenBank:
             for port, each in changes.items()
         }
         pins = PinTrace.of_lines(clock, self._trace.n_clocks, lines)
+        if spec.displacement is not None:
+            kept = {name: one for name, one in self._tables[TICK].columns.items() if name == "position_modulo"}
+            self._tables = golden.tables(spec, pins, self._steps)
+            self._tables[TICK] = self._tables[TICK].having(**kept)
         self._tables |= extras.tables(extras.View(spec, pins, self._steps, self._tables, clears))
 
     @staticmethod

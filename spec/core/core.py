@@ -9,6 +9,7 @@ from tachometry.spec.core.front_end import FrontEnd
 from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 from tachometry.spec.core.numbers import Numbers
 from tachometry.spec.core.words import Words, speed_notes
+from tachometry.spec.formats.displacement import Displacement
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +29,11 @@ class Core(Numbers):
         """Inputs of the core; where its index and its modulus are."""
         pins = tuple(pin for extra in self.extras for pin in extra.pins(self))
         return FrontEnd(self, self.times.longest, pins)
+
+    @cached_property
+    def displacement(self) -> Displacement | None:
+        """Format of the displacements that an extra gives to the datapath; None: there are none."""
+        return next(filter(None, (extra.displacement(self) for extra in self.extras)), None)
 
     @property
     def latency_entries(self) -> dict[str, int]:

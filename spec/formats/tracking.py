@@ -19,6 +19,7 @@ from fractions import Fraction
 from functools import cached_property
 from typing import ClassVar
 
+from tachometry.spec.formats.displacement import Displacement
 from tachometry.spec.language.units import ceil_log2
 
 WIDTH = 40  # bits of a word
@@ -69,6 +70,7 @@ class Tracking:
     slope: Fraction  # LSB of the acceleration that is shown in one of the recursion, less than 1
     velocity_std: Fraction  # LSB of the deviation that is shown, in one count per clock
     std_bits: int  # of it
+    displacement: Displacement | None = None  # of edges off their places
 
     sampled: ClassVar[bool] = False  # whether positions are read in place of counted edges
 
@@ -111,6 +113,17 @@ class Tracking:
     def places_bits(self) -> int:
         """Bits of the sum of twice their places; signed."""
         return (self.most_number**2).bit_length() + 1
+
+    @property
+    def fine_bits(self) -> int:
+        """Bits of the places of counts below half a count, which displacements have."""
+        return 0 if self.displacement is None else self.displacement.per_count.bit_length() - 2
+
+    @property
+    def placed_bits(self) -> int:
+        """Bits of the sum of twice the places, with displacements and as fine as these; signed."""
+        off = self.displacement
+        return self.places_bits if off is None else self.places_bits + self.fine_bits + off.shift + 1
 
     @cached_property
     def moved_bits(self) -> int:

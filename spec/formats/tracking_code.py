@@ -158,7 +158,7 @@ def _paired(chain: list[Instruction]) -> list[Instruction]:
     return chain
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Code:
     """Instructions, and the places of the labels among them."""
 
@@ -174,8 +174,8 @@ def assembled(listing: str = LISTING, apart: int = 2, ports: int = 1, **kind: bo
     """
     code: list[Instruction] = []
     labels: dict[str, int] = {}
-    wanted = {"block": ports > 1, "serial": ports == 1, "smooth": False, "reads": False, **kind}
-    within, wanted["edges"] = True, not wanted["reads"]
+    wanted = {"block": ports > 1, "serial": ports == 1, "smooth": False, "reads": False, "map": False, **kind}
+    within, wanted["edges"], wanted["plain"] = True, not wanted["reads"], not wanted["map"]
     for line in re.sub("#.*", "", listing).replace(";", "\n").splitlines():
         words = line.split()
         while words and words[0] in wanted:
@@ -298,8 +298,7 @@ def _longest_of(counts: int, times: Times, output: str, kind: Mapping[str, bool]
         clock, free = entry[place]
         one = code[place]
         begun = times.of(one.start)
-        if begun or one.word == "~":
-            clock = max(clock, free)
+        clock = max(clock, free) if begun or one.word == "~" else clock
         if begun:
             free = clock + begun
         clock += 1
@@ -335,7 +334,8 @@ class Program:
 
     @property
     def _kind(self) -> dict[str, bool]:
-        return {"smooth": self.smooth, "reads": self.form.sampled}
+        mapped = self.form.displacement is not None
+        return {"smooth": self.smooth, "reads": self.form.sampled, "map": mapped}
 
     @property
     def outputs(self) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ what is begun with the sum`.
     keep          the sign of the sum         log, exp      begin log2|sum|, 2^sum       out name      an output
     gain k        begin: log of the gain of p (0), v (1), a (2)  block, serial  before a line: for that machine only
     smooth, edges, reads   before a line, or several in braces: with --smooth, of counted edges, of read positions
+    map, plain    before a line: for a core with a map of the disc, without one
     by            the factor of products      product name  begin: sum·factor/2^shift of that name
     over n        begin: shift right by n     over by       by ⌊log2⌋ of the factor's whole part
 """
@@ -269,9 +270,8 @@ grows:
     growing = log_T + log_eighth
     end
 edges {; single:
-    $places keep
-    tau = $times
-    raw = zero s+ half
+    plain $places keep
+    tau = $times; plain raw = zero s+ half; map raw = $places
     c = sum - o@last
     quiet = $last
     since = $length + since min most_since
@@ -354,12 +354,12 @@ show:
     velocity = vs + ~
     goto place
 edges {; seen:
-    P = p + ~ keep
-    if neg goto below
-    sum + o@up
+    P = p + ~ keep; if neg goto below
+    plain sum + o@up; map t = $places; map P + o@up - t
     goto beyond
 below:
-    zero - P - o@down
+    plain zero - P - o@down
+    map t = $places; map t - P - o@down
 beyond:
     max zero
     t = sum - half; if neg goto still

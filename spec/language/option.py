@@ -88,6 +88,7 @@ class Option:
     fit_at: Callable[[str, str, Mapping[str, Any]], Any] | None = None
     flag: bool = False  # whether it stands alone, for yes
     needs: str = ""  # name of the flag that must be given with it
+    adds: bool = False  # whether this option of an extra adds it, as the first one does
     fits: Callable[[type[Any]], bool] | None = None  # whether the spec of a method has the option; None: always
     # values that pairwise tests use, the empty text for leaving it out; see `sim.studies.pairs` for those in words.
     # None: both values of a flag, all choices, else no values.
@@ -188,7 +189,9 @@ def _of_field(spec: Any, item: Field[Any]) -> Iterator[Option]:
             main, field=main.parameter, default=False if main.flag else None, within=("", main.field), extra=extra
         )
         for one in more:
-            yield replace(one, needs=main.name, field=one.parameter, within=("", one.field), extra=extra)
+            yield replace(
+                one, needs="" if one.adds else main.name, field=one.parameter, within=("", one.field), extra=extra
+            )
     options = item.metadata.get("options", ())
     for about in options:
         name = about.name or item.name.replace("_", "-")

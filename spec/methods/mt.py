@@ -43,7 +43,7 @@ class MTForm(TimedForm):
         period up to that, and in the one in which it ends.
         """
         per_period = self.tick.max_count if self.on_lattice else self.timer_periods
-        return (self.max_interval - self.max_periods + 1) * per_period
+        return (self.max_interval - self.max_periods + 1) * per_period + self.most_displaced
 
     @property
     def remembered_periods(self) -> int:

@@ -11,6 +11,7 @@ from tachometry.spec.core.tick import Tick
 from tachometry.spec.core.times import Times, Widths
 from tachometry.spec.core.velocity import Bound, Velocity
 from tachometry.spec.core.words import Words
+from tachometry.spec.formats.displacement import Displacement
 from tachometry.spec.language.option import ParameterError, option
 from tachometry.spec.language.port import UPDATE, Port, held
 from tachometry.spec.language.units import plural
@@ -26,6 +27,7 @@ class Quotient:
     tick: Tick
     on_lattice: bool  # whether times are counted in ticks
     one_count: bool  # whether it is one count over the time since the count before
+    displacement: Displacement | None  # of edges off their places
 
     @property
     def timer_cycles(self) -> int:
@@ -38,9 +40,16 @@ class Quotient:
         return self.asked.timing.tick_cycles // self.timer_cycles
 
     @property
+    def most_displaced(self) -> int:
+        """Greatest change of a distance by displacements, in counts times the timer periods in a tick."""
+        return 0 if self.displacement is None else 2 * self.displacement.most
+
+    @property
     def max_quotient(self) -> int:
         """Greatest |N·T|/time in counts per tick, before it is saturated."""
-        return self.tick.max_count if self.on_lattice and not self.one_count else self.timer_periods
+        if self.on_lattice and not self.one_count:
+            return self.tick.max_count
+        return self.timer_periods + self.most_displaced
 
     @property
     def saturates(self) -> bool:
@@ -59,6 +68,12 @@ class TimedForm(Quotient):
 
     velocity: Velocity
     decays: bool  # whether the velocity decays while no count comes
+
+    @property
+    def zeros(self) -> int:
+        """Lowest bits of a distance in half counts, times the timer periods in a tick, that are always 0."""
+        zeros = (self.timer_periods & -self.timer_periods).bit_length() - 1  # of 1½ counts
+        return zeros if self.displacement is None else min(zeros, self.displacement.low + 1)
 
     @property
     def division_periods(self) -> int:
@@ -153,7 +168,7 @@ class TimedTachometer(TachometerSpec):
 
     @cached_property
     def _quotient(self) -> Quotient:
-        return Quotient(self, self.tick, self.timer == "tick", self.one_count)
+        return Quotient(self, self.tick, self.timer == "tick", self.one_count, self.displacement)
 
     @cached_property
     def bound(self) -> Bound:
@@ -220,6 +235,8 @@ class TimedTachometer(TachometerSpec):
         super().__post_init__()
         if self.bounds and self.paper_exact:
             raise ParameterError("bounds", "must not be given with paper_exact, which has none")
+        if self.displacement is not None and self.form.on_lattice:
+            raise ParameterError("timer", "must be clock with --disc")
 
     @property
     def method_ports(self) -> tuple[Port, ...]:

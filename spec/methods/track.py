@@ -164,6 +164,7 @@ class TrackTachometer(TachometerSpec):
             slope=Fraction(1, 2),
             velocity_std=self.timing.tick_cycles * self.velocity.lsb_per_count * count,
             std_bits=min(self.velocity.width - 1, RESULT_BITS),
+            displacement=self.displacement,
         )
         if (sampled := self.encoder.sampled) is None:
             return Tracking(**common)

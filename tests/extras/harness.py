@@ -163,7 +163,9 @@ def _accesses(case: Case, registers: RegisterMap, trace: PinTrace) -> list[Acces
         if clock in aimed or rng.random() < 0.04:
             address = int(rng.choice(len(writes), p=writes / writes.sum()))
             clears = registers.registers[address].name == "CONTROL"
-            accesses.append(Access(clock, address, 1 if clears else int(rng.integers(1 << rng.integers(1, 9)))))
+            data = 1 if clears else int(rng.integers(1 << rng.integers(1, 9)))
+            acts = any(field.single and field.low == 8 for field in registers.registers[address].fields)
+            accesses.append(Access(clock, address, data | (acts & clock) << 8))
         elif rng.random() < 0.36:
             accesses.append(Access(clock, int(rng.choice(len(reads), p=reads / reads.sum()))))
     return accesses

@@ -37,6 +37,15 @@ def _model(extra: Extra) -> ModuleType:
     return import_module(f"{__name__}.{extra.name}")
 
 
+def displaced(view: View) -> Steps:
+    """Return the steps with the displacements that an extra gives to their edges."""
+    steps = view.steps
+    for extra in view.spec.extras:
+        if extra.displacement(view.spec) is not None:
+            steps = _model(extra).displaced(extra, view)
+    return steps
+
+
 def tables(view: View) -> dict[str, Table]:
     """Return the tables of all extras, by their names."""
     found: dict[str, Table] = {}

@@ -37,6 +37,7 @@ class Model:
         found = Measurements(
             clock=counts.clock(period[ends]),
             distance=2 * distance,
+            displaced=counts.place[ends] - counts.place[opening],
             time=time,
             forced=none,
             beyond=none,

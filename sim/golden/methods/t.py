@@ -28,6 +28,7 @@ class Model:
         found = Measurements(
             clock=counts.clock(counts.period),
             distance=2 * distance,
+            displaced=np.diff(counts.place, prepend=0),
             time=time,
             forced=none,
             beyond=many,

@@ -22,6 +22,7 @@ class Counts:
 
     period: Ints  # shape (n,)
     size: Ints  # shape (n,): counts of the step or of the tick; never 0
+    place: Ints  # shape (n,): how far off its place the edge lies, in counts, times the timer periods in a tick
     clock_of: Ints | None  # shape (m,): clock in which each period is seen; None: a period is a clock
     n_periods: int
 
@@ -30,9 +31,11 @@ class Counts:
         """Return the counts that the datapath sees within `n_clocks`: steps, or ticks that are not empty."""
         if spec.form.on_lattice:
             period = np.flatnonzero(ticks.pulse_count)
-            return cls(period, ticks.pulse_count[period], ticks.clock, len(ticks.clock))
+            return cls(period, ticks.pulse_count[period], 0 * period, ticks.clock, len(ticks.clock))
         seen = (steps.step != 0) & (steps.clock + spec.latency.tick < n_clocks)
-        return cls(steps.clock[seen] + spec.latency.tick, steps.step[seen], None, n_clocks)
+        form, period = spec.displacement, steps.clock[seen] + spec.latency.tick
+        place = 0 * period if form is None else steps.displaced[seen] << form.low
+        return cls(period, steps.step[seen], place, None, n_clocks)
 
     def clock(self, period: Ints) -> Ints:
         """Return clocks of some periods."""
@@ -58,6 +61,7 @@ class Measurements:
 
     clock: Ints  # shape (n,)
     distance: Ints  # shape (n,), half counts
+    displaced: Ints  # shape (n,): what the edges add to it, in counts, times the timer periods in a tick
     time: Ints  # shape (n,), timer periods
     # shape (n,): the maximum time has ended it; out of range before any division
     forced: NDArray[np.bool_]
@@ -117,6 +121,7 @@ def with_silences(spec: TimedTachometer, counts: Counts, found: Measurements) ->
     silent = Measurements(
         clock=counts.clock(period),
         distance=none,
+        displaced=none,
         time=time,
         forced=none == 0,
         beyond=none > 0,
@@ -128,9 +133,9 @@ def with_silences(spec: TimedTachometer, counts: Counts, found: Measurements) ->
     return found.with_more(silent)
 
 
-def rounded(spec: TimedTachometer, distance: Ints, time: Ints) -> tuple[Ints, NDArray[np.bool_]]:
+def rounded(spec: TimedTachometer, distance: Ints, time: Ints, off: Ints | int = 0) -> tuple[Ints, NDArray[np.bool_]]:
     """Return velocity in counts per tick of a distance in half counts, saturated, and whether that changed it."""
-    exact = round_quotient(distance * spec.form.timer_periods, time, spec.velocity.native_frac_bits - 1)
+    exact = round_quotient(distance * spec.form.timer_periods + 2 * off, time, spec.velocity.native_frac_bits - 1)
     limit = spec.tick.max_count << spec.velocity.native_frac_bits
     return np.clip(exact, -limit, limit), np.abs(exact) > limit
 
@@ -191,14 +196,14 @@ def _decaying(spec: TimedTachometer, counts: Counts, taken: Measurements, held: 
     # The shaft is no farther back than its last edge.
     back = np.where((sign > 0) & (last_size > 0), 0, -1)
     low, high = _between(spec, back, np.where((sign < 0) & (last_size < 0), 0, 1), age)
-    return Measurements(clock, 3 * sign, age, ~none, none, low, high, ~none)[nearer]
+    return Measurements(clock, 3 * sign, 0 * sign, age, ~none, none, low, high, ~none)[nearer]
 
 
 def updates(spec: TimedTachometer, counts: Counts, taken: Measurements, ticks: Table) -> Table:
     """Return all updates with the velocity in counts per tick, as the datapath shows it."""
     # A forced 0 takes the divider, if ticks are so short that it is still at work.
     finished = np.diff(taken.clock, append=np.iinfo(np.int64).max) >= spec.form.division_clocks
-    held, saturated = rounded(spec, taken.distance, taken.time)
+    held, saturated = rounded(spec, taken.distance, taken.time, taken.displaced)
     shown = _shown(spec, taken, held, saturated).rows(finished)
     if spec.form.decays:
         slower = _decaying(spec, counts, taken, held, ticks)

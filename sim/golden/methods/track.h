@@ -76,19 +76,19 @@ struct Recursion : Tables {
     moved = moved_ * k.count;
     held = phase == 2 ? middle : 0, held_age = phase == 2 ? since + age : 0;
     standstill = !number && quiet >= k.max_time;
-    if (!number) return silence(end);
+    if (!number) return silence(end, places, times);
     quiet = last << t;
     event(number, times << t, places, kind, down);
   }
   void event(int64_t n, int64_t times, int64_t places, int kind, bool down) {
-    int64_t tau = times, raw = places * k.half, at = raw - offsets[kind], log_n = 0, left = 0, total = 0;
+    int64_t tau = times, raw = places * (k.half >> k.fine), at = raw - offsets[kind], log_n = 0, left = 0, total = 0;
     if (n > 1) {
       int64_t off = 0;
       for (int j = 0; j < (n & 3); j++) off += offsets[(down ? kind + j : kind - j) & 3];
       log_n = log2(n);
       tau = power(log2(times) - log_n, 1);
       left = times - product(tau, n, k.time);
-      total = places * (k.half >> 6) - round(off, 6);
+      total = places * (k.half >> 6 >> k.fine) - round(off, 6);
       at = raw = power(log2(total) + k.log_64 - log_n, sign_of(total));
     }
     turn = (turn + 1) & ((1 << CHANCE_BITS) - 1);
@@ -193,11 +193,11 @@ struct Recursion : Tables {
     emit(ahead(), place());
     ready();
   }
-  void silence(int end) {
+  void silence(int end, int64_t above, int64_t below) {
     if (quiet >= k.forget) phase = since = p = 0;
     if (phase != 2) return nothing();
     int64_t least = 1, z = place(), sign = sign_of(z), velocity = ahead();
-    int64_t beyond = std::max<int64_t>(sign * (z + offsets[(z < 0 ? end - 1 : end) & 3]), 0) - k.half;
+    int64_t beyond = std::max<int64_t>(sign * (z + offsets[(z < 0 ? end - 1 : end) & 3] - (z < 0 ? below : above) * (k.half >> k.fine)), 0) - k.half;
     if (beyond >= 0) z -= sign * beyond;
     int64_t margin = 3 * certain + 2 * sure;
     if (slack > k.half) margin = std::min(margin, k.half + k.quarter);

@@ -26,8 +26,10 @@ class Windows:
     """Holds the counts of every tick, as columns of one length."""
 
     number: NDArray[np.int64]  # counts that an event takes: the first ones of the tick
-    times: NDArray[np.int64]  # sum of the clocks from each of these to the end of the tick
-    # sum of twice the places of their edges, in counts from the place at the beginning of the tick
+    # times: sum of the clocks from each of these to the end of the tick; places: sum of twice the places of the edges,
+    # in counts from the place at the beginning of the tick, and as fine as displacements. Without counts, displacements
+    # of the edges below and above
+    times: NDArray[np.int64]
     places: NDArray[np.int64]
     last: NDArray[np.int64]  # clocks from the last count of the tick to its end
     moved: NDArray[np.int64]  # forward counts less backward ones
@@ -62,6 +64,11 @@ class Windows:
         latest = np.minimum(until, first + most) - 1  # of an empty tick it is not used
         lower = through[:-1] - (step < 0)  # of the two positions around an edge
         none = np.zeros(len(last), dtype=np.int64)
+        places = summed(2 * (through[:-1] - before[window]) + step) << steps.fine_bits
+        above = below = none
+        if steps.around is not None:
+            places += summed(steps.displaced[chosen][counted])
+            above, below = steps.around(last)
 
         def of_count(values: NDArray[np.int64], which: NDArray[np.int64]) -> NDArray[np.int64]:
             found = none.copy()
@@ -70,8 +77,8 @@ class Windows:
 
         return cls(
             number=np.minimum(until - first, most),
-            times=summed(age),
-            places=summed(2 * (through[:-1] - before[window]) + step),
+            times=np.where(some, summed(age), below),
+            places=np.where(some, places, above),
             last=of_count(age, until - 1),
             moved=through[until] - before,
             kind=of_count(lower & 3, latest),
@@ -109,6 +116,7 @@ def rows(form: Tracking, lead: int) -> Rows:
 def constants_of(form: Tracking, lead: int) -> dict[str, int]:
     """Return what the C++ text takes of a form, by names."""
     bits = {"ahead": lead << form.time_bits, "time_bits": form.time_bits, "factor_bits": form.factor_bits}
+    bits["fine"] = form.fine_bits
     return {**form.constants, **form.shifts, **bits}
 
 

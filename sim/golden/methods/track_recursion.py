@@ -118,13 +118,13 @@ class Recursion:
         if number:
             self.quiet = last << bits
             return self._event(number, times << bits, places, kind, down)
-        return self._silence(end)
+        return self._silence(end, places, times)
 
     def _event(self, n: int, times: int, places: int, kind: int, down: int) -> Row:
         k = self._k
         if n == 1:
             tau = times
-            raw = places * k["half"]
+            raw = places * (k["half"] >> self._form.fine_bits)
             at = raw - self.offsets[kind]
         else:
             rest = range(n & 3)
@@ -132,7 +132,7 @@ class Recursion:
             log_n = log2(n)
             tau = self._power(log2(times) - log_n)
             left = times - self._product(tau, n, "time")
-            total = (places << 13) - self._round(off, 6)
+            total = (places << 13 - self._form.fine_bits) - self._round(off, 6)
             at = raw = self._power(log2(total) + k["log_64"] - log_n, -1 if total < 0 else 1)
         self._count_event()
         if self.phase == REST:
@@ -319,8 +319,8 @@ class Recursion:
         mean = self.shown_v + self._product(self.shown_a, self.since, "half_velocity")
         return self.p + self._product(mean, self.since, "place")
 
-    def _silence(self, end: int) -> Row:
-        """Say what the silence of a tick says."""
+    def _silence(self, end: int, above: int, below: int) -> Row:
+        """Say what the silence of a tick says; the edges about the place are displaced by `above` and `below`."""
         k = self._k
         if self.quiet >= k["forget"]:
             self.phase, self.since, self.p = REST, 0, 0
@@ -329,6 +329,7 @@ class Recursion:
         z, least = self._place, 1
         sign = -1 if z < 0 else 1
         offset = self.offsets[(end - 1 if z < 0 else end) & 3]
+        offset -= (below if z < 0 else above) * (k["half"] >> self._form.fine_bits)
         beyond = max(sign * (z + offset), 0) - k["half"]
         z -= sign * max(beyond, 0)
         margin = 3 * self.certain + 2 * self.sure

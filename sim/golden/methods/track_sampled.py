@@ -52,7 +52,7 @@ class SampledRecursion(Recursion):
         self.alarm = max(times * self.sure, -k["minus_change"])
         self.mean_alarm = max(3 * self.sure, -k["minus_mean"])
 
-    def _silence(self, end: int) -> Row:
+    def _silence(self, end: int, above: int, below: int) -> Row:
         """Carry on without a read, `end` ticks after the last one."""
         self.standstill = end >= self._reads.max_ticks
         if self.standstill:

@@ -5,6 +5,7 @@ predicts it, and `tests/extras/test_NAME.py` checks it. The order is that of opt
 ports and registers.
 """
 
+from tachometry.spec.core.extras.disc import DiscMap
 from tachometry.spec.core.extras.electrical import ElectricalAngle
 from tachometry.spec.core.extras.extra import Extra
 from tachometry.spec.core.extras.health import Health
@@ -13,6 +14,6 @@ from tachometry.spec.core.extras.position_compare import PositionCompare
 from tachometry.spec.core.extras.probe import Probe
 from tachometry.spec.core.extras.stream import Stream
 
-EXTRAS: tuple[type[Extra], ...] = (Health, OverSpeed, Probe, Stream, PositionCompare, ElectricalAngle)
+EXTRAS: tuple[type[Extra], ...] = (Health, OverSpeed, Probe, Stream, PositionCompare, ElectricalAngle, DiscMap)
 
 __all__ = ["EXTRAS", "Extra"]

@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Self
 
 from tachometry.spec.core.front_end import Pin
 from tachometry.spec.core.numbers import Numbers
+from tachometry.spec.formats.displacement import Displacement
 from tachometry.spec.language.field import Draft
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import Port
@@ -60,6 +61,10 @@ class Extra:
     def least_fine_bits(self, spec: Numbers) -> int:
         """Return fraction bits that it needs of a fine position."""
         return 0
+
+    def displacement(self, spec: Numbers) -> Displacement | None:
+        """Return the format of displacements of counts that it gives to the datapath; None: it gives none."""
+        return None
 
     def registers(self, spec: Numbers) -> Iterable[Draft]:
         """Return registers that a program writes; a field sets the input of its gates that has the name of its port."""

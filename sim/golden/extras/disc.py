@@ -1,0 +1,159 @@
+"""Golden model of `spec.core.extras.disc`."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.sim.golden.extras import View
+from tachometry.sim.golden.front_end import Steps
+from tachometry.sim.golden.sorted_lookup import Ints, spans
+from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.run import Table
+from tachometry.spec import TachometerSpec
+from tachometry.spec.core.extras.disc import DOUBTFUL, SEEN, SLIPS_BITS, SURE, UNKNOWN, DiscMap
+from tachometry.spec.formats.displacement import ENTRY_BITS
+
+
+def displaced(extra: DiscMap, view: View) -> Steps:
+    """Return the steps with the displacements of their edges, in the unit of the core; 0 where the map is not used."""
+    spec, steps = view.spec, view.steps
+    counts, form, found = spec.encoder.encoder_counts, extra.displacement(spec), _places(extra, view)
+    writes, through = _writes(extra, view.trace), np.append(0, np.cumsum(steps.step))
+
+    def of_edge(passed: Ints, clock: Ints) -> Ints:
+        """Return the displacement of an edge by the counts since reset below it."""
+        trust = found.trust[np.searchsorted(found.clock, clock + 1, side="right") - 1]
+        used = np.flatnonzero((trust & 1 == 1) & (_level(view.trace, "disc_bypass", clock + 1) == 0))
+        edge = (passed + found.moved[np.searchsorted(found.clock, clock, side="right") - 1])[used] % counts
+        value = np.zeros(len(clock), np.int64)
+        value[used] = _contents(extra, spec, writes, edge, clock[used]) << form.shift
+        return value
+
+    value = np.where(steps.step == 0, 0, of_edge(through[:-1] + (steps.step > 0), steps.clock))
+    some = steps.step != 0
+
+    def around(last: Ints) -> tuple[Ints, Ints]:
+        """Return those of the edges above and below: that of the latest count as it was then, and the next one."""
+        row = np.searchsorted(steps.clock[some], last)
+        back = np.append(False, steps.step[some] < 0)[row]
+        latest = np.append(0, value[some])[row]
+        ahead = of_edge(np.append(0, np.cumsum(steps.step[some]))[row] + ~back, last)
+        return np.where(back, latest, ahead), np.where(back, ahead, latest)
+
+    return replace(steps, displaced=value, around=around, fine_bits=form.per_count.bit_length() - 2)
+
+
+def tables(extra: DiscMap, view: View) -> dict[str, Table]:
+    """Return the clocks of slips, what is known of the place, and the levels of the pins."""
+    found = {"disc_place": _places(extra, view), "disc_writes": _writes(extra, view.trace)}
+    found["disc_pins"] = Table(view.trace.clock, view.trace.lines)
+    if extra.index_place(view.spec) is not None:
+        found["disc_slip"] = Table(found["disc_place"].clock[found["disc_place"].slip == 1], {})
+    return found
+
+
+def shown(
+    extra: DiscMap, spec: TachometerSpec, found: Mapping[str, Table], clock: Ints, cleared: int
+) -> dict[str, NDArray[Any]]:
+    """Return whether the map is used and sure, the slips since they were cleared, and the entry at the address."""
+    place, pins = found["disc_place"], found["disc_pins"]
+    trust = place.trust[np.searchsorted(place.clock, clock, side="right") - 1]
+    bypass = pins.get("disc_bypass")[np.searchsorted(pins.clock, clock, side="right") - 1]
+    columns: dict[str, NDArray[Any]] = {"disc_used": (trust & 1 == 1) & (bypass == 0), "disc_sure": trust == SURE}
+    if extra.index_place(spec) is not None:
+        slips = found["disc_slip"].clock
+        number = np.searchsorted(slips, clock) - np.searchsorted(slips, cleared, side="right")
+        columns["disc_slips"] = np.clip(number, 0, (1 << SLIPS_BITS) - 1)
+    if extra.writable:
+        address = pins["disc_address"][np.searchsorted(pins.clock, clock - 1, side="right") - 1]
+        entry = _contents(extra, spec, found["disc_writes"], address.astype(np.int64), clock - 1)
+        columns["disc_entry"] = np.where(clock > 0, entry, 0)
+    return columns
+
+
+def _level(trace: PinTrace, name: str, clock: Ints) -> Ints:
+    """Return the level of a pin in each of these clocks; 0 where nothing drives it."""
+    if name not in trace.lines:
+        return 0 * clock
+    levels: Ints = trace.lines[name][np.searchsorted(trace.clock, clock, side="right") - 1].astype(np.int64)
+    return np.where(clock < 0, 0, levels)
+
+
+def _high(trace: PinTrace, name: str) -> Ints:
+    """Return the clocks in which a pin is high."""
+    if name not in trace.lines:
+        return np.empty(0, np.int64)
+    rows = np.flatnonzero(trace.lines[name])
+    return spans(trace.clock[rows], np.append(trace.clock, trace.n_clocks)[rows + 1])[0]
+
+
+def _writes(extra: DiscMap, trace: PinTrace) -> Table:
+    """Return the clocks in which the table is written, with the edge and what is written."""
+    clock = _high(trace, "disc_write") + 1 if extra.writable else np.empty(0, np.int64)
+    data, half = _level(trace, "disc_data", clock), 1 << ENTRY_BITS - 1
+    return Table(clock, {"edge": _level(trace, "disc_address", clock), "data": (data + half) % (2 * half) - half})
+
+
+def _contents(extra: DiscMap, spec: TachometerSpec, writes: Table, edge: Ints, clock: Ints) -> Ints:
+    """Return the entry of each edge in a clock, which has all writes before it."""
+    table, value, done = np.zeros(1 << 14, np.int64), np.zeros(len(edge), np.int64), 0
+    table[: spec.encoder.encoder_counts] = extra.entries(spec)
+    epoch = np.searchsorted(writes.clock, clock)
+    for until in np.unique(epoch).tolist():
+        for row in range(done, until):
+            table[writes.edge[row]] = writes.data[row]
+        done, now = until, epoch == until
+        value[now] = table[edge[now]]
+    return value
+
+
+def _turns(view: View, busy: Ints) -> list[tuple[int, int]]:
+    """Return the clocks in which the place is moved, each with the counts: the first one without a step.
+
+    What is asked for before that takes the place of what waits.
+    """
+    asked = _high(view.trace, "disc_turn") + 1
+    by = _level(view.trace, "disc_turn_by", asked)
+    asked, by = (column[by < view.spec.encoder.encoder_counts] for column in (asked, by))
+    found, taken = [], {*busy.tolist()}
+    for clock, counts, later in zip(asked.tolist(), by.tolist(), [*asked[1:].tolist(), None], strict=True):
+        at = clock + 1
+        while at in taken and at <= (later or at):
+            at += 1
+        if later is None or at <= later:
+            found.append((at, counts))
+    return found
+
+
+def _places(extra: DiscMap, view: View) -> Table:
+    """Return from each clock on what the place is ahead of all steps, the trust in it, and whether it has slipped."""
+    spec, steps, trace = view.spec, view.steps, view.trace
+    counts, place = spec.encoder.encoder_counts, extra.index_place(spec)
+    some = steps.step != 0
+    busy, total = steps.clock[some], np.append(0, np.cumsum(steps.step[some]))
+    written = _writes(extra, trace).clock
+    forgets = np.union1d(_high(trace, "disc_forget"), written)
+    events: list[tuple[int, int, int]] = [(at, 2, 0) for at in forgets.tolist()]
+    if place is None:
+        events += [(at, 1, by) for at, by in _turns(view, busy)]
+    else:
+        marks = steps.z + 1
+        events += [(at, 0, place) for at in marks[~np.isin(marks, busy)].tolist()]
+    moved, trust, rows = 0, UNKNOWN, [(0, 0, UNKNOWN, False)]
+    for at, kind, value in sorted(events):
+        slip = False
+        if kind == 2:
+            trust = UNKNOWN
+        elif kind == 1:
+            moved, trust = moved + value, SEEN
+        else:
+            passed = int(total[np.searchsorted(busy, at)])
+            agrees = (passed + moved - value) % counts == 0
+            slip, moved = trust != UNKNOWN and not agrees, value - passed
+            trust = (SURE if trust != UNKNOWN else SEEN) if agrees else (SEEN if trust in (UNKNOWN, SURE) else DOUBTFUL)
+        rows.append((at + 1, moved, trust, slip))
+    clock, *columns = np.array(rows, np.int64).T
+    return Table(clock, {name: column for name, column in zip(("moved", "trust", "slip"), columns, strict=True)})

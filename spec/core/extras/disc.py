@@ -1,0 +1,173 @@
+"""The map of a disc in the core: each count is placed where its edge lies."""
+
+import hashlib
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from tachometry.spec.core.disc import MOST_BYTES, Disc
+from tachometry.spec.core.extras.extra import Event, Extra
+from tachometry.spec.core.front_end import FrontEnd, Pin
+from tachometry.spec.core.numbers import Numbers
+from tachometry.spec.formats.displacement import ENTRY_BITS, FINEST, Displacement
+from tachometry.spec.language.field import Draft, Field
+from tachometry.spec.language.files import read_text
+from tachometry.spec.language.option import ParameterError, option
+from tachometry.spec.language.port import TICK, Port, held, pin, strobe
+from tachometry.spec.language.units import format_time
+
+MOST_EDGES = 1 << 14  # eight block RAMs of ECP5
+_TABLES = ("none", "edges")
+SLIPS_BITS = 8  # of the number of slips, which stays at its end
+UNKNOWN, SEEN, DOUBTFUL, SURE = range(4)  # trust in the place; bit 0: the map is used
+_METHODS = ("t", "mt", "track")
+_DISC = """Map of the disc that tachometry calibrate has written. Each count is then placed where its edge lies. The \
+map is used from the first index on. Without --index, or with --index-at edge, DISC_TURN must say where it lies."""
+_TABLE = """Table of the map that a program may write. edges has 8 bits for each edge. It is empty without --disc."""
+
+
+@dataclass(frozen=True)
+class DiscFile:
+    """The map of a disc, and the file that it is read from."""
+
+    path: str
+    disc: Disc
+
+    def __str__(self) -> str:
+        return self.path
+
+
+def parse_disc(what: str, text: str) -> DiscFile:
+    """Read the map from the file of this name; ParameterError if it has none."""
+    try:
+        return DiscFile(text, Disc.parse(read_text(Path(text), MOST_BYTES)))
+    except (OSError, ValueError) as error:
+        raise ParameterError(what, f"must be a file of tachometry calibrate: {text}: {error}") from error
+
+
+def _fits(spec: Any) -> bool:
+    return spec.method in _METHODS
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiscMap(Extra):
+    """A table has the displacement of each edge, a counter follows the place in the turn, and an index checks it."""
+
+    name = "disc"
+
+    file: DiscFile | None = option(  # noqa: RUF009
+        None, _DISC, name=name, metavar="FILE", shown="none", parse=parse_disc, fits=_fits, tests=(), tacit=True
+    )
+    table: str = option(
+        "none", _TABLE, name="disc-table", choices=_TABLES, fits=_fits, tests=("", "edges"), tacit=True, adds=True
+    )
+
+    @property
+    def writable(self) -> bool:
+        """Whether a program may write the table."""
+        return self.table != "none"
+
+    def displacement(self, spec: Numbers) -> Displacement:
+        known = self.file.disc.displacement if self.file else ()
+        worst = max(0.99 * self.writable, *map(abs, known), 0)  # counts; what a program writes may be about 1
+        form = Displacement(spec.timing.tick_cycles if spec.facts.update_by == "count" else int(1 / FINEST))
+        return replace(form, shift=max(0, math.ceil(math.log2(max(worst, 1e-9) / 127 / form.unit))))
+
+    def entries(self, spec: Numbers) -> tuple[int, ...]:
+        """Return the table after configuration, of each edge."""
+        known = self.file.disc.displacement if self.file else (0.0,) * spec.encoder.encoder_counts
+        return tuple(round(each / float(self.displacement(spec).unit)) for each in known)
+
+    def index_place(self, spec: Numbers) -> int | None:
+        """Return the place in the turn at which the index comes; None without one in a state of the lines."""
+        encoder, front = spec.encoder, FrontEnd(spec, 0)  # without inputs of extras
+        place = front.index_place
+        if encoder.sensor != "quadrature" or encoder.decoding != 4:
+            place = 0
+        return None if front.index_state is None else (-place if encoder.reverse else place) % 4
+
+    def missing(self) -> Mapping[str, str]:
+        return {"axes": "does not work with --axes", "loop": "does not work with --loop"}
+
+    def check(self, spec: Numbers) -> None:
+        encoder, place, disc = spec.encoder, self.index_place(spec), self.file and self.file.disc
+        own = encoder.encoder_counts, encoder.decoding
+        refusals = {
+            f"must be of at most {MOST_EDGES} counts per turn, not {own[0]}": own[0] > MOST_EDGES,
+            "does not work with --teeth": encoder.teeth is not None,
+            "does not work with --bounds": spec.bounds,
+        }
+        if disc:
+            refusals |= {
+                f"must be the map of this encoder, not of {disc.counts_per_rev} counts a turn with x{disc.decoding} "
+                "decoding": (disc.counts_per_rev, disc.decoding) != own,
+                f"must have the index at {place}, as --index-at, not {disc.index_place}: see tachometry calibrate": (
+                    place not in (None, disc.index_place)
+                ),
+            }
+        for why, refused in refusals.items():
+            if refused:
+                raise ParameterError(self.name if disc else "disc_table", why)
+
+    def _inputs(self, spec: Numbers) -> Iterable[tuple[str, str, Pin]]:
+        """Yield the inputs, each with the register and the field that take its place on a bus."""
+
+        def row(register: str, field: str, name: str, text: str, bits: int = 1) -> tuple[str, str, Pin]:
+            port = pin(f"disc_{name}", f"{text} Synchronous to clk.", bits)
+            return f"DISC_{register}", field, Pin(port, act=field in ("forget", "now", "write"))
+
+        bits = (spec.encoder.encoder_counts - 1).bit_length()
+        yield row("CONTROL", "bypass", "bypass", "The map is not used while this is high.")
+        yield row("CONTROL", "forget", "forget", "Forgets the place in the turn, and with it the use of the map.")
+        if self.index_place(spec) is None:
+            yield row("TURN", "by", "turn_by", "Counts by which disc_turn moves the place, less than a turn.", bits)
+            yield row("TURN", "now", "turn", "Moves the place by disc_turn_by of the next clock; the map is then used.")
+        if self.writable:
+            yield row("ADDRESS", "edge", "address", "Edge that disc_write writes, and disc_entry shows.", bits)
+            yield row("DATA", "value", "data", "Displacement that is written, signed.", ENTRY_BITS)
+            yield row("DATA", "write", "write", "Writes disc_data of the next clock, and forgets the place.")
+
+    def pins(self, spec: Numbers) -> Iterable[Pin]:
+        return (each for _, _, each in self._inputs(spec))
+
+    def ports(self, spec: Numbers) -> Iterable[Port]:
+        yield held(TICK, "disc_used", help="The map of the disc is used. It also changes between ticks.")
+        yield held(TICK, "disc_sure", help="The latest index was where the map expects it.")
+        if self.index_place(spec) is not None:
+            text = "Indices that were not where the map expects them, since they were cleared; 255 is the most."
+            yield held(TICK, "disc_slips", SLIPS_BITS, help=text)
+            yield strobe("disc_slip", "An index is not where the map expects it: counts were lost, or added.")
+        if self.writable:
+            text = "Entry of the table at disc_address. It also changes between ticks."
+            yield held(TICK, "disc_entry", ENTRY_BITS, signed=True, help=text)
+
+    def registers(self, spec: Numbers) -> Iterable[Draft]:
+        for name, rows in groupby(self._inputs(spec), lambda row: row[0]):
+            fields, low = list[Field](), 0
+            for _, field, one in rows:
+                port, width, text = one.port.name, one.port.width, one.port.help
+                fields.append(Field(field, width, low, text, writable=True, single=one.act, port=port))
+                low = 1 if low + width == 1 else max(width, ENTRY_BITS)
+            yield name, fields[0].help, tuple(fields), {}
+
+    def events(self, spec: Numbers) -> Mapping[str, Event]:
+        event = Event("An index was not where the map of the disc expects it.", ("disc_slip",))
+        return {} if self.index_place(spec) is None else {"disc_slip": event}
+
+    def entry(self, spec: Numbers) -> dict[str, Any]:
+        counts, unit = spec.encoder.encoder_counts, float(self.displacement(spec).unit)
+        table = bytes(each & (1 << ENTRY_BITS) - 1 for each in self.entries(spec))
+        return {
+            "form": "edges", "entries": counts, "counts_per_lsb": unit, "index_place": self.index_place(spec),
+            "writable": self.writable, "sha256": hashlib.sha256(table).hexdigest() if self.file else None,
+            "error_counts": self.file.disc.error if self.file else None,
+        }  # fmt: skip
+
+    def row(self, spec: Numbers, run: Any) -> tuple[str, str]:
+        used = run.ticks.clock[run.ticks.disc_used]
+        return "disc", f"map used from {format_time(spec.tick.seconds(int(used[0])))} on" if len(
+            used
+        ) else "map not used"

@@ -1,0 +1,38 @@
+"""Number format of the displacements of edges, which a core adds to distances and places."""
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+
+# What gates give to a datapath: the displacement of the edge of a count, and that of the count before.
+DISPLACED = ("displaced", "displaced_before")
+ENTRY_BITS = 8  # of an entry of a table, signed
+FINEST = Fraction(1, 256)  # counts: no unit is smaller
+
+
+@dataclass(frozen=True)
+class Displacement:
+    """Displacements in a unit of 2^low/per_count counts; an entry of a table is shifted left by `shift`."""
+
+    per_count: int  # LSBs of the distance or place that displacements are added to, in a count
+    shift: int = 0
+
+    @property
+    def low(self) -> int:
+        """Bits of that distance or place below the unit, which is at least `FINEST`."""
+        return max(0, math.ceil(math.log2(self.per_count * FINEST)))
+
+    @property
+    def unit(self) -> Fraction:
+        """Counts that an entry of 1 stands for."""
+        return Fraction(1 << self.low + self.shift, self.per_count)
+
+    @property
+    def width(self) -> int:
+        """Bits of a displacement in the unit, signed."""
+        return ENTRY_BITS + self.shift
+
+    @property
+    def most(self) -> int:
+        """Greatest |displacement| in LSBs of the distance or place."""
+        return 1 << self.width - 1 + self.low

@@ -1,0 +1,247 @@
+"""The map of a disc in the core, from the pins and the words of the command line alone; see `extras.harness`."""
+
+import json
+from contextlib import nullcontext
+from dataclasses import replace
+from hashlib import sha256
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from extras.harness import BASE, Case, agreeing, in_icarus, on_a_bus, refused
+from proofs.formal.mutants import mutant
+from support.nightly import nightly
+
+from tachometry.hdl.extras import disc as gates
+from tachometry.hdl.methods import count_way, tick_counts, track
+from tachometry.sim import golden
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.engines.cxxrtl import Cxxrtl
+from tachometry.sim.signals.recording import PinTrace, quadrature
+from tachometry.sim.studies.lockstep import lockstep
+from tachometry.spec import ParameterError, of_texts
+from tachometry.spec.core.disc import Disc
+from tachometry.spec.core.extras.disc import DiscMap
+from tachometry.spec.registers.manifest import manifest
+
+EDGES = 100
+FAR = tuple(np.clip(np.random.default_rng(7).normal(0, 0.15, EDGES), -0.4, 0.4).round(5).tolist())
+
+
+@pytest.fixture(autouse=True)
+def _files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let far.json be a map whose index is at place 2, and other.json one without an index."""
+    monkeypatch.chdir(tmp_path)
+    far = Disc(EDGES, FAR, 4, 2, 0.01, 0.05, (60.0, 150.0), 40.0, False)
+    for name, one in {"far": far, "other": replace(far, index_place=None)}.items():
+        Path(f"{name}.json").write_text(one.text)
+
+
+class Mapped(Case):
+    """A shaft whose index is where it should be; the table is seldom written, and the place seldom forgotten."""
+
+    def trace(self) -> PinTrace:
+        trace = super().trace()
+        a, b = trace.lines["a"].astype(int), trace.lines["b"].astype(int)
+        turn = (np.diff((a ^ b) + 2 * b) + 1) % 4 - 1  # along 00, 10, 11, 01
+        place = np.append(0, np.cumsum(turn))
+        seldom = (np.random.default_rng(self.seed).random(len(trace.clock)) < 0.03).astype(np.uint8)
+        names = {"disc_write", "disc_forget"} & trace.lines.keys()
+        lines = trace.lines | {name: trace.lines[name] & seldom for name in names}
+        lines["z"] = (place % EDGES == 2).astype(np.uint8)
+        return PinTrace.of_lines(trace.clock, trace.n_clocks, lines)
+
+
+CASES = (
+    Mapped("mt", "disc=far.json index=yes", edges=100),
+    Mapped("t", "disc=other.json disc-table=edges max-speed=100rev/s", edges=100),
+    Mapped("mt", "disc-table=edges disc=far.json index=yes index-once=yes preset=7 whole-cycles=yes", edges=60),
+    Mapped(
+        "t", "disc=far.json index=yes index-reset=yes tick=300clk max-time=3000clk unit=rpm", edges=120, clocks=400_000
+    ),
+)
+TRACKED = (
+    Mapped("track", "disc=far.json index=yes tick=300clk multiplier=block max-time=3000clk", edges=70, clocks=200_000),
+    Mapped("track", "disc=other.json disc-table=edges tick=1000clk smooth=yes max-time=5000clk", edges=60),
+)
+BUS = (
+    Case("mt", "disc=far.json index=yes position-modulo=rev/4", swings=True),
+    Case("t", "disc=other.json disc-table=edges", edges=60),
+)
+
+
+def rule(case: Case) -> None:
+    """The map is used in some ticks and not in others, and never while it is bypassed."""
+    used, bypass = case.run().ticks.disc_used, case.level("disc_bypass")
+    assert 0.01 < used.mean() < 0.99
+    assert not any(used[[bypass[clock] == 1 for clock in case.run().ticks.clock]])
+
+
+test_cores = agreeing(CASES + TRACKED, rule)
+test_first_bus, test_second_bus = map(on_a_bus, BUS)
+test_refusals = refused(
+    {
+        "disc-table=edges": "disc_table must not be given with method m",
+    }
+)
+
+
+@pytest.mark.parametrize(
+    ("method", "words", "why"),
+    [
+        ("mt", "disc=far.json", ""),
+        ("s", "disc=far.json", "must not be given with method s"),
+        ("mt", "disc=none.json", "disc must be a file of tachometry calibrate: none.json: "),
+        ("mt", "disc=far.json ppr=24", "must be the map of this encoder, not of 100 counts a turn with x4 decoding"),
+        ("mt", "disc=other.json index=yes", "must have the index at 2, as --index-at, not None"),
+        ("mt", "disc=far.json index=yes index-at=A=0,B=1", "must have the index at 3, as --index-at, not 2"),
+        ("mt", "disc-table=edges ppr=4097", "disc_table must be of at most 16384 counts per turn, not 16388"),
+        ("mt", "disc=far.json bounds=yes", "disc does not work with --bounds"),
+        ("mt", "disc=far.json timer=tick", "timer must be clock with --disc"),
+        ("t", "disc-table=edges teeth=60-2 sensor=pulses ppr=60 decoding=1", "does not work with --teeth"),
+    ],
+)
+def test_refusals_of_maps(method: str, words: str, why: str) -> None:
+    if not why:
+        assert DiscMap.of(Case(method, words).spec.extras)
+        return
+    with pytest.raises(ParameterError) as caught:
+        _ = Case(method, words).spec.ports
+    assert why in str(caught.value)
+
+
+def turning(spec: Any, places: Any, apart: int = 23, **levels: Any) -> PinTrace:
+    """Return a shaft that is at these places one after the other, with an index at each place 2 of a turn."""
+    clock = np.arange(len(places)) * apart
+    level = quadrature(np.asarray(places))
+    lines = {
+        "a": level & np.uint8(1),
+        "b": level >> np.uint8(1),
+        "z": (np.asarray(places) % EDGES == 2).astype(np.uint8),
+    }
+    return PinTrace.of_lines(clock, int(clock[-1]) + 200, lines | levels).completed(spec)
+
+
+def test_every_arrow_of_trust() -> None:
+    """Two turns make it sure; a slip is seen, a second one takes it out of use, and one that agrees brings it back."""
+    spec = Case("mt", "disc=far.json index=yes").spec
+    turns = [np.arange(0, 250), 251 + np.arange(0, 200), 452 + np.arange(0, 101), 554 + np.arange(0, 320)]
+    places = np.concatenate(turns)  # the place jumps by 2 of the index that the core expects, three times
+    real = np.concatenate(
+        [np.arange(0, 250), 250 + np.arange(0, 200), 450 + np.arange(0, 101), 551 + np.arange(0, 320)]
+    )
+    level, z = quadrature(real), (places % EDGES == 2).astype(np.uint8) * (real % 4 == 2)
+    lines = {"a": level & np.uint8(1), "b": level >> np.uint8(1), "z": z.astype(np.uint8)}
+    trace = PinTrace.of_lines(np.arange(len(real)) * 23, len(real) * 23 + 200, lines).completed(spec)
+    run = golden.run(spec, trace)
+    ticks = run.ticks
+    seen = [(bool(u), bool(s)) for u, s in zip(ticks.disc_used, ticks.disc_sure, strict=True)]
+    assert [one for one, other in pairwise([*seen, None]) if one != other] == [
+        (False, False),
+        (True, False),
+        (True, True),
+    ]
+    assert lockstep(spec, trace, Cxxrtl()).n_mismatches == 0
+
+
+FAULTS = (
+    (gates.Gates, "Mux(step[0], step[1], was)", "step[0]", 2),
+    (gates.Gates, "trust[0].eq(agrees | ~unsure)", "trust[0].eq(1)", 0),
+    (gates.Gates, "Mux(shows, self.displaced, latest)", "latest", 0),
+    (gates.Gates, "Mux(rest < 0, total, rest)", "total", 1),
+    (gates.Gates, "self.disc_forget | writes", "self.disc_forget", 1),
+    (gates.Gates, "Mux(back, place, moved)", "moved", 0),
+    (tick_counts.TickCounts, "Mux(takes, self.displaced, 0)", "0", 4),
+    (track.TrackMethod, "counts.number > 1", "1", 4),
+    (count_way.CountWay, "self.displaced_before << self._low", "self.displaced_before", 3),
+)
+
+
+@pytest.mark.parametrize(("box", "text", "wrong", "case"), FAULTS)
+def test_wrong_gates_are_seen(box: Any, text: str, wrong: str, case: int) -> None:
+    with mutant(box, text, wrong):
+        assert lockstep((CASES + TRACKED)[case].spec, (CASES + TRACKED)[case].trace(), Cxxrtl()).n_mismatches
+
+
+@pytest.mark.parametrize(
+    ("box", "text", "wrong"),
+    [
+        (None, "", ""),
+        (tick_counts.TickCounts, "Mux(was, latest, ahead)", "ahead"),
+        pytest.param(track.TrackMethod, "machine.sign", "0", marks=nightly),
+        pytest.param(gates.Gates, "counted | self._looks", "counted", marks=nightly),
+        pytest.param(gates.Gates, "Mux(step[0], step[1], was)", "step[1]", marks=nightly),
+    ],
+)
+def test_silences_know_the_edges_about_the_shaft(box: Any, text: str, wrong: str) -> None:
+    """A shaft that swings slowly waits at edges, whose displacement says how far it may have gone."""
+    spec = Case("track", "disc=far.json index=yes tick=300clk multiplier=block max-time=3000clk").spec
+    moved = parse_motion("constant:50rad/s:300ms+sine:20rad/s:3Hz:500ms")
+    trace = PinTrace.of(VirtualEncoder(25, index=True).record(moved).recording, spec).completed(spec)
+    with mutant(box, text, wrong) if box else nullcontext():
+        assert bool(lockstep(spec, trace, Cxxrtl()).n_mismatches) == bool(box)
+    assert golden.run(spec, trace).ticks.disc_used[-1]
+
+
+@pytest.mark.parametrize("method", ["t", "mt", pytest.param("track", marks=nightly)])
+def test_a_map_of_zeros_changes_nothing(method: str) -> None:
+    Path("even.json").write_text(replace(Disc.parse(Path("far.json").read_text()), displacement=(0.0,) * EDGES).text)
+    words = "index=yes " + {"track": "tick=300clk max-time=3000clk multiplier=block"}.get(method, "max-speed=200rev/s")
+    more = dict(word.split("=") for word in words.split())
+    case = Mapped(method, f"disc=even.json {words}", edges=100, clocks=200_000)
+    spec, trace = case.spec, case.trace()
+    plain = of_texts(method, BASE | more)
+    run, without = golden.run(spec, trace), golden.run(plain, trace)
+    assert run.ticks.disc_used.any()
+    for name in without.updates.columns:
+        assert np.array_equal(run.updates[name], without.updates[name]), name
+
+
+@pytest.mark.parametrize("method", ["t", "mt"])
+def test_a_map_takes_the_disc_away(method: str) -> None:
+    """Of a shaft at constant speed whose edges lie as the map says, both ways."""
+    words = "disc=far.json index=yes clock=10MHz tick=1000clk max-time=20000clk"
+    spec = Case(method, words).spec
+    unit = manifest(spec)["disc"]["counts_per_lsb"]
+    at = np.arange(1, 401) + np.round(np.array(FAR)[np.arange(1, 401) % EDGES] / unit) * unit
+    for way in (1, -1):
+        clock = np.rint((at if way > 0 else 500 - at[::-1]) * 1000).astype(np.int64)
+        level = quadrature(np.arange(0, 401)[::way])
+        lines = {"a": level & np.uint8(1), "b": level >> np.uint8(1)}
+        lines["z"] = (np.arange(0, 401)[::way] % EDGES == 2).astype(np.uint8)
+        trace = PinTrace.of_lines(np.append(0, clock), 505_000, lines).completed(spec)
+        updates = golden.run(spec, trace).updates
+        late = updates.rows((updates.clock > 210_000) & (updates.clock < 390_000))
+        speed = late.velocity / 2**spec.velocity.frac_bits
+        assert np.abs(speed - way).max() < 0.01
+        bypassed = golden.run(
+            spec, PinTrace.of_lines(trace.clock, trace.n_clocks, trace.lines | {"disc_bypass": 1 + 0 * trace.a})
+        )
+        assert np.abs(bypassed.updates.velocity / 2**spec.velocity.frac_bits - way)[20:].max() > 0.05
+
+
+def test_a_turn_aligns_a_core_without_an_index_while_the_shaft_turns() -> None:
+    """A turn of 30 counts is taken in the next clock without a count, and the map is used from then on."""
+    spec = Case("mt", "disc=other.json").spec
+    for late in range(-3, 4):
+        high = (np.arange(300) == 100).astype(np.uint8)
+        trace = turning(spec, np.arange(300), disc_turn_by=np.full(300, 30, np.uint8))
+        trace = trace.with_pulses("disc_turn", np.array([2300 + late]))
+        assert high.sum() == 1
+        assert lockstep(spec, trace, Cxxrtl()).n_mismatches == 0
+        ticks = golden.run(spec, trace).ticks
+        assert ticks.clock[ticks.disc_used.argmax()] - 2300 in range(0, 25)
+
+
+def test_the_manifest_has_the_table() -> None:
+    spec = Case("mt", "disc=far.json index=yes").spec
+    entry = json.loads(json.dumps(manifest(spec)["disc"]))
+    table = bytes(round(each / entry["counts_per_lsb"]) % 256 for each in FAR)
+    assert (entry["entries"], entry["index_place"]) == (EDGES, 2)
+    assert entry["sha256"] == sha256(table).hexdigest()
+
+
+test_verilog = in_icarus(CASES[0])
