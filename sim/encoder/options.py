@@ -177,7 +177,7 @@ class EncoderOptions:
     )
     frame_errors: float = _fault(
         "Probability that a read of a sampled position is wrong. The frame says so.",
-        "PROBABILITY",
+        "P",
         number_reader(FRACTION),
         name="frame-errors",
     )

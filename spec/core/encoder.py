@@ -123,7 +123,7 @@ class Encoder:
             ),
             Option(
                 "Pole pairs of the motor. With --sensor hall instead of --ppr: the halls have as many periods in a "
-                "turn. Together with --lines, --ppr or --cpr the same as --electrical.",
+                "turn. Together with --lines, --ppr or --cpr it is --electrical.",
                 name="pole-pairs",
                 parse_at=_pole_pairs,
                 **_OF_TURN,

@@ -1,4 +1,4 @@
-"""What a map gives: errors of the velocity with it and without, from captures of a shaft that coasts down.
+"""Errors of the velocity with a map and without, from captures of a shaft that coasts down.
 
 Bars are at 0.8 of the gains that are known of such discs; seeds of discs and of jitter are drawn here.
 """
