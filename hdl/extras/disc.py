@@ -55,7 +55,8 @@ class Gates(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        step, writes = self.step, Signal()
+        step = self.step
+        writes = Signal()
         if self._writable:
             m.d.sync += writes.eq(self.disc_write)
         edge = self._follow(m, step, self.disc_forget | writes)
@@ -77,7 +78,8 @@ class Gates(wiring.Component):
         read = memory.read_port()
         m.d.comb += read.addr.eq(edge)
         if self._writable:
-            write, shows = memory.write_port(), memory.read_port()
+            write = memory.write_port()
+            shows = memory.read_port()
             m.d.comb += [
                 *(port.addr.eq(self.disc_address) for port in (write, shows)),
                 write.data.eq(self.disc_data),
@@ -88,9 +90,12 @@ class Gates(wiring.Component):
 
     def _follow(self, m: Module, step: Signal, forgets: Value) -> Value:
         """Follow the place and the trust in it; return the edge that a step passes."""
-        edges, place, trust = self._edges, Signal(range(self._edges)), Signal(2)
+        edges = self._edges
+        place = Signal(range(edges))
+        trust = Signal(2)
         moved = Signal.like(place)  # by the step of this clock
-        back, was = Signal(), Signal()
+        back = Signal()
+        was = Signal()
         m.d.comb += back.eq(Mux(step[0], step[1], was))
         m.d.sync += was.eq(back)
         ends = place == Mux(back, 0, edges - 1)
@@ -116,8 +121,11 @@ class Gates(wiring.Component):
 
     def _turn(self, m: Module, step: Signal, place: Signal, trust: Signal) -> None:
         """Move the place by `disc_turn_by`, in the first clock without a step."""
-        edges, waits, asked = self._edges, Signal(), Signal()
-        by, total = Signal.like(place), Signal(range(2 * edges))
+        edges = self._edges
+        waits = Signal()
+        asked = Signal()
+        by = Signal.like(place)
+        total = Signal(range(2 * edges))
         rest = Signal(signed(len(total) + 1))
         m.d.comb += [total.eq(place + by), rest.eq(total - edges)]
         m.d.sync += asked.eq(self.disc_turn)

@@ -182,7 +182,9 @@ class FineGates(Gates):
 
     def _has_moved(self, m: Module) -> Signal:
         """Return whether the update is of a tick in which something moved the position."""
-        moved, of_tick, of_update = Signal(), Signal(), Signal()
+        moved = Signal()
+        of_tick = Signal()
+        of_update = Signal()
         m.d.sync += moved.eq(self.moves | (moved & ~self.tick))
         with m.If(self.tick):
             m.d.sync += of_tick.eq(moved)

@@ -23,7 +23,9 @@ class _Frame:
         self.silent = Signal()  # there is no answer
         self.unequal = Signal()  # the second reading differs from the first, or CDS is not low
         self.second = Signal()
-        self.rests, self.idle, self.done = Signal(), Signal(), Signal()
+        self.rests = Signal()
+        self.idle = Signal()
+        self.done = Signal()
 
 
 class SerialEncoder(wiring.Component):
@@ -148,7 +150,8 @@ class SerialEncoder(wiring.Component):
         wrong: Value = frame.unequal
         if self._reads.crc:
             wrong |= frame.check != self._reads.residue
-        error, left_out = ~frame.flags[1], Signal()
+        error = ~frame.flags[1]
+        left_out = Signal()
         m.d.sync += left_out.eq((self.start & ~frame.idle) | (left_out & frame.done))
         reason = Mux(wrong, WRONG_CHECK, Mux(error, ERROR_BIT, 0))
         m.d.comb += [
