@@ -307,5 +307,7 @@ def test_the_page_has_every_pin_and_its_command_makes_the_plugin(tmp_path: Path)
 
 
 def test_other_targets_are_refused() -> None:
-    with pytest.raises(ParameterError, match=r"^target must be one of none, rio, litex, vivado, linux, not 'mesa'$"):
+    with pytest.raises(
+        ParameterError, match=r"^target must be one of none, rio, litex, vivado, quartus, linux, not 'mesa'$"
+    ):
         export(of_texts("s", {"ppr": "500"}), NAME, target="mesa")
