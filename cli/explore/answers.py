@@ -169,20 +169,21 @@ def curves(options: Texts) -> Answer:
     unit, near = core.scale.shown_unit, np.geomspace(plans.low, plans.high, _POINTS + 1)[:-1]
     every = plans.line.speed.tolist()
     starts = sorted({bisect_left(every, speed) for speed in near.tolist()})
-    within = plans.line.speed >= plans.range[0]  # in which `generate` has the worst error
 
     def shown(name: str, spec: TachometerSpec, plan: Plan) -> Answer:
         error = plan.resolution + plan.disc + spec.velocity.rounding_lsb * spec.velocity.rad_per_s_per_lsb
         late = float(spec.tick.seconds(spec.latency.tick_to_velocity) + spec.times.filter_lag)
         delay = late + plan.measurement_time / 2 * (not spec.words.on_ramps)
-        errors, known = _greatest(unit.of(error), starts), within & ~np.isnan(error)
-        most = [values[known].max(initial=-1) for values in (unit.of(error), delay)]
-        worst = (f"{most[0]:.4g}", shown_time(most[1])) if known.any() else ("-", "-")
+        at = zip(_numbers(unit.of(error)), every, strict=True)
+        known = [value for value, speed in at if value is not None and speed >= plans.range[0]]  # as in `generate`
+        delays = _greatest(delay, starts)
+        longest = max((value for value in delays if value is not None), default=0)
+        worst = (f"{max(known):.4g}", shown_time(longest)) if known else ("-", "-")
         rest = spec.times.standstill_ticks * spec.timing.tick_seconds
         own = name == core.method
         cells = "see the core" if own else str(cells_of(spec) or "-")  # a reference core has other options
         row = [*worst, short_time(rest), cells]
-        return dict(name=name, own=own, error=errors, delay=_greatest(delay, starts), cells=row)
+        return dict(name=name, own=own, error=_greatest(unit.of(error), starts), delay=delays, cells=row)
 
     each = [shown(name, plans.methods[name], plan) for name, plan in plans.lines.items()]
     return {

@@ -146,7 +146,7 @@ class Encoder:
         "meter, always forward. step-dir: each rise of A is a step, with --decoding 2 each edge, forward "
         "while B is high. up-down: each rise of A counts up, each rise of B down. hall: A, B and C of a "
         "motor, 120 electrical degrees apart. sampled: an absolute position of --bits, read once a tick. ssi, "
-        "biss: the same, read by the core itself from an encoder with SSI or BiSS-C.",
+        "biss: such a position, read by the core itself from an encoder with SSI or BiSS-C.",
         choices=tuple(KINDS),
         tests=("", "hall", "pulses", "step-dir", "up-down"),
         tacit=True,

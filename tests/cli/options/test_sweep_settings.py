@@ -111,7 +111,7 @@ bounds = [true, false]
     [
         ("ppr = ", "must be TOML: Invalid value"),
         ("turns = 500", ": 'turns' is no key of a sweep: keys must be of methods, from, "),
-        ("turns = 500", ", illegal, broken, stuck, index-width, index-skew, seed, and [vary]"),
+        ("turns = 500", ", index-width, index-skew, noise, interpolation, frame-errors, seed, and [vary]"),
         ("tick = [1, 2]", "tick must be a text, a number, true or false, not [1, 2]: a list belongs into [vary]"),
         ("tick = 1979-05-27", "tick must be a text, a number, true or false, not datetime.date"),
         ("vary = 3", "vary must be a table of axes, not 3"),
