@@ -14,6 +14,7 @@ APART = {
     frozenset({("paper-exact", "yes"), ("adaptive", "25%")}),
     frozenset({("paper-exact", "yes"), ("whole-cycles", "yes")}),
     frozenset({("timer", "tick"), ("whole-cycles", "yes")}),
+    *(frozenset({("disc-table", "edges"), other}) for other in (("timer", "tick"), ("bounds", "yes edge-error 0.3"))),
     frozenset({("adaptive", "25%"), ("max-time", "2")}),
     frozenset({("adaptive", "25%"), ("max-time", "3")}),
     frozenset({("adaptive", "25%"), ("lowpass", "20kHz")}),
@@ -83,6 +84,8 @@ def test_every_option_is_a_factor(method: str) -> None:
     without = {about.name for about in common_options() if not about.needs} - set(found)
     never = {"rairan": {"external-tick"}, "track": {"tick", "bounds"}}
     lines = {"pole-pairs", "teeth", "ratio"}  # tests/hdl/front_end has the wheel, tests/spec/core the ratio
+    lines |= {"bits", "sample-age", "encoder-clock", "line-delay", "crc", "gray", "repeat"}  # tests/hdl/core has reads
+    lines |= {"disc"} if method in ("t", "mt", "track") else {"disc", "disc-table"}  # tests/extras has maps
     assert without == {"ppr", "lines", "cpr", "clock", "dt", "pwm", "lsb"} | lines | never.get(method, set())
     assert "yes index-reset" in found["index"]
     assert ("yes edge-error 0.3" in found.get("bounds", ())) == METHODS[method].facts.bounds
