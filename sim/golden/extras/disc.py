@@ -119,7 +119,7 @@ def _turns(view: View, busy: Ints) -> list[tuple[int, int]]:
     by = _level(view.trace, "disc_turn_by", asked)
     asked, by = (column[by < view.spec.encoder.encoder_counts] for column in (asked, by))
     found, taken = [], {*busy.tolist()}
-    for clock, counts, later in zip(asked.tolist(), by.tolist(), [*asked[1:].tolist(), None], strict=True):
+    for clock, counts, later in zip(asked.tolist(), by.tolist(), [*asked[1:].tolist(), None], strict=False):
         at = clock + 1
         while at in taken and at <= (later or at):
             at += 1
