@@ -42,7 +42,8 @@ def test_every_step_and_every_error(sensor: str) -> None:
 
 @pytest.mark.parametrize("sensor", only(["step-dir", "up-down"], CASES))  # which Verilator 5.48 has counted wrongly
 def test_every_step_in_verilator(sensor: str, tmp_path: Path) -> None:
-    spec = of_texts("m", BASE | {"sensor": sensor})
+    own = {name: text for name, text in CASES[sensor].items() if name in ("sensor", "decoding")}
+    spec = of_texts("m", BASE | {"sensor": sensor} | own)
     found = lockstep(spec, stress(spec, 1, 26), LintingVerilator(tmp_path, few=True))
     assert found.n_mismatches == 0, found.first
     assert {-1, 1} <= {*found.actual.ticks.pulse_count.tolist()} or sensor == "pulses"

@@ -95,7 +95,7 @@ def test_a_wide_index_is_told(seed: int, texts: dict[str, str]) -> None:
     found = lockstep(spec, trace, PySim())
     assert found.n_mismatches == 0, found.first
     assert len(found.actual.tables["index_wide"]) > 3
-    assert len(found.actual.tables["index_missed"]) > 3 or "sensor" in texts
+    assert len(found.actual.tables["index_missed"]) > 1 or "sensor" in texts
     assert len(found.actual.index) > 10
 
 
