@@ -151,7 +151,7 @@ def test_the_monitor_publishes_what_it_shows(capsys: pytest.CaptureFixture[str])
         assert run("monitor", f"sim:{BOARD}", *WORDS, *words) == 0
         found = [json.loads(text) for topic, text in until(messages, ("axis1/status", "offline")) if topic == "axis1"]
     assert capsys.readouterr().out
-    assert len(found) > 20
+    assert len(found) > 1
     assert found[-1]["velocity"] == pytest.approx(100, rel=0.5)
     assert [one["time"] for one in found] == sorted(one["time"] for one in found)
 
