@@ -25,7 +25,7 @@ from tachometry.spec.language.port import UPDATE, Port, held
 
 CORE = "--ppr 24 --clock 100kHz --tick 1ms --max-time 20ms".split()
 X = ["--method", "x", "--doubled"]
-MOTION = ["--motion", "constant:60rad/s:200ms"]
+MOTION = ["--motion", "constant:600rpm:200ms"]
 
 
 @dataclass(frozen=True, kw_only=True)
