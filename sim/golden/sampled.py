@@ -33,15 +33,9 @@ class Reads:
             changed = np.append(True, level[1:] != level[:-1])
             found = records(spec.reads, begin, Line(trace.clock[changed], level[changed]))
             return cls.those(spec, found.clock, found.sample, found.age, found.reason == 0)
-        lasts = np.diff(trace.clock, append=trace.n_clocks) * (trace.lines["sample_valid"] != 0)
-        row = np.repeat(np.arange(len(lasts)), lasts)
-        clock = trace.clock[row] + np.arange(len(row)) - np.repeat(np.cumsum(lasts) - lasts, lasts)
-        sample, right = (trace.lines[name][row].astype(np.int64) for name in ("sample", "sample_ok"))
-        age = (
-            np.full(len(row), sampled.age)
-            if sampled.age is not None
-            else trace.lines["sample_age"][row].astype(np.int64)
-        )
+        clock = trace.high("sample_valid")
+        sample, right = (trace.line_at(name, clock) for name in ("sample", "sample_ok"))
+        age = trace.line_at("sample_age", clock) if sampled.age is None else np.full(len(clock), sampled.age)
         return cls.those(spec, clock, sample, age, right != 0)
 
     @classmethod

@@ -224,6 +224,18 @@ class PinTrace(_Lines):
         held = np.searchsorted(self.clock, clock, side="right") - 1
         return {name: line[held] for name, line in self.lines.items()}
 
+    def line_at(self, name: str, clock: NDArray[np.int64], otherwise: int = 0) -> NDArray[np.int64]:
+        """Return a line in each of these clocks: 0 before the first row, `otherwise` if nothing drives it."""
+        if name not in self.lines:
+            return np.full(len(clock), otherwise, dtype=np.int64)
+        return np.append(0, self.lines[name].astype(np.int64))[np.searchsorted(self.clock, clock, side="right")]
+
+    def high(self, name: str) -> NDArray[np.int64]:
+        """Return the clocks in which a line is not 0."""
+        lasts = np.diff(self.clock, append=self.n_clocks) * (self.line_at(name, self.clock) != 0)
+        row = np.repeat(np.arange(len(lasts)), lasts)
+        return self.clock[row] + np.arange(len(row)) - np.repeat(np.cumsum(lasts) - lasts, lasts)
+
     def with_pulses(self, name: str, rises: NDArray[np.int64], width: int = 1) -> "PinTrace":
         """Return the same trace with a line that is high for `width` clocks from each of the clocks `rises`.
 

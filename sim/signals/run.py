@@ -43,6 +43,11 @@ class Table:
         """Return a column, or zeros where the core has no such port."""
         return self.columns.get(name, np.zeros(len(self), dtype=np.bool_))
 
+    def at(self, name: str, clock: Ints) -> Ints:
+        """Return a column as it is in each of these clocks: that of the latest row, 0 before the first."""
+        values = np.append(0, self.get(name).astype(np.int64))
+        return values[np.searchsorted(self.clock, clock, side="right")]
+
     def rows(self, chosen: Any) -> Table:
         """Return the rows of an index array, a mask or a slice."""
         return Table(self.clock[chosen], {name: column[chosen] for name, column in self.columns.items()})

@@ -13,9 +13,7 @@ from tachometry.sim.signals.axes import of_axis
 from tachometry.sim.signals.files import rows_of, write_csv
 from tachometry.sim.signals.run import Run, Table
 from tachometry.spec import CoreSpec, TachometerSpec
-from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.language.port import TICK, UPDATE
-from tachometry.spec.language.units import SpeedUnit
 
 
 @dataclass(frozen=True)
@@ -92,7 +90,7 @@ def _columns(spec: CoreSpec, run: Run) -> dict[str, NDArray[Any]]:
 
 
 def _of_updates(spec: TachometerSpec, run: Run, tick_to_velocity: int) -> dict[str, NDArray[Any]]:
-    updates, unit = run.updates, SpeedUnit("rad/s" if spec.unit == NATIVE else spec.unit)
+    updates, unit = run.updates, spec.scale.own_unit
     tick = np.searchsorted(run.ticks.clock, updates.clock - tick_to_velocity, side="right") - 1
     columns = {
         "clock": updates.clock,

@@ -99,6 +99,9 @@ def _takes_reads(spec: Any) -> bool:
     return bool(spec.facts.takes_reads)
 
 
+_READ: dict[str, Any] = {"fits": _takes_reads, "tests": (), "tacit": True}  # of options of an encoder that is read
+
+
 @dataclass(frozen=True)
 class Encoder:
     """An incremental encoder, or another sensor of motion, and how its edges are counted.
@@ -187,9 +190,7 @@ class Encoder:
         "Bits of a sampled position (instead of --ppr). M+B: M of turns and B of a turn, as 12+17, or B alone.",
         metavar="M+B",
         parse=parse_bits,
-        fits=_takes_reads,
-        tests=(),
-        tacit=True,
+        **_READ,
     )
     sample_age: int | None = option(
         None,
@@ -197,9 +198,7 @@ class Encoder:
         "input sample_age has it.",
         metavar="N",
         parse=parse_whole,
-        fits=_takes_reads,
-        tests=(),
-        tacit=True,
+        **_READ,
     )
 
     encoder_clock: int | None = option(
@@ -208,9 +207,7 @@ class Encoder:
         shown="1MHz, with biss 5MHz",
         metavar="FREQUENCY",
         parse=parse_frequency,
-        fits=_takes_reads,
-        tests=(),
-        tacit=True,
+        **_READ,
     )
     line_delay: Fraction | None = option(  # noqa: RUF009
         None,
@@ -219,9 +216,7 @@ class Encoder:
         shown="0",
         metavar="TIME",
         parse=parse_time,
-        fits=_takes_reads,
-        tests=(),
-        tacit=True,
+        **_READ,
     )
     crc: str | None = option(
         None,
@@ -229,17 +224,13 @@ class Encoder:
         shown="0x43, which is x^6 + x + 1",
         metavar="[POLY|none]",
         parse=_polynomial,
-        fits=_takes_reads,
-        tests=(),
-        tacit=True,
+        **_READ,
     )
-    gray: bool = option(False, "The encoder sends Gray code.", fits=_takes_reads, tests=(), tacit=True)
+    gray: bool = option(False, "The encoder sends Gray code.", **_READ)
     repeat: bool = option(
         False,
         "Read an encoder with ssi twice, and take equal reads only. It must repeat its position.",
-        fits=_takes_reads,
-        tests=(),
-        tacit=True,
+        **_READ,
     )
 
     def __post_init__(self) -> None:

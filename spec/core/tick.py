@@ -61,9 +61,13 @@ class Scale:
         return 2 * math.pi / float(self.asked.encoder.counts_per_rev * self.asked.timing.tick_seconds)
 
     @property
+    def own_unit(self) -> SpeedUnit:
+        """The unit of the velocity; rad/s for counts per tick, which depend on the tick."""
+        return SpeedUnit("rad/s" if self.asked.unit == NATIVE else self.asked.unit)
+
+    @property
     def shown_unit(self) -> SpeedUnit:
         """The unit in which commands show speeds: that of the velocity, else the one that was typed, else rad/s."""
         asked = self.asked
-        if asked.unit != NATIVE:
-            return SpeedUnit(asked.unit)
-        return SpeedUnit(asked.shown or (asked.max_speed.unit if asked.max_speed is not None else "rad/s"))
+        typed = asked.shown or (asked.max_speed and asked.max_speed.unit)
+        return SpeedUnit(typed) if typed and asked.unit == NATIVE else self.own_unit

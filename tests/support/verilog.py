@@ -85,6 +85,14 @@ class LintingVerilator(Verilator):
         return text
 
 
+def smoke(spec: AnySpec, folder: Path) -> str:
+    """Return what the smoke test of an exported core prints in Icarus."""
+    for name, text in export(spec, "spindle").items():
+        (folder / name).write_text(text)
+    subprocess.run(["iverilog", "-g2012", "-o", "tb", "spindle.v", "spindle_tb.sv"], cwd=folder, check=True)
+    return subprocess.run([folder / "tb"], cwd=folder, check=True, capture_output=True, text=True).stdout
+
+
 def run_in_icarus(spec: AnySpec, folder: Path, trace: Trace) -> Run:
     """Compile the exported Verilog as Verilog-2001 with -Wall, any warning an error, and play a trace on it."""
     return play_in_icarus(spec, folder, _changes(list(spec.ports.pins), trace), trace.n_clocks)

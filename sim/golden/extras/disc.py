@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim.golden.extras import View
 from tachometry.sim.golden.front_end import Steps
-from tachometry.sim.golden.sorted_lookup import Ints, spans
+from tachometry.sim.golden.sorted_lookup import Ints
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
@@ -25,9 +25,9 @@ def displaced(extra: DiscMap, view: View) -> Steps:
 
     def of_edge(passed: Ints, clock: Ints) -> Ints:
         """Return the displacement of an edge by the counts since reset below it."""
-        trust = found.trust[np.searchsorted(found.clock, clock + 1, side="right") - 1]
-        used = np.flatnonzero((trust & 1 == 1) & (_level(view.trace, "disc_bypass", clock + 1) == 0))
-        edge = (passed + found.moved[np.searchsorted(found.clock, clock, side="right") - 1])[used] % counts
+        trust = found.at("trust", clock + 1)
+        used = np.flatnonzero((trust & 1 == 1) & (view.trace.line_at("disc_bypass", clock + 1) == 0))
+        edge = (passed + found.at("moved", clock))[used] % counts
         value = np.zeros(len(clock), np.int64)
         value[used] = _contents(extra, spec, writes, edge, clock[used]) << form.shift
         return value
@@ -60,41 +60,24 @@ def shown(
 ) -> dict[str, NDArray[Any]]:
     """Return whether the map is used and sure, the slips since they were cleared, and the entry at the address."""
     place, pins = found["disc_place"], found["disc_pins"]
-    trust = place.trust[np.searchsorted(place.clock, clock, side="right") - 1]
-    bypass = pins.get("disc_bypass")[np.searchsorted(pins.clock, clock, side="right") - 1]
+    trust = place.at("trust", clock)
+    bypass = pins.at("disc_bypass", clock)
     columns: dict[str, NDArray[Any]] = {"disc_used": (trust & 1 == 1) & (bypass == 0), "disc_sure": trust == SURE}
     if extra.index_place(spec) is not None:
         slips = found["disc_slip"].clock
         number = np.searchsorted(slips, clock) - np.searchsorted(slips, cleared, side="right")
         columns["disc_slips"] = np.clip(number, 0, (1 << SLIPS_BITS) - 1)
     if extra.writable:
-        address = pins["disc_address"][np.searchsorted(pins.clock, clock - 1, side="right") - 1]
-        entry = _contents(extra, spec, found["disc_writes"], address.astype(np.int64), clock - 1)
+        entry = _contents(extra, spec, found["disc_writes"], pins.at("disc_address", clock - 1), clock - 1)
         columns["disc_entry"] = np.where(clock > 0, entry, 0)
     return columns
 
 
-def _level(trace: PinTrace, name: str, clock: Ints) -> Ints:
-    """Return the level of a pin in each of these clocks; 0 where nothing drives it."""
-    if name not in trace.lines:
-        return 0 * clock
-    levels: Ints = trace.lines[name][np.searchsorted(trace.clock, clock, side="right") - 1].astype(np.int64)
-    return np.where(clock < 0, 0, levels)
-
-
-def _high(trace: PinTrace, name: str) -> Ints:
-    """Return the clocks in which a pin is high."""
-    if name not in trace.lines:
-        return np.empty(0, np.int64)
-    rows = np.flatnonzero(trace.lines[name])
-    return spans(trace.clock[rows], np.append(trace.clock, trace.n_clocks)[rows + 1])[0]
-
-
 def _writes(extra: DiscMap, trace: PinTrace) -> Table:
     """Return the clocks in which the table is written, with the edge and what is written."""
-    clock = _high(trace, "disc_write") + 1 if extra.writable else np.empty(0, np.int64)
-    data, half = _level(trace, "disc_data", clock), 1 << ENTRY_BITS - 1
-    return Table(clock, {"edge": _level(trace, "disc_address", clock), "data": (data + half) % (2 * half) - half})
+    clock = trace.high("disc_write") + 1 if extra.writable else np.empty(0, np.int64)
+    data, half = trace.line_at("disc_data", clock), 1 << ENTRY_BITS - 1
+    return Table(clock, {"edge": trace.line_at("disc_address", clock), "data": (data + half) % (2 * half) - half})
 
 
 def _contents(extra: DiscMap, spec: TachometerSpec, writes: Table, edge: Ints, clock: Ints) -> Ints:
@@ -115,8 +98,8 @@ def _turns(view: View, busy: Ints) -> list[tuple[int, int]]:
 
     What is asked for before that takes the place of what waits.
     """
-    asked = _high(view.trace, "disc_turn") + 1
-    by = _level(view.trace, "disc_turn_by", asked)
+    asked = view.trace.high("disc_turn") + 1
+    by = view.trace.line_at("disc_turn_by", asked)
     asked, by = (column[by < view.spec.encoder.encoder_counts] for column in (asked, by))
     found, taken = [], {*busy.tolist()}
     for clock, counts, later in zip(asked.tolist(), by.tolist(), [*asked[1:].tolist(), None], strict=False):
@@ -135,7 +118,7 @@ def _places(extra: DiscMap, view: View) -> Table:
     some = steps.step != 0
     busy, total = steps.clock[some], np.append(0, np.cumsum(steps.step[some]))
     written = _writes(extra, trace).clock
-    forgets = np.union1d(_high(trace, "disc_forget"), written)
+    forgets = np.union1d(trace.high("disc_forget"), written)
     events: list[tuple[int, int, int]] = [(at, 2, 0) for at in forgets.tolist()]
     if place is None:
         events += [(at, 1, by) for at, by in _turns(view, busy)]

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from tachometry.sim.golden.extras import View
 from tachometry.sim.golden.sorted_lookup import Ints
-from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.electrical import REFUSED, REFUSED_BITS, ElectricalAngle
@@ -25,7 +24,7 @@ def tables(extra: ElectricalAngle, view: View) -> dict[str, Table]:
     states = extra.angles(view.spec).states
     counts, refused = (_states(states, view), []) if states else _counts(extra, view)
     updates = view.tables["measured"].clock
-    offsets = zip(updates + 1, _written(view.trace, "angle_offset", updates, extra.offset), strict=True)
+    offsets = zip(updates + 1, view.trace.line_at("angle_offset", updates, extra.offset), strict=True)
     offset = _latest([(0, extra.offset), *offsets], "offset")
     phases = (_tracked if view.spec.carrying else _counted)(extra, view, counts)
     found = {"angle_phase": phases, "angle_offset": offset, REFUSED: Table(np.array(refused, np.int64), {})}
@@ -38,7 +37,7 @@ def shown(
 ) -> dict[str, NDArray[Any]]:
     """Return the angle, whether it is valid, and how many indices were refused; a program does not clear these."""
     angles = extra.angles(spec)
-    marks, homes = (_at(found[f"angle_{name}"], "at", clock - 1) for name in ("index", "home"))
+    marks, homes = (found[f"angle_{name}"].at("at", clock - 1) for name in ("index", "home"))
     valid = np.maximum(_last_set(found, clock - 1), marks) > homes
     columns = {"angle": _angle(angles, found, clock), "angle_valid": valid}
     if extra.corrects(spec):
@@ -73,9 +72,9 @@ def _angle(angles: Angles, found: Mapping[str, Table], clock: Ints) -> Ints:
     # What the angle was set to, or nothing from the first index on.
     at = _last_set(found, before)
     there, rows = np.unique(at - 1, return_inverse=True)
-    difference = _at(found["angle_value"], "value", there) - _top(angles, phases, there) - _at(offset, "offset", there)
-    is_set = at > _at(found["angle_first"], "at", before)
-    shift = np.where(is_set, difference[rows], 0) + _at(offset, "offset", before + 1)
+    difference = found["angle_value"].at("value", there) - _top(angles, phases, there) - offset.at("offset", there)
+    is_set = at > found["angle_first"].at("at", before)
+    shift = np.where(is_set, difference[rows], 0) + offset.at("offset", before + 1)
     angle: Ints = np.where(clock > 0, (_top(angles, phases, clock - 1) + shift) % _TURN, 0)
     return angle
 
@@ -85,17 +84,6 @@ def _latest(rows: Sequence[tuple[int, ...]], *names: str) -> Table:
     clock, *columns = np.array(rows, np.int64).T
     last = np.append(np.diff(clock) > 0, True)
     return Table(clock[last], {name: column[last] for name, column in zip(names, columns, strict=True)})
-
-
-def _at(table: Table, name: str, clock: Ints) -> Ints:
-    """Return the value in each of these clocks; 0 before the first."""
-    values: Ints = np.append(0, table[name])[np.searchsorted(table.clock, clock, side="right")]
-    return values
-
-
-def _written(trace: PinTrace, name: str, clock: Ints, value: int) -> Ints:
-    """Return an input in each of these clocks, or its value where nothing drives it."""
-    return trace.at(clock)[name].astype(np.int64) if name in trace.lines else np.full(len(clock), value, np.int64)
 
 
 def _counts(extra: ElectricalAngle, view: View) -> tuple[Table, list[int]]:
@@ -135,11 +123,11 @@ def _tracked(extra: ElectricalAngle, view: View, counts: Table) -> Table:
     updates, ticks, angles = view.tables["measured"], view.tables["tick"], extra.angles(view.spec)
     bits, late, (of_velocity, of_fine, of_acceleration) = angles.factor_bits, angles.late, angles.factors
     place = ticks["position"][np.searchsorted(ticks.clock, updates["cause"])] << angles.position_fine_bits
-    lead = _written(view.trace, "angle_lead", updates.clock, extra.lead)
+    lead = view.trace.line_at("angle_lead", updates.clock, extra.lead)
     between = [
         wrapped(of, angles.position_fine_bits + PLACE_BITS) for of in (updates["position_fine"] - place).tolist()
     ]
-    of_ticks = _at(counts, "angle", updates["cause"]), _settled(angles, updates, between), lead
+    of_ticks = counts.at("angle", updates["cause"]), _settled(angles, updates, between), lead
     columns = np.column_stack((updates.clock, *of_ticks, updates["velocity"], updates["acceleration"])).tolist()
     rows = list[list[int]]()
     for clock, at, between, ahead, velocity, acceleration in columns:
@@ -176,7 +164,7 @@ def _counted(extra: ElectricalAngle, view: View, counts: Table) -> Table:
     updates = updates.rows(np.diff(updates.clock, append=_NEVER) >= angles.clocks - 1)
     velocity, *_ = angles.factors
     slopes = [velocity.times(one) for one in updates["velocity"].tolist()]
-    leads = (_written(view.trace, "angle_lead", updates.clock, extra.lead) + angles.span).tolist()
+    leads = (view.trace.line_at("angle_lead", updates.clock, extra.lead) + angles.span).tolist()
     ahead = [0, *(wrapped(slope * lead, angles.bits) for slope, lead in zip(slopes, leads, strict=True))]
     slopes = [0, *(max(-half, min(half, wrapped(slope, angles.bits))) for slope in slopes)]
     ends = updates.clock + angles.clocks
@@ -184,7 +172,7 @@ def _counted(extra: ElectricalAngle, view: View, counts: Table) -> Table:
     latest, place = np.searchsorted(ends, clock, side="right"), np.full(len(clock), _GROWS)
     place[np.searchsorted(clock, counts.clock)] = np.where(counts["step"], -counts["step"] * half, _GROWS)
     place[0] = 0
-    base, slope = _at(counts, "angle", clock) + np.array(ahead)[latest], np.array(slopes)[latest]
+    base, slope = counts.at("angle", clock) + np.array(ahead)[latest], np.array(slopes)[latest]
     rows = np.column_stack((clock + 1, base, slope, place, 0 * clock)).tolist()
     return _owing(angles, rows, int(counts.clock[:2][-1]) + 1 if angles.cycle else 0)
 
@@ -238,7 +226,7 @@ def _sets(view: View, known: Ints | None) -> dict[str, Table]:
     """
     trace, late = view.trace, view.spec.latency.tick - 1
     sets, ends = np.flatnonzero(trace.lines["angle_set"]), np.append(trace.clock, trace.n_clocks) + 1
-    value = _written(trace, "angle_value", trace.clock, 0)
+    value = trace.line_at("angle_value", trace.clock)
     marks, homes = view.steps.index + late, view.steps.arms + late
     # First is that of all, and that behind each `home`.
     turns = np.searchsorted(homes, marks, side="left")
@@ -253,4 +241,4 @@ def _sets(view: View, known: Ints | None) -> dict[str, Table]:
 
 def _last_set(found: Mapping[str, Table], clock: Ints) -> Ints:
     """Return one more than the last clock in which the angle was set, not after each of these; 0 or less for none."""
-    return np.minimum(_at(found["angle_sets"], "end", clock), clock + 1)
+    return np.minimum(found["angle_sets"].at("end", clock), clock + 1)

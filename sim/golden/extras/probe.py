@@ -26,9 +26,7 @@ def tables(extra: Probe, view: View) -> dict[str, Table]:
         at, level = view.steps.pins[line]
         # An edge is known in a register a clock before it is shown; what has been set until then counts.
         known = at[1:] + spec.latency.tick - 1
-        rows = np.searchsorted(trace.clock, known - 1, side="right") - 1
-        packed = trace.lines["probe_edges"][rows] if "probe_edges" in trace.lines else extra.packed_edges
-        wanted = packed >> 2 * number & (RISING | FALLING)
+        wanted = trace.line_at("probe_edges", known - 1, extra.packed_edges) >> 2 * number & (RISING | FALLING)
         edges = known[wanted & np.where(level[1:] > level[:-1], RISING, FALLING) != 0]
         clock, flag = _while_armed(number, edges, trace)
         flags.append(flag)

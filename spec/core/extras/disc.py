@@ -168,6 +168,6 @@ class DiscMap(Extra):
 
     def row(self, spec: Numbers, run: Any) -> tuple[str, str]:
         used = run.ticks.clock[run.ticks.disc_used]
-        return "disc", f"map used from {format_time(spec.tick.seconds(int(used[0])))} on" if len(
-            used
-        ) else "map not used"
+        if not len(used):
+            return "disc", "map not used"
+        return "disc", f"map used from {format_time(spec.tick.seconds(int(used[0])))} on"

@@ -1,13 +1,12 @@
 """Cores that read an encoder themselves: hardware against golden model, exported Verilog, and what is refused."""
 
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 from support.nightly import only
+from support.verilog import smoke
 
-from tachometry.hdl.export import export
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.sampled import encoder_of
@@ -43,11 +42,7 @@ def test_gates_and_golden_model_agree_on_every_read(case: str) -> None:
 
 @pytest.mark.parametrize("case", only(["m"], [*CASES]))
 def test_exported_verilog_reads_a_model_in_icarus(case: str, tmp_path: Path) -> None:
-    for name, text in export(core(case), "spindle").items():
-        (tmp_path / name).write_text(text)
-    subprocess.run(["iverilog", "-g2012", "-o", "tb", "spindle.v", "spindle_tb.sv"], cwd=tmp_path, check=True)
-    said = subprocess.run([tmp_path / "tb"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
-    assert "PASS: position 24" in said
+    assert "PASS: position 24" in smoke(core(case), tmp_path)
 
 
 @pytest.mark.parametrize(("errors", "delay"), [(0, "0ns"), (0.05, "1us")])

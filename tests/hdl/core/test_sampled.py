@@ -1,6 +1,5 @@
 """Cores whose encoder is read: hardware against golden model, exported Verilog, and what each read does."""
 
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +7,8 @@ import numpy as np
 import pytest
 from amaranth import Module
 from support.nightly import only
+from support.verilog import smoke
 
-from tachometry.hdl.export import export
 from tachometry.hdl.front_end import sampled_position
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
@@ -136,11 +135,7 @@ def _elaborate(wrong: Any, reader: sampled_position.SampledPosition) -> Module:
 
 @pytest.mark.parametrize("case", only(["m of turns"], [*CASES]))
 def test_exported_verilog_reads_in_icarus(case: str, tmp_path: Path) -> None:
-    for name, text in export(core(case), "spindle").items():
-        (tmp_path / name).write_text(text)
-    subprocess.run(["iverilog", "-g2012", "-o", "tb", "spindle.v", "spindle_tb.sv"], cwd=tmp_path, check=True)
-    said = subprocess.run([tmp_path / "tb"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
-    assert "PASS: position 24" in said
+    assert "PASS: position 24" in smoke(core(case), tmp_path)
 
 
 @pytest.mark.parametrize("reverse", ["no", "yes"])
