@@ -16,10 +16,11 @@ from support.nightly import nightly
 
 from tachometry.hdl.extras import disc as gates
 from tachometry.hdl.methods import count_way, tick_counts, track
-from tachometry.sim import golden
+from tachometry.sim import build, golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines.cxxrtl import Cxxrtl
+from tachometry.sim.golden.methods import track as twin
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import ParameterError, of_texts
@@ -176,14 +177,23 @@ def test_wrong_gates_are_seen(box: Any, text: str, wrong: str, case: int) -> Non
         pytest.param(gates.Gates, "Mux(step[0], step[1], was)", "step[1]", marks=nightly),
     ],
 )
-def test_silences_know_the_edges_about_the_shaft(box: Any, text: str, wrong: str) -> None:
+def test_silences_know_the_edges_about_the_shaft(
+    box: Any, text: str, wrong: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A shaft that swings slowly waits at edges, whose displacement says how far it may have gone."""
     spec = Case("track", "disc=far.json index=yes tick=300clk multiplier=block max-time=3000clk").spec
     moved = parse_motion("constant:50rad/s:300ms+sine:20rad/s:3Hz:500ms")
     trace = PinTrace.of(VirtualEncoder(25, index=True).record(moved).recording, spec).completed(spec)
     with mutant(box, text, wrong) if box else nullcontext():
         assert bool(lockstep(spec, trace, Cxxrtl()).n_mismatches) == bool(box)
-    assert golden.run(spec, trace).ticks.disc_used[-1]
+    if box is None:
+        run = golden.run(spec, trace)
+        assert run.ticks.disc_used[-1]
+        twin.compiled.cache_clear()
+        monkeypatch.setattr(build, "find_compiler", lambda: None)  # so it is the one in Python
+        for name, column in golden.run(spec, trace).updates.columns.items():
+            assert np.array_equal(column, run.updates[name]), name
+        twin.compiled.cache_clear()
 
 
 @pytest.mark.parametrize("method", ["t", "mt", pytest.param("track", marks=nightly)])
@@ -236,12 +246,36 @@ def test_a_turn_aligns_a_core_without_an_index_while_the_shaft_turns() -> None:
         assert ticks.clock[ticks.disc_used.argmax()] - 2300 in range(0, 25)
 
 
+def test_a_place_is_forgotten_with_any_clock_about_a_count() -> None:
+    spec = Case("mt", "disc=other.json").spec
+    trace = turning(spec, np.arange(200), disc_turn_by=np.full(200, 30, np.uint8))
+    for late in (*range(6), *range(23, 29)):  # an update may end with every second count
+        forgotten = trace.with_pulses("disc_turn", np.array([500])).with_pulses("disc_forget", np.array([2300 + late]))
+        assert lockstep(spec, forgotten, Cxxrtl()).n_mismatches == 0
+        used = golden.run(spec, forgotten).ticks.disc_used
+        assert used.any()
+        assert not used[-1]
+
+
+@pytest.mark.parametrize("reverse", ["no", "yes"])
+@pytest.mark.parametrize("state", ["A=0,B=0", "A=1,B=0", "A=1,B=1", "A=0,B=1"])
+def test_the_place_of_the_index_is_where_a_shaft_finds_it(state: str, reverse: str) -> None:
+    spec = Case("mt", f"disc-table=edges index=yes index-at={state} reverse={reverse}").spec
+    encoder = VirtualEncoder.of(spec.encoder, index=True, index_width=4)
+    trace = PinTrace.of(encoder.record(parse_motion("constant:50rad/s:300ms")).recording, spec).completed(spec)
+    found = {*(golden.run(spec, trace).index.index_position % 4).tolist()}
+    assert found == {DiscMap.of(spec.extras).index_place(spec)}  # type: ignore[union-attr]
+
+
 def test_the_manifest_has_the_table() -> None:
     spec = Case("mt", "disc=far.json index=yes").spec
     entry = json.loads(json.dumps(manifest(spec)["disc"]))
     table = bytes(round(each / entry["counts_per_lsb"]) % 256 for each in FAR)
     assert (entry["entries"], entry["index_place"]) == (EDGES, 2)
     assert entry["sha256"] == sha256(table).hexdigest()
+    tracked = Case("track", "disc=far.json index=yes tick=1000clk max-time=5000clk").spec
+    unit = manifest(tracked)["disc"]["counts_per_lsb"]
+    assert 64 <= max(map(abs, FAR)) / unit < 128  # no bit of an entry is idle
 
 
 test_verilog = in_icarus(CASES[0])

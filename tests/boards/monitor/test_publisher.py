@@ -149,7 +149,9 @@ def test_the_monitor_publishes_what_it_shows(capsys: pytest.CaptureFixture[str])
         address = f"mqtt://127.0.0.1:{broker.port}/axis1"
         words = ("--set", "speed=100rad/s", "--duration", "1s", "--plain", "--publish", address)
         assert run("monitor", f"sim:{BOARD}", *WORDS, *words) == 0
-        found = [json.loads(text) for topic, text in until(messages, ("axis1/status", "offline")) if topic == "axis1"]
+        every = until(messages, ("axis1/status", "offline"))
+    found = [json.loads(text) for topic, text in every if topic == "axis1"]
+    assert ("axis1/status", "online") in every
     assert capsys.readouterr().out
     assert len(found) > 1
     assert found[-1]["velocity"] == pytest.approx(100, rel=0.5)

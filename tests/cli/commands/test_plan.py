@@ -146,6 +146,8 @@ def test_a_clock_out_of_reach_is_warned_of() -> None:
     assert dict(size_rows(replace(found, remedy=None)))["warning"].startswith(
         "--clock 100MHz is above that: take a lower"
     )
+    far = dict(size_rows(replace(found, remedy=None, wanted_hz=400_000_000)))["warning"]
+    assert far == "--clock 400MHz is above that: take a lower --clock"
     assert "warning" not in dict(size_rows(replace(found, wanted_hz=94_000_000)))
 
 

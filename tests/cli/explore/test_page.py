@@ -214,6 +214,15 @@ def test_curves_are_those_of_plan(client: TestClient) -> None:
     assert found["curves"][0]["cells"] == [f"{error.max():.4g}", "503us", short_time(rest), "see the core"]
 
 
+def test_the_worst_error_of_the_table_is_that_of_the_core(client: TestClient) -> None:
+    """That of speeds below the range, at which a count may take longer than the maximum time, is greater."""
+    drive = {"lines": "1024", "clock": "125MHz", "pwm": "20kHz", "max-speed": "6000rpm"}
+    own, *_ = asked(client, "curves", options=drive)["curves"]
+    (row,) = (text for name, text in asked(client, "check", options=drive)["rows"] if name == "worst error")
+    assert float(own["cells"][0]) == pytest.approx(float(row.split()[0]), rel=0.005)
+    assert max(filter(None, own["error"])) > 1.1 * float(own["cells"][0])
+
+
 def test_a_motion_is_answered_by_golden_models(client: TestClient) -> None:
     found = asked(client, "respond", options=CORE, motion={"motion": "constant:100rad/s:100ms", "jitter": "5%"})
     own = found["curves"][0]

@@ -19,7 +19,8 @@ from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.sim.studies.plan import Plans
-from tachometry.spec import ParameterError, TachometerSpec, of_options, of_texts
+from tachometry.spec import ParameterError, TachometerSpec, TrackTachometer, of_options, of_texts
+from tachometry.spec.formats.tracking import PLACE_BITS
 
 BASE = {"sensor": "sampled", "bits": "17", "clock": "48MHz", "tick": "40clk", "max-time": "400clk"}
 SLOW = {"tick": "900clk", "max-time": "9000clk"}
@@ -165,6 +166,9 @@ def test_a_core_is_made_again_from_its_options() -> None:
         ("m", {"bits": "25"}, "bits must be bits of turns and of a turn, as 12\\+17"),
         ("m", {"ppr": "3"}, "ppr must be left out with --sensor sampled, not 3: type --bits"),
         ("m", {"index": "yes"}, "index must be left out with --sensor sampled: it is for edges"),
+        ("m", {"preset": "0"}, "preset must be left out with --sensor sampled: it is for edges"),
+        ("m", {"position-modulo": "rev"}, "position_modulo must be left out with --sensor sampled: it is for edges"),
+        ("m", {"blanking": "3"}, "blanking_clocks must be left out with --sensor sampled: it is for edges"),
         ("m", {"filter": "3"}, "filter_clocks must be left out with --sensor sampled: it is for edges"),
         ("m", {"sample-age": "81"}, "sample_age must be from 0 to 80 clocks, two ticks, not 81"),
         ("m", {"health": "yes"}, "health must be left out with --sensor sampled: it needs edges"),
@@ -186,3 +190,13 @@ def test_a_plan_is_for_edges() -> None:
 def test_bits_must_be_given() -> None:
     with pytest.raises(ParameterError, match=r"^bits must be given with --sensor sampled, as 17"):
         of_texts("m", {name: text for name, text in BASE.items() if name != "bits"})
+
+
+@pytest.mark.parametrize(("bits", "fraction"), [("17", 4), ("12", 0)])
+def test_floors_are_those_of_rounding(bits: str, fraction: int) -> None:
+    """The noise is at least 1/3 LSB of the read, a change is above 3/2, a mean above 1 LSB."""
+    spec = of_texts("track", BASE | SLOW | {"bits": bits})
+    assert isinstance(spec, TrackTachometer)
+    lsb = 2.0 ** (PLACE_BITS - fraction)
+    found = [spec.form.constants[name] / lsb for name in ("least_noise", "minus_change", "minus_mean")]
+    assert found == pytest.approx([1 / 3, -3 / 2, -2], abs=1e-3)
