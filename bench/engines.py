@@ -86,7 +86,7 @@ def loop_alone(name: str, spec: TachometerSpec, trace: PinTrace, expected: Run, 
     """Return the shortest processor time in which an engine runs all clocks, without what it does before and after."""
     engine = pick(name)
     assert isinstance(engine, CompiledEngine)
-    design = Design(spec, driven_pins(spec, trace), long=True)
+    design = Design(spec, driven_pins(spec, trace), effort=2)
     library, times = engine.library(design), []
     for _ in range(repeats):
         play = Play(library, design, trace, (0, trace.n_clocks), engine.every_clock)

@@ -34,7 +34,7 @@ DRIVER = files(__package__).joinpath("driver.h").read_text(encoding="utf-8")
 _CALL = 0.05  # seconds that a call should take, so that progress is seen and Ctrl-C is heard
 _FIRST_CALL = 1000  # clocks
 _CAPACITY = 1 << 14  # rows
-_LONG = 30_000_000  # clocks
+_SHORT, _LONG = 30_000, 30_000_000  # clocks: a run is brief up to the first, and long above the second
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Design:
     spec: AnySpec
     pins: list[Port]  # inputs, in the order of their levels
     watched: Watched | None = None  # the core with shown signals, if there are any to be shown
-    long: bool = False  # the run is: the compiler may take its time
+    effort: int = 1  # of the compiler: 0 for a brief run, 1 for a short one, 2 for a long one
 
     @cached_property
     def component(self) -> wiring.Component:
@@ -105,7 +105,7 @@ class CompiledEngine(ABC):
     every_clock = False  # none is skipped
 
     def __init__(self) -> None:
-        self._libraries: dict[tuple[AnySpec, bool], Path] = {}
+        self._libraries: dict[tuple[AnySpec, int], Path] = {}
 
     @abstractmethod
     def library(self, design: Design) -> Path:
@@ -115,7 +115,7 @@ class CompiledEngine(ABC):
         """Return the library of a design, which is looked up once."""
         if design.watched is not None:
             return self.library(design)
-        key = (design.spec, design.long)
+        key = (design.spec, design.effort)
         if key not in self._libraries:
             self._libraries[key] = self.library(design)
         return self._libraries[key]
@@ -132,7 +132,7 @@ class CompiledEngine(ABC):
         """Run the core, as `Engine.run` says."""
         pins = driven_pins(spec, trace)
         watched = None if vcd is None else Watched(spec)
-        design = Design(spec, pins, watched, trace.n_clocks > _LONG)
+        design = Design(spec, pins, watched, (trace.n_clocks > _SHORT) + (trace.n_clocks > _LONG))
         play = Play(self.kept(design), design, trace, window or (0, trace.n_clocks), self.every_clock)
         interrupt = None
         with ExitStack() as stack:

