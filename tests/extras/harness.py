@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.nightly import only
 from support.simulate import Seen, clock_by_clock
 from support.verilog import run_in_icarus
 
@@ -46,6 +47,7 @@ class Case:
     clocks: int = 10_000
     seed: int = 1
     swings: bool = False  # the shaft swings about a few edges, and z is often high
+    late: bool = False  # another core shows nearly the same: it is left to `make test-all`
 
     @property
     def texts(self) -> dict[str, str]:
@@ -110,7 +112,9 @@ def _run(case: Case) -> Run:
 
 
 def agreeing(cases: Sequence[Case], rule: Callable[[Case], None]) -> Callable[[Case], None]:
-    @pytest.mark.parametrize("case", cases, ids=lambda case: f"{case.method} {case.words}")
+    soon = [case for case in cases if not case.late]
+
+    @pytest.mark.parametrize("case", only(soon, cases), ids=lambda case: f"{case.method} {case.words}")
     def test(case: Case) -> None:
         spec = case.spec
         assert of_options(spec.options) == spec

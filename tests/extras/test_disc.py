@@ -161,6 +161,7 @@ FAULTS = (
 )
 
 
+@nightly
 @pytest.mark.parametrize(("box", "text", "wrong", "case"), FAULTS)
 def test_wrong_gates_are_seen(box: Any, text: str, wrong: str, case: int) -> None:
     with mutant(box, text, wrong):

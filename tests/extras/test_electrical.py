@@ -11,6 +11,7 @@ import pytest
 from extras.harness import Case, agreeing, in_icarus, on_a_bus, refused
 from proofs.formal.mutants import mutant
 from support.command import run
+from support.nightly import nightly
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.extras import electrical
@@ -34,11 +35,11 @@ CASES = (
     Case("track", f"electrical=3 multiplier=block sincos=yes index=yes index-reset=yes {TRACK}", clocks=20_000),
     Case("s", f"electrical=7 index=yes lead=50clk unit=rpm sincos=yes {SLOW}", edges=60),
     Case("mt", f"electrical=11 index=yes index-once=yes preset=7 {SLOW}", edges=60),
-    Case("m", f"electrical=7 index=yes {SLOW}", swings=True),
+    Case("m", f"electrical=7 index=yes {SLOW}", swings=True, late=True),
     Case("mt", "electrical=18 ppr=97 tick=60clk max-time=300clk index=yes health=yes", swings=True),
-    Case("rairan", f"electrical=21 ppr=5000 index=yes reverse=yes {SLOW}", edges=200),
-    Case("s", f"electrical=21 ppr=5000 electrical-offset=-30deg position-modulo=rev/8 {SLOW}", edges=200),
-    Case("t", f"electrical=7 filter=3clk {SLOW}", clocks=5000),
+    Case("rairan", f"electrical=21 ppr=5000 index=yes reverse=yes {SLOW}", edges=200, late=True),
+    Case("s", f"electrical=21 ppr=5000 electrical-offset=-30deg position-modulo=rev/8 {SLOW}", edges=200, late=True),
+    Case("t", f"electrical=7 filter=3clk {SLOW}", clocks=5000, late=True),
     Case("mt", f"electrical=2 ppr=2 sensor=hall index=yes index-once=yes reverse=yes invert=b {SLOW}", edges=60),
     Case("track", f"electrical=7 ppr=7 sensor=hall lead=1tick {TRACK}", edges=60, clocks=30_000),
 )
@@ -98,12 +99,14 @@ FAULTS = (
 )
 
 
+@nightly
 @pytest.mark.parametrize(("text", "wrong", "case"), FAULTS)
 def test_wrong_gates_are_seen(text: str, wrong: str, case: int) -> None:
     with mutant(electrical.Gates, text, wrong):
         assert lockstep(CASES[case].spec, CASES[case].trace(), PySim()).n_mismatches
 
 
+@nightly
 def test_a_wrong_limit_of_a_silence_is_seen() -> None:
     """In slow swings, places wait for a count at all distances from the edge."""
     texts = {"lines": "100", "clock": "2MHz", "tick": "250us", "max-time": "40ms", "electrical": "7"}
@@ -155,9 +158,15 @@ def is_exact(gates: Any) -> bool:
 
 def test_gates_add_counts_exactly() -> None:
     assert is_exact(electrical.Gates)
-    for right, wrong in (("up.eq(left + remainder)", "up.eq(left)"), ("(step[0] & carry)", "step[0]")):
-        with mutant(electrical.Gates, right, wrong):
-            assert not is_exact(electrical.Gates)
+
+
+@nightly
+@pytest.mark.parametrize(
+    ("right", "wrong"), [("up.eq(left + remainder)", "up.eq(left)"), ("(step[0] & carry)", "step[0]")]
+)
+def test_gates_that_add_inexactly_are_seen(right: str, wrong: str) -> None:
+    with mutant(electrical.Gates, right, wrong):
+        assert not is_exact(electrical.Gates)
 
 
 def errors(method: str, motion: str, words: dict[str, str], first: int, disc: VirtualEncoder | None = None) -> Any:

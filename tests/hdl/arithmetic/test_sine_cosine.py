@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from proofs.formal.mutants import mutant
+from support.nightly import nightly
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.arithmetic import sine_cosine as sine_cosine_gates
@@ -36,6 +37,7 @@ def test_gates_agree() -> None:
     assert agrees(SineCosine())
 
 
+@nightly
 @pytest.mark.parametrize("right", ["of_x, y + of_x", "quadrant[0] ^ quadrant[1]", "first < 0, START"])
 def test_wrong_gates_are_seen(right: str) -> None:
     wrong = right.replace("of_x, y + of_x", "of_x, y").replace("^", "&").replace("<", ">")

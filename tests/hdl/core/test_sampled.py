@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from amaranth import Module
-from support.nightly import only
+from support.nightly import nightly, only
 from support.verilog import smoke
 
 from tachometry.hdl.front_end import sampled_position
@@ -107,6 +107,7 @@ def test_after_the_maximum_time_the_next_read_is_absolute() -> None:
     assert run.ticks.pulse_count.sum() == 17 + 1
 
 
+@nightly
 @pytest.mark.parametrize(
     ("old", "new"),
     [

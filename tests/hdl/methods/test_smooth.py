@@ -10,6 +10,7 @@ from amaranth import Module, Signal
 from amaranth.sim import Simulator
 from extras.harness import Case
 from support.axes import motions
+from support.nightly import nightly
 from support.tracking import Interpreter, core, windows
 from support.verilog import run_in_icarus
 
@@ -32,7 +33,7 @@ TICK, QUICK = "tick=2000clk max-time=8000clk", "tick=400clk max-time=8000clk"
 CASES = (
     Case("track", f"smooth=yes {TICK}", edges=200, clocks=60_000),
     Case("track", f"smooth=yes multiplier=block unit=rpm lowpass=200Hz {TICK}", edges=200, clocks=60_000),
-    Case("track", f"smooth=yes multiplier=block unit=count/tick velocity-width=12 {QUICK}", edges=200, clocks=60_000),
+    Case("track", f"smooth=yes multiplier=block unit=count/tick velocity-width=12 {QUICK}", edges=200, clocks=30_000),
 )
 
 
@@ -99,6 +100,7 @@ def test_the_program_agrees_with_the_golden_model(multiplier: str) -> None:
     assert not differs(core(smooth="yes", tick="100us", max_speed="1000rad/s", multiplier=multiplier))
 
 
+@nightly
 @pytest.mark.parametrize(("text", "wrong"), FAULTS)
 def test_a_wrong_program_is_seen(text: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assert LISTING.count(text) == 1
@@ -109,6 +111,7 @@ def test_a_wrong_program_is_seen(text: str, wrong: str, monkeypatch: pytest.Monk
     tracking_code._longest.cache_clear()
 
 
+@nightly
 def test_wrong_gates_are_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(track, "delay_of", lambda shown, time_bits: shown)
     assert lockstep(CASES[2].spec, CASES[2].trace(), Cxxrtl()).n_mismatches

@@ -79,8 +79,8 @@ def slow(method: str) -> tuple[TachometerSpec, PinTrace]:
     return slow_shaft("s", tick="5ms", **{"max-time": "50ms"}) if method == "long" else slow_shaft(method)
 
 
-# The divider of S, long ticks, and a machine that goes on alone; a timer is in the core below.
-@pytest.mark.parametrize("method", only(["s", "track", "long"], [*METHODS, "long"]))
+# The divider of S, and long ticks; a timer is in the core below.
+@pytest.mark.parametrize("method", only(["s", "long"], [*METHODS, "long"]))
 def test_slow_shafts(method: str) -> None:
     """Nearly all of their clocks are skipped."""
     assert check(*slow(method)) > 0.8

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.nightly import nightly
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress_of
@@ -41,6 +42,7 @@ def test_sixty_four_axes() -> None:
     check(4, Cxxrtl(), 1)
 
 
+@nightly
 def test_no_memory_of_five_tracked_axes_is_read_behind_its_end() -> None:
     """Compiled, that would end the process."""
     words = next(words for words in AXES if words[1] == "track" and "5" in words)
