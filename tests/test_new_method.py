@@ -99,10 +99,10 @@ def test_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
         assert "--doubled / --no-doubled Everything is measured twice, which changes nothing." in text
         assert "[default: no-doubled]" in text
     if command not in ("compare", "verify", "sweep"):
-        assert "[auto|s|m|t|mt|rairan|track|x]" in text
+        assert f"[auto|{'|'.join(METHODS)}]" in text
         assert "x does what m does" in text
     if command == "verify":
-        assert "They are s, m, t, mt, rairan, track, x." in text
+        assert f"They are {', '.join(METHODS)}." in text
 
 
 def test_generate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -47,7 +47,7 @@ FASTEST = {
 
 @cache
 def made(method: str, bus: str = "none") -> dict[str, str]:
-    spec = of_texts(method, had_by(method, BASE | CASES[method]))
+    spec = of_texts(method, had_by(method, BASE | CASES.get(method, {})))
     return export(spec, "spindle", bus, 100_000 if bus == "uart" else None)
 
 
