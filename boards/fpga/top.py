@@ -23,7 +23,7 @@ _SHARED = {"spi_miso": "spi_cs_n"}  # outputs that are only driven while an inpu
 
 
 def component(spec: TachometerSpec | LoopSpec, bus: Bus) -> wiring.Component:
-    """Return what is put on boards."""
+    """Return the component that is put on boards."""
     return Demo(demo_map(spec), bus)
 
 

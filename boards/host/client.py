@@ -11,7 +11,7 @@ Write = Callable[[int, int], None]
 
 
 class WrongBoard(ValueError):
-    """Tells that another core answers than that of the manifest."""
+    """Another core answers than that of the manifest."""
 
 
 class Client:

@@ -13,7 +13,7 @@ _BUSY = frozenset((errno.EAGAIN, errno.EBUSY))
 
 
 class Unplugged(OSError):
-    """Tells that the port of this name is not there, for now."""
+    """The port of this name is not there, for now."""
 
     def __init__(self, name: str, why: str) -> None:
         super().__init__(f"{name}: {why}")
@@ -51,7 +51,7 @@ class SerialPort:
         self.close()
 
     def read(self, size: int = 1, /) -> bytes:
-        """Return what is there; if there is nothing, what comes first within a short time."""
+        """Return the bytes received; if there are none, the first ones within a short time."""
         with _told(self.name):
             return bytes(self._port.read(max(1, min(size, self._port.in_waiting))))
 

@@ -26,7 +26,7 @@ class ClosablePort(Port, Protocol):
 
 
 class ForeignDevice(ValueError):
-    """Tells that a device speaks at the port, but not as a tachometer."""
+    """A device sends at the port, but not as a tachometer."""
 
 
 @dataclass(frozen=True)

@@ -67,7 +67,7 @@ class _Commands(click.Group):
 
 
 class Refused(Exception):
-    """Tells the user, by its message, that a request cannot be met."""
+    """A request cannot be met; the message is for the user."""
 
 
 @click.group(

@@ -85,7 +85,7 @@ class Live:
         }
 
     def frames(self, session: str, since: str) -> Answer:
-        """Return what has come after a time of the board, in seconds, and how it is."""
+        """Return the frames after a time of the board, in seconds, and the state of the session."""
         with refusals():
             return self._of(session).news(float(since))
 

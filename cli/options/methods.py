@@ -49,7 +49,7 @@ def shown_name(name: str, spec: TachometerSpec) -> str:
 
 
 def listed_methods(text: str, others: Collection[str] = ()) -> list[tuple[str, str | None, Texts]]:
-    """Return what is in a list with commas: each with its method, None of `others`, and what is given of its options.
+    """Return the members of a list with commas: each with its method, None of `others`, and its options as given.
 
     It raises ValueError if a name is not known.
     """

@@ -32,7 +32,7 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 def message_of(error: ValueError) -> str:
-    """Return what is wrong, with the option in place of a parameter: "--max-time, in ticks, must be …"."""
+    """Return the message of an error, with the option in place of a parameter: "--max-time, in ticks, must be …"."""
     if not isinstance(error, ParameterError):
         return str(error)
     name, _, part = error.parameter.partition(" ")

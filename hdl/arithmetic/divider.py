@@ -122,7 +122,7 @@ class Divider(wiring.Component):
 
     @property
     def _dividend(self) -> Value:
-        """Return what is divided, but for `addend` and what lies below."""
+        """Return the dividend without `addend` and the bits below it."""
         above = self._above
         if not self._nearest:
             return self.dividend

@@ -136,5 +136,5 @@ class HasIdle(Protocol):
 
 
 def idle_of(boxes: Mapping[str, object]) -> tuple[Idle, ...]:
-    """Return what may be skipped in boxes within a box, by their names."""
+    """Return the counters that may be skipped in boxes within a box, by the names of the boxes."""
     return tuple(one.within(name) for name, box in boxes.items() if isinstance(box, HasIdle) for one in box.idle)

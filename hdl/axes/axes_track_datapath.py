@@ -22,13 +22,13 @@ from tachometry.spec.methods.track_axis import TrackAxis
 
 
 def tick_layout(axis: TrackAxis) -> data.StructLayout:
-    """Return what is new with the tick of an axis."""
+    """Return the values that are new with the tick of an axis."""
     shapes = {"pulse_count": signed(axis.widths.count), "position": signed(axis.position_width)}
     return data.StructLayout({**shapes, "overflow": 1})
 
 
 def kept_layout(axis: TrackAxis) -> data.StructLayout:
-    """Return what is kept of an axis from turn to turn: its position, and the time since its last count."""
+    """Return the values of an axis between two turns: its position, and the time since its last count."""
     most = axis.timing.max_ticks
     shapes = {"position": signed(axis.position_width), "elapsed": range(most + 1), "counted": 1}
     return data.StructLayout(shapes)
@@ -120,7 +120,7 @@ class AxesTrackDatapath(wiring.Component):
         return self._held(m, write.en, of_axis, after, counts, found)
 
     def _added(self, m: Module, kept: data.View, known: data.View) -> tuple[data.View, Sequence[Value]]:
-        """Return what is kept of an axis from this turn on, and its counts of the tick with their overflow."""
+        """Return the values to keep of an axis from this turn on, and its counts of the tick with their overflow."""
         axis, most = self._axis, self._axis.timing.max_ticks
         before = Signal(kept_layout(axis))
         after = Signal(kept_layout(axis))

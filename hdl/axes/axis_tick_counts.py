@@ -14,7 +14,7 @@ BLOCK: Mapping[str, str | int] = {"ram_style": "block", "no_rw_check": 1}
 
 
 def counts_layout(form: Tracking) -> data.StructLayout:
-    """Return what is added up in a tick, as `TickCounts` says; `end` is the position modulo 4."""
+    """Return the sums of a tick, see `TickCounts`; `end` is the position modulo 4."""
     return data.StructLayout(
         {
             "number": form.number_bits,

@@ -146,7 +146,7 @@ def _shapes(fields: Iterable[Field]) -> dict[str, tuple[Shape, int]]:
 
 
 def _held(m: Module, field: Field, given: Value) -> Value:
-    """Return what is written, held within what the field can have."""
+    """Return a written value, held within the limits of the field."""
     assert field.least is not None
     assert field.most is not None
     word = given.as_signed() if field.signed else given

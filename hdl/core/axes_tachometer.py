@@ -119,7 +119,7 @@ class AxesTachometer(wiring.Component):
         self._show(m, INDEX, index.index_valid, "index_axis", index.axis, index)
 
     def _looks(self, m: Module, levels: _Values) -> tuple[_Values, _Values, _Values]:
-        """Return of the axis whose slot it is its place in the tick, its levels, and whether they are known by then."""
+        """Return place in the tick and levels of the axis whose slot it is, and whether these are known by then."""
         rounds = self.rounds
         level = {name: of_slot(value, rounds.slot) for name, value in levels.items()}
         names = ("slot", "first", "last", "ready")

@@ -102,7 +102,7 @@ class Gates(wiring.Component):
         return m
 
     def _awaited(self, m: Module, reached: Signal) -> Awaited:
-        """Return what is awaited in this clock."""
+        """Return the positions that are awaited in this clock."""
         (step,) = delay(m, self.step, clocks=self._latency)
         return self._listed(m, step, reached) if self._compare.depth else self._computed(m, step)
 
@@ -114,7 +114,7 @@ class Gates(wiring.Component):
         return step[0] & (back == (direction == BACKWARD)) & (self.position == awaited)
 
     def _computed(self, m: Module, step: Value) -> Awaited:
-        """Return what is awaited of positions that lie equally apart."""
+        """Return the awaited one of positions that lie equally apart."""
         compare, back = self._compare, step[1]
         aims = self._aims
         # Positions that end do not wrap, and the one behind the last needs another bit where all are compared.
@@ -145,7 +145,7 @@ class Gates(wiring.Component):
         return here, self._at(step, here) & Mux(back, behind, left), moves
 
     def _listed(self, m: Module, step: Value, reached: Signal) -> Awaited:
-        """Return what is awaited of a list."""
+        """Return the awaited position of a list."""
         fifo = SyncFIFOBuffered(width=len(self.position), depth=self._compare.depth)
         m.submodules.fifo = ResetInserter(self.position_compare_clear)(fifo)
         m.d.comb += [

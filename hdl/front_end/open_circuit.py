@@ -8,7 +8,7 @@ from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
 
 
 class OpenCircuit(wiring.Component):
-    """Tells that a line has equalled its complement for longer than `clocks`, once until they differ again.
+    """Pulse when a line has equalled its complement for longer than `clocks`, once until they differ again.
 
     - `equal`: The line equals its complement.
     - `clear`: What lasts is told again.

@@ -8,7 +8,7 @@ from tachometry.hdl.wires.delay import delay
 
 
 class PinRise(wiring.Component):
-    """Tells that an input rises, or that a program asks for what that does.
+    """Pulse when an input rises, or when a program asks for the same.
 
     Latency: if `level` rises in clock c, `rises` is high in clock c + `latency` - 1, in which the position takes the
     step of clock c. What is asked for is told at once.

@@ -123,7 +123,7 @@ class QuotientVelocity(wiring.Component):
         return measuring, forced, beyond
 
     def _too_far(self, m: Module) -> Value:
-        """Tell, while a distance is divided, whether it is more than the divider takes.
+        """Return whether the distance that is divided is more than the divider takes.
 
         Only with a greatest speed is the divider so narrow; a way that it does not take is too fast in any time.
         """

@@ -142,7 +142,7 @@ class RairanCounters(wiring.Component):
             m.d.sync += [c_dt.eq(0), self.rest.eq(0)]
 
     def _at_end(self, m: Module, value: Value) -> Value:
-        """Return what is asked at an end of dt without a count, from a register.
+        """Return a condition, asked at an end of dt without a count, from a register.
 
         What it depends on has then been the same for a clock at least: another end of dt, or a count that opened a
         window, is a dt ago; and a count that opens none finds and leaves a Cdt of 0, and makes several of one.

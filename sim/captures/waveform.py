@@ -160,7 +160,7 @@ class Changes:
 
 
 def _default(names: Mapping[int, str], a: Channel | None, b: Channel | None) -> tuple[Channel | None, Channel | None]:
-    """Return what is not given, by the last part of the name, where that is unique."""
+    """Return A and B; one that is not given by the last part of its name, where that is unique."""
 
     def only(line: str) -> int | None:
         alike = [number for number, name in names.items() if name.rpartition(".")[2].casefold() == line]

@@ -10,7 +10,7 @@ from tachometry.spec import CoreSpec, Port
 
 
 class Interrupted(KeyboardInterrupt):
-    """Tells of Ctrl-C in a simulation; `run` is what was simulated before, its `n_clocks` those that were done."""
+    """Ctrl-C in a simulation; `run` is the part simulated before, `n_clocks` long."""
 
     def __init__(self, run: Run) -> None:
         super().__init__()

@@ -61,7 +61,7 @@ class Generator:
         self._swings = False
 
     def command(self, enable: bool = True) -> Command:
-        """Return what is commanded."""
+        """Return the present command."""
         form = self._form
         wide = form.place_width
         place = (self.place + (1 << (wide - 1))) % (1 << wide) - (1 << (wide - 1))
@@ -97,7 +97,7 @@ class Generator:
 
 
 def generated(form: GeneratorForm, positions: Iterable[int], demands: Iterable[Demand]) -> list[Command]:
-    """Return what is commanded in each control tick, from the positions and demands in them."""
+    """Return the command of each control tick, from its position and demand."""
     generator = Generator(form)
     found = []
     for position, demand in zip(positions, demands, strict=True):

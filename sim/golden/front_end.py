@@ -306,12 +306,12 @@ class _Origins:
         return replace(found, at_index=found.before_reset(steps.index, steps))
 
     def before_reset(self, clock: NDArray[np.int64], steps: Steps) -> NDArray[np.int64]:
-        """Return what is taken off the sum in each of these clocks, with a preset of the clock, but not its index."""
+        """Return the offset to subtract in each of these clocks, with a preset of the clock, but not its index."""
         found: NDArray[np.int64] = self.off[np.searchsorted(self.clock, clock) + np.isin(clock, steps.presets)]
         return found
 
     def after(self, clock: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return what is taken off the sum of the steps up to each of these clocks."""
+        """Return the offset to subtract from the sum of the steps up to each of these clocks."""
         found: NDArray[np.int64] = self.off[np.searchsorted(self.clock, clock, side="right")]
         return found
 
@@ -326,7 +326,7 @@ def positions_at(
 
 
 def homed(spec: TachometerSpec, steps: Steps, clock: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Tell in which clocks `homed` is high: the index was taken since it was let through."""
+    """Return the clocks in which `homed` is high: the index was taken since it was let through."""
     known = np.searchsorted(steps.index + spec.latency.tick, clock, side="right")
     armed = np.searchsorted(steps.arms + spec.latency.tick, clock, side="right")
     return np.append(-1, steps.index)[known] > np.append(-1, steps.arms)[armed]

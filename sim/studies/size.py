@@ -127,7 +127,7 @@ def versions(*others: str) -> dict[str, str]:
 def made(
     files: Mapping[str, str], commands: Sequence[Sequence[str]], results: Sequence[str], tools: Mapping[str, str]
 ) -> list[Any]:
-    """Return what is in the JSON files that commands make of some files; kept, see `sim.build.cached`.
+    """Return the content of the JSON files that commands make of some files; kept, see `sim.build.cached`.
 
     It raises RuntimeError if a command fails.
     """

@@ -47,7 +47,7 @@ class Make:
 
 @dataclass(frozen=True)
 class Checked:
-    """Tells what was found of a core."""
+    """Results of the check of a core."""
 
     manifest: Path
     # what was found of each file, and where it differs first, or ""
@@ -191,7 +191,7 @@ def _as_of(file: str, text: str, written: Mapping[str, Any]) -> str:
 
 
 def _compared(there: str, text: str | None, module: str | None) -> tuple[str, str]:
-    """Return what is found of the content of a file; Verilog of a module may be other text for the same core."""
+    """Return the verdict on the content of a file; Verilog of a module may be other text for the same core."""
     if not there:
         return MISSING, ""
     if text in (None, there):

@@ -72,7 +72,7 @@ def _levels(port: Port, rng: np.random.Generator, n: int) -> IntArray:
 
 
 def _held(inputs: dict[str, IntArray]) -> dict[str, IntArray]:
-    """Return what is taken where inputs are frozen now and then."""
+    """Return the values that are taken where inputs are frozen now and then."""
     freeze = inputs.get("freeze")
     if freeze is None:
         return {}

@@ -35,7 +35,7 @@ def parameters_of(spec: Core) -> dict[str, Any]:
 
 
 def written(part: Any, spec: Core) -> dict[str, str]:
-    """Return what is asked for in the fields of a part of a core, or of the core itself, as texts by option names."""
+    """Return the options that a part of a core, or the core itself, has beyond defaults, as texts by their names."""
     fitting = {about.field: about for about in reversed(options_of(type(part))) if about.fits_in(spec)}
     found = {}
     for about in reversed(fitting.values()):

@@ -49,7 +49,7 @@ def fixed_log(value: float) -> int:
 
 
 def greatest_acceleration(counts_per_rev: Fraction | int) -> float:
-    """Return in rad/s² what fits the word of the acceleration: less if counts are finer, for the sake of the LSB."""
+    """Return the greatest acceleration of the word, in rad/s²: less if counts are finer, for the sake of the LSB."""
     return 110_000 / math.sqrt(max(counts_per_rev / 2000, 1))
 
 

@@ -64,7 +64,7 @@ class VelocityOutput:
         return self._constant[1]
 
     def rounding(self, towards: int = 0) -> int:
-        """Return what is added before these bits are dropped: to round to the nearest (0), down (−1) or up (1).
+        """Return the constant added before these bits are dropped, to round to the nearest (0), down (−1) or up (1).
 
         Down and up allow for the greatest error of the rounded multiplier, so that the result is a bound.
         """

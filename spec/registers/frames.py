@@ -47,7 +47,7 @@ TELEMETRY_HEADER = 1 << FROM_CORE | Type.TELEMETRY << TYPE_LOW
 
 
 class FrameError(ValueError):
-    """Tells that no frame came, or not the one that was expected."""
+    """No frame came, or not the one that was expected."""
 
 
 @dataclass(frozen=True)

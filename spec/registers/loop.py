@@ -121,7 +121,7 @@ def _field(port: Port) -> Field:
 
 
 def _ranged(field: Field) -> Field:
-    """Return what is written is held within what there are bits for."""
+    """Return the field with the limits of its bits, to which a write is held."""
     most = (1 << (field.kept - field.signed)) - 1
     return replace(field, least=-most - 1 if field.signed else 0, most=most)
 

@@ -221,7 +221,7 @@ def outcome(line: str) -> tuple[int, str, str]:
 
 
 def wrong(row: Row, folder: Path, before: dict[str, tuple[int, int]]) -> str | None:
-    """Return what is wrong with what a row does; `before` are the contents of the folder."""
+    """Return the fault in the outcome of a row; `before` are the contents of the folder."""
     code, out, err = outcome(row.line)
     told = err.removesuffix("\n")
     if (code, out) != (2, "") or not told.startswith("tachometry: error: ") or not told.isprintable():

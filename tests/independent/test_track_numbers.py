@@ -54,7 +54,7 @@ def test_a_silence_of_the_maximum_time_is_a_rest_and_one_of_100_ms_is_forgotten(
 
 
 def beside(golden: Found, described: Found, edges: list[int], memory: int) -> list[tuple[float, ...]]:
-    """Return in every tick velocity and its deviation, in counts per tick; by the rules the latter lacks its factor."""
+    """Return velocity and deviation of every tick, in counts per tick; by the rules the latter lacks its factor."""
     words = {"max-memory": f"{memory}clk"}
     latency, updates = described(WORDS | words)["latency_cycles"], shown(golden, words, edges, edges[-1])
     counts: list[list[tuple[int, int]]] = [[] for _ in range(len(updates) + 1)]

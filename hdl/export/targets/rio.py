@@ -130,7 +130,7 @@ def _events(alone: TachometerSpec) -> dict[str, str]:
 
 
 def _counted(spec: CoreSpec) -> dict[str, str]:
-    """Return what is counted, by the names in the frame, and when it happens, in Verilog."""
+    """Return the events that are counted, by the names in the frame, each as a condition in Verilog."""
     events = {event: _EVENTS[event] for event in _events(spec.tachometer)}
     events |= {"indexes": INDEX} if spec.tachometer.index else {}
     if spec.axes is None:

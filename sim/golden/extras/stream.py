@@ -60,7 +60,7 @@ def shown(
 def records(
     spec: TachometerSpec, trace: PinTrace, steps: Steps, tables: Mapping[str, Table]
 ) -> tuple[Ints, NDArray[np.void]]:
-    """Return what is sent.
+    """Return the records that are sent.
 
     - `steps`: Those of the trace.
     - `tables`: `sim.golden.tables` of them.

@@ -28,7 +28,7 @@ class Counts:
 
     @classmethod
     def of(cls, spec: TimedTachometer, ticks: Table, steps: Steps, n_clocks: int) -> "Counts":
-        """Return the counts that the datapath sees within `n_clocks`: steps, or ticks that are not empty."""
+        """Return the steps that the datapath counts within `n_clocks`, or the ticks that are not empty."""
         if spec.form.on_lattice:
             period = np.flatnonzero(ticks.pulse_count)
             return cls(period, ticks.pulse_count[period], 0 * period, ticks.clock, len(ticks.clock))

@@ -41,7 +41,7 @@ class Windows:
 
     @classmethod
     def of(cls, steps: Steps, last: NDArray[np.int64], most: int, begin: int = -1, place: int = 0) -> "Windows":
-        """Return the counts of windows that end with the clocks `last`, of which an event takes `most`.
+        """Return every count of windows that end with the clocks `last`, of which an event takes `most`.
 
         The first window comes after the clock `begin`, which ends at the position `place`.
         """

@@ -352,7 +352,7 @@ class Recursion:
         return self._emit(0, self.p, 0)
 
     def _emit(self, velocity: int, place: int | None = None, least: int = 1) -> Row:
-        """Return what is shown, with a deviation of at least so many LSB."""
+        """Return the outputs of an update, with a deviation of at least `least` LSB."""
         k, place = self._k, self._place if place is None else place
         shown = self._product(velocity, k["tick"], "shown")
         more = max(self.trouble + k["log_9_4"], 0) + k["log_8"]

@@ -87,7 +87,7 @@ class Stream(Extra):
         }
 
     def parts(self, spec: Numbers) -> tuple[Part, ...]:
-        """Return what is in a record, without gaps: behind time and flags the numbers of two words come first."""
+        """Return the fields of a record, without gaps: behind time and flags the numbers of two words come first."""
         found = [Part("time", 32, 0, signed=False), Part("flags", 32, _WORD, signed=False)]
         more = [(port.name, port.width) for port in spec.method_ports if port.name in _FINE]
         more = [("position", spec.position_width), ("velocity", spec.velocity.width), *more]

@@ -288,7 +288,7 @@ def test_every_configuration_is_as_generated(method: str, generated: Generated) 
 
 
 def kind(path: Path) -> str:
-    """Return what is the same in the names of files of one kind."""
+    """Return the name that files of one kind share."""
     return re.sub("core", "NAME", path.name)
 
 

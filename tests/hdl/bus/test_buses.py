@@ -146,7 +146,7 @@ def write_design(folder: Path) -> None:
 
 
 def play(folder: Path, simulator: str, seed: int, number: int, clocks_each: int) -> dict[str, str]:
-    """Return what is wrong on each bus after so many accesses, each with about so many clocks."""
+    """Return the fault on each bus after `number` accesses, each with about `clocks_each` clocks."""
     n_clocks = number * clocks_each
     trace, captures = motion(seed, n_clocks)
     plans = {bus: plan(seed, bus, number) for bus in NAMES}

@@ -17,7 +17,7 @@ from tachometry.spec.core.index import Index
 
 
 def definition(levels: list[int], clocks: int) -> tuple[list[int], int]:
-    """Return what is believed in the clock after each, and how many levels went back.
+    """Return the level believed in the clock after each, and how many levels went back.
 
     −1 stands for nothing: no level has held long enough yet.
     """

@@ -56,7 +56,7 @@ def expected(counts: Mapping[int, int], lengths: list[int]) -> list[dict[str, in
 
 
 def run(form: Tracking, counts: Mapping[int, int], lengths: list[int]) -> list[dict[str, int]]:
-    """Return what is shown two clocks after each tick, and until the next ends."""
+    """Return the outputs two clocks after each tick, and until the next ends."""
     ends = (np.cumsum(lengths) - 1).tolist()
     rows = [{"tick": 0, "step": counts.get(clock, 0)} for clock in range(ends[-1] + 3)]
     for end in ends:
@@ -83,7 +83,7 @@ def check(counts: Mapping[int, int], lengths: list[int], form: Tracking = FORM) 
 
 
 def third(*counts: tuple[int, int]) -> dict[str, int]:
-    """Return what is shown of these counts of the third tick, behind two with one each."""
+    """Return the outputs for these counts of the third tick, behind two with one each."""
     return check({3: 1, T + 3: 1} | {2 * T + clock: step for clock, step in counts}, [T] * 4)[2]
 
 

@@ -41,13 +41,13 @@ def _from(trace: PinTrace, clock: int) -> PinTrace:
 
 
 def _columns(spec: AxesSpec) -> list[tuple[str, str]]:
-    """Return what is compared, and the strobe with which it is."""
+    """Return the outputs to compare, each with its strobe."""
     found = [(name, strobe) for strobe, names in spec.ports.strobes.items() for name in (strobe, *names)]
     return [(name, strobe) for name, strobe in found if not name.startswith(_OF_POSITION)]
 
 
 def _dense(spec: AxesSpec, run: Run, first: int) -> NDArray[np.int64]:
-    """Return what is shown in every clock, with its strobe, else 0; the run begins in clock `first`."""
+    """Return the outputs in every clock with their strobe, else 0; the run begins in clock `first`."""
     found = np.zeros((first + run.n_clocks, len(_columns(spec))), dtype=np.int64)
     for place, (name, strobe) in enumerate(_columns(spec)):
         table = run.tables[strobe]

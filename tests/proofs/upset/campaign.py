@@ -85,7 +85,7 @@ def motion(spec: TachometerSpec, n_cycles: int, seed: int) -> PinTrace:
 
 
 def dense(spec: TachometerSpec, run: Run) -> dict[str, NDArray[np.int64]]:
-    """Return what is shown in every clock, by output; shape (n_clocks,).
+    """Return the value of each output in every clock; shape (n_clocks,).
 
     The age is that of the clocks of ticks, 0 in others.
     """

@@ -39,7 +39,7 @@ def spec_of(method: str) -> TachometerSpec:
 
 
 def speeds() -> list[float]:
-    """Return in counts per tick, from 1/100 to 20, none of them special, some close to multiples."""
+    """Return speeds in counts per tick, from 1/100 to 20, none of them special, some close to multiples."""
     near = [k + d for k in (1, 2, 7) for d in (-0.013, 0.003, 0.029)]
     return [*(10 ** np.random.default_rng(5).uniform(-2, 1.3, 40)).tolist(), *near]
 

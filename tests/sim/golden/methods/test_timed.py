@@ -46,7 +46,7 @@ def test_a_stop_is_seen() -> None:
 
 
 def counting(n_ticks: int, tick: int, gap: int) -> PinTrace:
-    """Return steady counts, and external ticks."""
+    """Return a trace of steady counts and external ticks."""
     clock = np.arange(0, n_ticks * tick, gap)
     level = quadrature(np.arange(len(clock)))
     trace = PinTrace(clock, level & np.uint8(1), level >> np.uint8(1), n_ticks * tick)

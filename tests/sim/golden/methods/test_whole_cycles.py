@@ -30,7 +30,7 @@ def random_counts(n: int, seed: int) -> tuple[Ints, Ints]:
 
 
 def windows(spec: MTTachometer, clock: Ints, step: Ints) -> tuple[Ints, Ints]:
-    """Return which counts open and close the measurements of the golden model."""
+    """Return which of the counts open and close the measurements of the golden model."""
     none, n_clocks = np.empty(0, np.int64), int(clock[-1]) + 10 * TICK
     tick = np.arange(TICK - 1, n_clocks, TICK)
     ticks = Table(tick + spec.latency.tick, {"pulse_count": np.zeros(len(tick), np.int64)})

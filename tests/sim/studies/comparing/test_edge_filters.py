@@ -18,7 +18,7 @@ COUNT = 2 * math.pi / CPR
 
 
 def edges_of(motion: str) -> tuple[Steps, FloatArray, FloatArray]:
-    """Return what is counted, and stamps (s) and places of the edges."""
+    """Return the steps, and stamps (s) and places of the edges."""
     recording = record(motion, pulses_per_rev=CPR // 4, jitter=0.05, seed=3).recording
     steps = Steps.of_recording(recording, CPR)
     stamp, place = np.floor(steps.time * 1e6 + 1e-6) * 1e-6, np.cumsum(steps.step) - steps.step / 2
