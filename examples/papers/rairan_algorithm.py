@@ -3,14 +3,15 @@
 import numpy as np
 
 from papers.lab import Lab
-from papers.result import Claim, Curve, Panel, Result
-from tachometry.sim.theory.rairan import (
+from papers.rairan_equations import (
+    Row,
     rairan_eq01_update_time,
     rairan_eq03_error,
     rairan_eq04_max_error,
-    rairan_update_time,
+    table1_rows,
 )
-from tachometry.sim.theory.table1 import Row, table1_rows
+from papers.result import Claim, Curve, Panel, Result
+from tachometry.sim.theory.rairan import rairan_update_time
 
 _DT = 1000  # ts
 

@@ -7,19 +7,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from papers.lab import Lab
-from papers.result import Claim, Curve, Panel, Result
-from tachometry.sim.encoder.motion import FloatArray
-from tachometry.sim.encoder.virtual import Encoding
-from tachometry.sim.signals.run import Run
-from tachometry.sim.theory.rairan import (
+from papers.rairan_equations import (
     rairan_eq04_max_error,
-    rairan_eq05_n2,
     rairan_eq08_sup_error,
-    rairan_eq11_n3,
     rairan_eq13_max_error,
     rairan_eq14_max_acceleration,
     rairan_speed_limit,
 )
+from papers.result import Claim, Curve, Panel, Result
+from tachometry.sim.encoder.motion import FloatArray
+from tachometry.sim.encoder.virtual import Encoding
+from tachometry.sim.signals.run import Run
+from tachometry.sim.theory.rairan import rairan_eq05_n2, rairan_eq11_n3
 from tachometry.spec import Encoder, RairanTachometer, Speed, Timing
 
 _TURN = 2 * math.pi

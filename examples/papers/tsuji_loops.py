@@ -11,7 +11,7 @@ from papers.result import Claim, Curve, Panel, Result
 from tachometry.sim.encoder.motion import FloatArray, cos2pi, parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines.loop import Gains, Log, Motor, Observer
-from tachometry.sim.studies.loops.control import Command, Load, Setting, Task, as_shown, each_seed, mean
+from tachometry.sim.studies.loops.control import Command, Load, Setting, Task, each_seed, mean
 from tachometry.spec import Encoder, MTachometer, MTTachometer, STachometer, TachometerSpec, Timing
 
 _LINES = 500
@@ -26,6 +26,17 @@ _TIME, _SPEED = "time (s)", "velocity (rad/s)"
 _COUNT = 2 * math.pi / _LINES  # rad, of the figures with single decoding
 _KVS = (10.0, 25.0, 50.0, 75.0, 100.0, 150.0)  # 1/s
 _FEW_KVS = (10.0, 50.0)
+
+
+def as_shown(log: Log, rad_per_count: float, rate: float = 30.0, period: float = 1e-3) -> FloatArray:
+    """Return the speed by the M method every `period`, low-pass filtered at `rate` rad/s, as in Figs. 13 and 14."""
+    every = round(period / (log["time"][1] - log["time"][0]))
+    measured = np.diff(log["position"][::every], prepend=0.0) * rad_per_count / period
+    kept, found, state = math.exp(-rate * period), [], 0.0
+    for value in measured.tolist():
+        state = value + (state - value) * kept
+        found.append(state)
+    return np.array(found)
 
 
 def _core(method: type[TachometerSpec], *, decoding: int, tick: str, **options: Any) -> TachometerSpec:

@@ -15,6 +15,7 @@ import pytest
 from papers import FIGURES, LOOPS, tsuji_loops
 from papers.__main__ import main
 from papers.lab import Lab
+from papers.rairan_equations import Row, table1_rows
 from papers.result import Result
 from support import docs
 from support.nightly import only
@@ -24,7 +25,6 @@ from tachometry.sim.golden.methods import m as m_method
 from tachometry.sim.golden.quotient import round_quotient
 from tachometry.sim.signals.run import Run
 from tachometry.sim.theory.performance import Performance
-from tachometry.sim.theory.table1 import Row, table1_rows
 from tachometry.spec import MTachometer, STachometer, TachometerSpec
 
 DOCS = docs.page("measured/figures.md")
@@ -133,7 +133,7 @@ def test_every_claim_can_be_refuted(name: str, monkeypatch: pytest.MonkeyPatch) 
         refute(WrongLab(hdl=False))
     lab = Remembering()
     for what, right in list(vars(module).items()):
-        if isinstance(right, FunctionType) and right.__module__.startswith("tachometry.sim.theory"):
+        if isinstance(right, FunctionType) and right.__module__.startswith(("tachometry.sim.theory", "papers.rairan")):
             for factor in (3, 1 / 3):
                 if left:
                     wrong = wrong_table(factor) if right is table1_rows else wrong_equation(right, factor)

@@ -156,17 +156,6 @@ def _dip(log: Log, load: Load) -> float:
     return float(np.abs(during - (before.mean() if len(before) else 0.0)).max())
 
 
-def as_shown(log: Log, rad_per_count: float, rate: float = 30.0, period: float = 1e-3) -> FloatArray:
-    """Return the speed by the M method every `period`, low-pass filtered at `rate` rad/s, as in Figs. 13 and 14."""
-    every = round(period / (log["time"][1] - log["time"][0]))
-    measured = np.diff(log["position"][::every], prepend=0.0) * rad_per_count / period
-    kept, found, state = math.exp(-rate * period), [], 0.0
-    for value in measured.tolist():
-        state = value + (state - value) * kept
-        found.append(state)
-    return np.array(found)
-
-
 def mean(outcomes: Sequence[Outcome]) -> Outcome:
     """Return the mean of outcomes, but the largest deviation of all."""
     dips = [one.dip for one in outcomes if one.dip is not None]

@@ -8,11 +8,12 @@ from itertools import count, pairwise
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from papers import rairan_equations as paper
+from papers.rairan_equations import table1_rows
 from reference.rairan import table_1
 
 from tachometry.sim.theory import rairan
 from tachometry.sim.theory.checks import Floats
-from tachometry.sim.theory.table1 import table1_rows
 
 DT = 2520  # ts, divisible by 1 to 10
 
@@ -93,8 +94,8 @@ def test_bounds_of_the_errors_are_attained_or_suprema() -> None:
     m = measured()
     n2 = rairan.rairan_eq05_n2(m.n1)
     n3 = rairan.rairan_eq11_n3(m.n1, n2)
-    errors = [rairan.rairan_eq03_error(m.n1, m.speed, 1), 1 - n2 / m.speed, np.abs(n3 - m.speed) / m.speed]
-    bounds = [rairan.rairan_eq04_max_error(m.n1), rairan.rairan_eq08_sup_error(n2), rairan.rairan_eq13_max_error(m.n1)]
+    errors = [paper.rairan_eq03_error(m.n1, m.speed, 1), 1 - n2 / m.speed, np.abs(n3 - m.speed) / m.speed]
+    bounds = [paper.rairan_eq04_max_error(m.n1), paper.rairan_eq08_sup_error(n2), paper.rairan_eq13_max_error(m.n1)]
     attained = [lambda n1: n1 <= 1, lambda n1: n1 >= 1, lambda n1: True]
     for error, bound, is_attained in zip(errors, bounds, attained, strict=True):
         assert np.all(error <= bound * (1 + 1e-12))
@@ -108,43 +109,43 @@ def test_bounds_of_the_errors_are_attained_or_suprema() -> None:
 
 def test_claims_on_the_errors_at_constant_speed() -> None:
     """160 slots, dt = 2 s, 2 and 24 rev/s; every 40th of 160 slots, dt = 1 ms, up to 30 rev/s."""
-    n1 = np.ceil(np.array([2, 24]) / rairan.rairan_speed_limit(160, 2))
+    n1 = np.ceil(np.array([2, 24]) / paper.rairan_speed_limit(160, 2))
     assert n1.tolist() == [640, 7680]
-    percent = 100 * rairan.rairan_eq13_max_error(n1)
+    percent = 100 * paper.rairan_eq13_max_error(n1)
     # The paper has 0.07 for the first, cut off.
     assert percent.tolist() == pytest.approx([0.0782, 0.0065], abs=5e-5)
 
-    limit = rairan.rairan_speed_limit(160 / 40, 1e-3)
+    limit = paper.rairan_speed_limit(160 / 40, 1e-3)
     assert limit == pytest.approx(250)
     n1 = 1 / np.floor(limit / np.linspace(1, 30, 1000))
     # Less than 10 % is true of n3 alone.
-    assert rairan.rairan_eq13_max_error(n1).max() == pytest.approx(1 / 17)
-    assert rairan.rairan_eq08_sup_error(rairan.rairan_eq05_n2(n1)).max() == pytest.approx(1 / 9)
-    assert rairan.rairan_eq04_max_error(n1).max() == pytest.approx(1 / 8)
+    assert paper.rairan_eq13_max_error(n1).max() == pytest.approx(1 / 17)
+    assert paper.rairan_eq08_sup_error(rairan.rairan_eq05_n2(n1)).max() == pytest.approx(1 / 9)
+    assert paper.rairan_eq04_max_error(n1).max() == pytest.approx(1 / 8)
 
 
 def test_claims_on_acceleration() -> None:
     """10,000 pulses, dt = 1 ms: 0.1 rev/s and 50 rev/s²; Fig. 5 has ramps of 8.33 and −12.5 rev/s²."""
     pulses, dt = 10_000, 1e-3
-    limit = float(rairan.rairan_speed_limit(pulses, dt))
+    limit = float(paper.rairan_speed_limit(pulses, dt))
     assert limit == pytest.approx(0.1)
-    assert rairan.rairan_eq14_max_acceleration([2, 3, 100], pulses, dt).tolist() == pytest.approx([50] * 3)
+    assert paper.rairan_eq14_max_acceleration([2, 3, 100], pulses, dt).tolist() == pytest.approx([50] * 3)
     # With 8.33 rev/s² and Ndt1 = 2, the speed changes by 1.5 intervals in the 3 dt of such a window.
-    printed = float(rairan.rairan_eq14_max_acceleration(1 / 2, pulses, dt))
+    printed = float(paper.rairan_eq14_max_acceleration(1 / 2, pulses, dt))
     assert printed == pytest.approx(8.33, abs=5e-3)
     assert printed * 3 * dt / (limit * (1 / 2 - 1 / 3)) == pytest.approx(1.5)
 
 
 def test_arguments_are_broadcast_and_ranges_kept() -> None:
-    assert rairan.rairan_eq03_error(np.array([2, 3]), np.full((4, 1), 1.5), 1).shape == (4, 2)
-    assert rairan.rairan_eq14_max_acceleration(np.array([0.5, 3]), np.full((4, 1), 160), 1).shape == (4, 2)
+    assert paper.rairan_eq03_error(np.array([2, 3]), np.full((4, 1), 1.5), 1).shape == (4, 2)
+    assert paper.rairan_eq14_max_acceleration(np.array([0.5, 3]), np.full((4, 1), 160), 1).shape == (4, 2)
     for call in (
-        lambda: rairan.rairan_speed_limit(160, 0),
+        lambda: paper.rairan_speed_limit(160, 0),
         lambda: rairan.rairan_update_time([1, 0], 1, 1),
-        lambda: rairan.rairan_eq04_max_error([1, 1.5]),
+        lambda: paper.rairan_eq04_max_error([1, 1.5]),
         lambda: rairan.rairan_eq05_n2(0),
-        lambda: rairan.rairan_eq08_sup_error(0.75),
-        lambda: rairan.rairan_eq13_max_error(math.nan),
+        lambda: paper.rairan_eq08_sup_error(0.75),
+        lambda: paper.rairan_eq13_max_error(math.nan),
     ):
         with pytest.raises(ValueError, match="must be"):
             call()
@@ -152,11 +153,11 @@ def test_arguments_are_broadcast_and_ranges_kept() -> None:
 
 def test_printed_form_of_1_against_what_table_1_does() -> None:
     ratio = np.linspace(0.05, 7, 700)
-    printed, exact = (f(ratio, 1, 1) for f in (rairan.rairan_eq01_update_time, rairan.rairan_update_time))
+    printed, exact = (f(ratio, 1, 1) for f in (paper.rairan_eq01_update_time, rairan.rairan_update_time))
     assert np.all(printed >= exact - 1e-12)
     assert (printed / exact).max() == pytest.approx(1.125, abs=1e-3)  # at 1.5
     whole = np.arange(1, 9)
-    np.testing.assert_allclose(rairan.rairan_eq01_update_time(whole, 1, 1), (whole + 1) / whole)
+    np.testing.assert_allclose(paper.rairan_eq01_update_time(whole, 1, 1), (whole + 1) / whole)
 
 
 @pytest.mark.parametrize("dt", [1, 2, 7, 20])

@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from papers.rairan_equations import rairan_eq13_max_error
 from reference.front import Front
 from reference.rairan import estimate, next_k, rairan_updates, table_1
 from reference.sequences import rounded
@@ -15,7 +16,6 @@ from support.rairan import golden_updates, make_spec, random_steps, steps_of
 from tachometry.sim.golden.methods.adaptive import next_shift
 from tachometry.sim.golden.methods.rairan import Model, orbit
 from tachometry.sim.signals.run import Table
-from tachometry.sim.theory.rairan import rairan_eq13_max_error
 from tachometry.spec import RairanTachometer, Speed
 from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.methods.adaptive import AdaptiveDt, parse_target

@@ -9,6 +9,7 @@ import loops
 import numpy as np
 import pytest
 from loops import GAINS, IDEAL, KINDS, MOTOR, REAL, core, is_usable, setting, usable, variants
+from papers.tsuji_loops import as_shown
 from support.nightly import nightly
 
 from tachometry.sim.encoder.motion import parse_motion
@@ -19,7 +20,6 @@ from tachometry.sim.studies.loops.control import (
     Outcome,
     Setting,
     Task,
-    as_shown,
     each_seed,
     mean,
     outcome_of,
