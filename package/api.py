@@ -30,7 +30,7 @@ from tachometry.sim.signals.recording import Recording
 from tachometry.sim.signals.shown import Shown
 from tachometry.sim.studies.comparing.comparison import Comparison, Source, comparison
 from tachometry.sim.studies.plan import Plan, default_range, plan_at
-from tachometry.sim.studies.simulation import Axis, Simulation
+from tachometry.sim.studies.simulation import Axis, Running, Simulation
 from tachometry.sim.studies.simulation import simulate as simulation_of
 from tachometry.spec import METHODS, CoreSpec, TachometerSpec, common_options, of_options, own_options
 from tachometry.spec.control import AnySpec, LoopSpec
@@ -375,18 +375,7 @@ def _recorded(spec: AnySpec, motion: str, axis: int, encoder: Mapping[str, objec
 
 
 def _run(spec: AnySpec, source: str, recordings: list[Recording], truths: list[Encoding] | None, engine: str) -> Run:
-    return Run(
-        simulation_of(
-            _core(spec),
-            source,
-            recordings,
-            truths,
-            engine,
-            window=lambda _, n_clocks: (0, n_clocks),
-            vcd=None,
-            bar=no_bar,
-        )
-    )
+    return Run(simulation_of(_core(spec), source, recordings, truths, Running(engine)))
 
 
 def _core(spec: AnySpec) -> CoreSpec:

@@ -7,18 +7,15 @@ from pathlib import Path
 
 import click
 
-from tachometry.cli.files import Outputs
+from tachometry.cli.commands.simulate import run_core
 from tachometry.cli.options.axes import AXES
 from tachometry.cli.options.capture import CAPTURE_OPTIONS
 from tachometry.cli.options.core import core_options
 from tachometry.cli.options.engine import ENGINE_OPTIONS
 from tachometry.cli.options.option import FilePath, GroupedCommand
-from tachometry.cli.options.outputs import OUTPUT_OPTIONS, refuse_plot, write_outputs
-from tachometry.cli.reports.run import print_simulation
-from tachometry.cli.reports.terminal import progress_bar
+from tachometry.cli.options.outputs import OUTPUT_OPTIONS, outputs_of
 from tachometry.sim.signals.recording import Recording
-from tachometry.sim.studies.simulation import Pulses, Window
-from tachometry.sim.studies.simulation import simulate as simulation_of
+from tachometry.sim.studies.simulation import Running
 from tachometry.spec import CoreSpec
 
 
@@ -43,9 +40,7 @@ def replay(
     capture: Path,
     read: Callable[..., Recording],
     targets: dict[str, Path],
-    engine: str,
-    window: Window,
-    pulses: Pulses,
+    running: Running,
 ) -> int:
     """Run a core on captured encoder signals, against the golden model.
 
@@ -58,20 +53,6 @@ def replay(
     Equal options and captures give
     equal files. Exit status 1 if hardware and golden model differ.
     """
-    outputs = Outputs(targets, inputs=[capture])
-    refuse_plot(spec, targets)
+    outputs = outputs_of(spec, targets, [capture])
     recordings = [read(capture, spec, axis) for axis in range(spec.axes or 1)]
-    with outputs:
-        simulation = simulation_of(
-            spec,
-            str(capture),
-            recordings,
-            None,
-            engine,
-            window=window,
-            vcd=outputs.get("--vcd"),
-            bar=progress_bar,
-            pulses=pulses,
-        )
-        kept = write_outputs(simulation, outputs)
-    return print_simulation(simulation, kept)
+    return run_core(outputs, running, spec, str(capture), recordings)

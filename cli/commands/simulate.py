@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -12,10 +13,12 @@ from tachometry.cli.options.core import core_options
 from tachometry.cli.options.engine import ENGINE_OPTIONS
 from tachometry.cli.options.motion import FORMS, MOTION_OPTIONS, Recorder, shown_in_unit_of
 from tachometry.cli.options.option import GroupedCommand
-from tachometry.cli.options.outputs import OUTPUT_OPTIONS, refuse_plot, write_outputs
+from tachometry.cli.options.outputs import OUTPUT_OPTIONS, outputs_of, write_outputs
 from tachometry.cli.reports.run import print_simulation
 from tachometry.cli.reports.terminal import progress_bar
-from tachometry.sim.studies.simulation import Pulses, Window
+from tachometry.sim.encoder.virtual import Encoding
+from tachometry.sim.signals.recording import Recording
+from tachometry.sim.studies.simulation import Running
 from tachometry.sim.studies.simulation import simulate as simulation_of
 from tachometry.spec import CoreSpec
 
@@ -46,9 +49,7 @@ def simulate(
     record: Recorder,
     tables: list[Path],
     targets: dict[str, Path],
-    engine: str,
-    window: Window,
-    pulses: Pulses,
+    running: Running,
 ) -> int:
     """Run a core on a virtual encoder, against the golden model and the truth.
 
@@ -59,22 +60,24 @@ def simulate(
     Equal options give equal files.
     Exit status 1 if hardware and golden model differ.
     """
-    outputs = Outputs(targets, inputs=tables)
-    refuse_plot(spec, targets)
+    outputs = outputs_of(spec, targets, tables)
     spec = shown_in_unit_of(record.motion, spec)
     truths = [record(spec.tachometer, axis, spec.axes) for axis in range(spec.axes or 1)]
     recordings = [truth.recording for truth in truths]
+    return run_core(outputs, running, spec, "--motion", recordings, truths)
+
+
+def run_core(
+    outputs: Outputs,
+    running: Running,
+    spec: CoreSpec,
+    source: str,
+    recordings: list[Recording],
+    truths: list[Encoding] | None = None,
+) -> int:
+    """Simulate a core, write the outputs, and print the results; return the exit status."""
     with outputs:
-        simulation = simulation_of(
-            spec,
-            "--motion",
-            recordings,
-            truths,
-            engine,
-            window=window,
-            vcd=outputs.get("--vcd"),
-            bar=progress_bar,
-            pulses=pulses,
-        )
+        running = replace(running, vcd=outputs.get("--vcd"), bar=progress_bar)
+        simulation = simulation_of(spec, source, recordings, truths, running)
         kept = write_outputs(simulation, outputs)
     return print_simulation(simulation, kept)

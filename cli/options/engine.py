@@ -7,7 +7,8 @@ import numpy as np
 
 from tachometry.cli.options.option import Group, option
 from tachometry.sim.signals.arrays import Ints
-from tachometry.spec import ParameterError, TachometerSpec
+from tachometry.sim.studies.simulation import Running
+from tachometry.spec import CoreSpec, ParameterError, TachometerSpec
 from tachometry.spec.core.timing import time_or_clocks
 
 _SIMULATION = "Simulation"
@@ -35,8 +36,10 @@ _OPTIONS = [
 ]
 
 
-def _read(*, vcd_from: str | None, vcd_to: str | None, pulse: tuple[str, ...], **others: Any) -> dict[str, Any]:
-    def window(spec: TachometerSpec, n_clocks: int) -> tuple[int, int]:
+def _read(
+    *, engine: str, vcd_from: str | None, vcd_to: str | None, pulse: tuple[str, ...], **others: Any
+) -> dict[str, Any]:
+    def window(spec: CoreSpec, n_clocks: int) -> tuple[int, int]:
         begin = 0 if vcd_from is None else _clock("vcd_from", vcd_from, spec)
         end = n_clocks if vcd_to is None else min(_clock("vcd_to", vcd_to, spec), n_clocks)
         if begin >= end:
@@ -48,14 +51,11 @@ def _read(*, vcd_from: str | None, vcd_to: str | None, pulse: tuple[str, ...], *
 
     if (vcd_from is not None or vcd_to is not None) and "--vcd" not in others["targets"]:
         raise ValueError("--vcd must be given together with --vcd-from and --vcd-to")
-    return dict(window=window, pulses=pulses, **others)
+    return dict(running=Running(engine, window, pulses), **others)
 
 
 ENGINE_OPTIONS = Group(_OPTIONS, _read)
-"""Handed over as `engine`, a name, `window`, a function of spec and number of clocks, and `pulses`, one of a spec.
-
-The function gives the first clock of the waveform and the one after the last; ValueError if there is none.
-"""
+"""Handed over as `running`, see `Running`."""
 
 
 def _pulses(spec: TachometerSpec, texts: tuple[str, ...]) -> dict[str, Ints]:
@@ -82,7 +82,7 @@ def _pulses(spec: TachometerSpec, texts: tuple[str, ...]) -> dict[str, Ints]:
     return found
 
 
-def _clock(what: str, text: str, spec: TachometerSpec) -> int:
+def _clock(what: str, text: str, spec: CoreSpec) -> int:
     """Return the clock in which an instant lies."""
     if (seconds := time_or_clocks(what, text, spec.timing.clock_hz)) < 0:
         raise ParameterError(what, f"must be at least 0, not {text}")

@@ -1,6 +1,6 @@
 """Options of the files that a simulation writes, and what writes each."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -54,10 +54,12 @@ OUTPUT_OPTIONS = Group(_OPTIONS, _read)
 """Handed over as `targets`, a dictionary of option to path; a `.gtkw` comes with `--vcd`."""
 
 
-def refuse_plot(spec: CoreSpec, targets: Mapping[str, Path]) -> None:
-    """Check that no figure is wanted of many axes."""
+def outputs_of(spec: CoreSpec, targets: Mapping[str, Path], inputs: Sequence[Path]) -> Outputs:
+    """Return the outputs of a simulation of this core, see `Outputs`."""
+    outputs = Outputs(targets, inputs)
     if spec.axes is not None and "--plot" in targets:
         raise ValueError("--plot must not be given together with --axes: a figure is of one axis")
+    return outputs
 
 
 def write_outputs(simulation: Simulation, outputs: Outputs) -> list[Path]:

@@ -12,7 +12,7 @@ from tachometry.sim.engines.pick import pick
 from tachometry.sim.engines.waveform import Curve, add_curves
 from tachometry.sim.signals.arrays import Ints
 from tachometry.sim.signals.axes import AxesTrace, Trace, of_axis
-from tachometry.sim.signals.progress import Bar
+from tachometry.sim.signals.progress import Bar, no_bar
 from tachometry.sim.signals.recording import PinTrace, Recording, packed
 from tachometry.sim.signals.run import Run
 from tachometry.sim.signals.tables import HeldVelocity, VelocityError, held_from, held_velocity, velocity_error
@@ -24,6 +24,17 @@ from tachometry.spec.methods.axis import WARM_UP
 
 Window = Callable[[CoreSpec, int], tuple[int, int]]
 Pulses = Callable[[TachometerSpec], dict[str, Ints]]
+
+
+@dataclass(frozen=True)
+class Running:
+    """Describes how a simulation is run."""
+
+    engine: str
+    window: Window = lambda _, n_clocks: (0, n_clocks)  # gives the clocks that the waveform `vcd` shows
+    pulses: Pulses = lambda _: {}  # gives clocks in which other inputs than those of the encoder rise, by their names
+    vcd: Path | None = None
+    bar: Bar = no_bar
 
 
 @dataclass(frozen=True)
@@ -98,35 +109,28 @@ def simulate(
     source: str,
     recordings: Sequence[Recording],
     truths: Sequence[Encoding] | None,
-    engine: str,
-    *,
-    window: Window,
-    vcd: Path | None,
-    bar: Bar,
-    pulses: Pulses | None = None,
+    running: Running,
 ) -> Simulation:
     """Run hardware and golden model on a recording for each axis.
 
     - `source`: What messages call that which the recordings come from.
     - `truths`: What the shaft of each axis truly did.
-    - `window`: Gives the clocks that the waveform `vcd` shows.
-    - `pulses`: Gives clocks in which other inputs than those of the encoder rise, by their names.
 
     It raises ValueError if the recordings do not last a tick, or have too many.
     """
     trace: Trace = PinTrace.of(recordings[0], spec) if spec.axes is None else AxesTrace.placed(recordings, spec)
-    if pulses is not None and isinstance(trace, PinTrace):
-        trace = _pulsed(spec, source, trace, pulses)
+    if isinstance(trace, PinTrace):
+        trace = _pulsed(spec, source, trace, running.pulses)
     fewest = spec.tick.longest + spec.latency.tick  # after which there is something to report
     if trace.n_clocks < fewest:
         raise ValueError(
             f"{source} must last at least {fewest} clocks of --clock ({format_time(spec.tick.seconds(fewest))}), "
             f"a tick and its latency, not {trace.n_clocks}"
         )
-    shown, chosen = window(spec, trace.n_clocks), pick(engine)
-    with bar("simulating", trace.n_clocks, "clocks", rate=True) as progress:
+    shown, chosen, vcd = running.window(spec, trace.n_clocks), pick(running.engine), running.vcd
+    with running.bar("simulating", trace.n_clocks, "clocks", rate=True) as progress:
         found = lockstep(spec, trace, chosen, vcd=vcd, window=shown, progress=progress, fewest=fewest)
-    missing = " (there is no C++ compiler)" if (engine, chosen.name) == ("auto", "pysim") else ""
+    missing = " (there is no C++ compiler)" if (running.engine, chosen.name) == ("auto", "pysim") else ""
     known = [None] * len(recordings) if truths is None else truths
     each = enumerate(zip(recordings, known, strict=True))
     axes = tuple(_axis(spec, found.actual, number, *of) for number, of in each)
