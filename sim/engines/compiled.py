@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from tachometry.hdl import core_of
 from tachometry.hdl.arithmetic.idle import HasIdle, Idle
-from tachometry.sim.engines.engine import Interrupted, driven_pins
+from tachometry.sim.engines.engine import NO_WATCH, Interrupted, Watch, driven_pins
 from tachometry.sim.engines.probes import WORD, Watched
 from tachometry.sim.engines.waveform import Waveform
 from tachometry.sim.signals.axes import Trace
@@ -120,27 +120,18 @@ class CompiledEngine(ABC):
             self._libraries[key] = self.library(design)
         return self._libraries[key]
 
-    def run(
-        self,
-        spec: CoreSpec,
-        trace: Trace,
-        *,
-        vcd: Path | None = None,
-        window: tuple[int, int] | None = None,
-        progress: Callable[[int], None] | None = None,
-    ) -> Run:
-        """Run the core, as `Engine.run` says."""
+    def run(self, spec: CoreSpec, trace: Trace, watch: Watch = NO_WATCH) -> Run:
         pins = driven_pins(spec, trace)
-        watched = None if vcd is None else Watched(spec)
+        watched = None if watch.vcd is None else Watched(spec)
         design = Design(spec, pins, watched, (trace.n_clocks > _SHORT) + (trace.n_clocks > _LONG))
-        play = Play(self.kept(design), design, trace, window or (0, trace.n_clocks), self.every_clock)
+        play = Play(self.kept(design), design, trace, watch.window or (0, trace.n_clocks), self.every_clock)
         interrupt = None
         with ExitStack() as stack:
             waveform = None
-            if vcd is not None and watched is not None:
-                waveform = stack.enter_context(Waveform(vcd, spec.timing.clock_hz, watched.widths))
+            if watch.vcd is not None and watched is not None:
+                waveform = stack.enter_context(Waveform(watch.vcd, spec.timing.clock_hz, watched.widths))
             try:
-                play.to_the_end(waveform, progress)
+                play.to_the_end(waveform, watch.progress)
             except KeyboardInterrupt as raised:
                 interrupt = raised
             if waveform is not None:

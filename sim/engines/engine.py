@@ -1,6 +1,7 @@
 """Engines run the hardware: all take a trace of pins and give a `Run`."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -17,28 +18,25 @@ class Interrupted(KeyboardInterrupt):
         self.run = run
 
 
+@dataclass(frozen=True)
+class Watch:
+    """Describes what is seen of a simulation that runs."""
+
+    vcd: Path | None = None  # where a waveform goes, and a GTKWave save file beside it with the suffix `.gtkw`
+    window: tuple[int, int] | None = None  # first clock of the waveform, and the one after the last; None for all
+    progress: Callable[[int], None] | None = None  # called now and then with the number of clocks done
+
+
+NO_WATCH = Watch()
+
+
 class Engine(Protocol):
     """Simulates the core."""
 
     name: str
 
-    def run(
-        self,
-        spec: CoreSpec,
-        trace: Trace,
-        *,
-        vcd: Path | None = None,
-        window: tuple[int, int] | None = None,
-        progress: Callable[[int], None] | None = None,
-    ) -> Run:
-        """Simulate `trace.n_clocks` clocks after reset.
-
-        - `vcd`: Where to write a waveform, and a GTKWave save file beside it with the suffix `.gtkw`.
-        - `window`: First clock of the waveform, and the one after the last; None for all.
-        - `progress`: Called now and then with the number of clocks done.
-
-        It raises Interrupted at Ctrl-C, with what was simulated so far.
-        """
+    def run(self, spec: CoreSpec, trace: Trace, watch: Watch = NO_WATCH) -> Run:
+        """Simulate `trace.n_clocks` clocks after reset; Interrupted at Ctrl-C, with the clocks simulated so far."""
         ...
 
 

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from amaranth.sim import Simulator
 from numpy.typing import NDArray
 
 from tachometry.hdl import core_of
-from tachometry.sim.engines.engine import Interrupted, driven_pins
+from tachometry.sim.engines.engine import NO_WATCH, Interrupted, Watch, driven_pins
 from tachometry.sim.engines.probes import shown
 from tachometry.sim.engines.waveform import Waveform
 from tachometry.sim.signals.axes import Trace
@@ -74,22 +73,13 @@ class PySim:
 
     name = "pysim"
 
-    def run(
-        self,
-        spec: CoreSpec,
-        trace: Trace,
-        *,
-        vcd: Path | None = None,
-        window: tuple[int, int] | None = None,
-        progress: Callable[[int], None] | None = None,
-    ) -> Run:
-        """Run the core, as `Engine.run` says."""
+    def run(self, spec: CoreSpec, trace: Trace, watch: Watch = NO_WATCH) -> Run:
         core, top = core_of(spec), Module()
         top.submodules.core = core
         outputs = spec.ports.outputs
         strobe = Cat(getattr(core, port.name) for port in outputs if port.is_strobe).any()
         values = _packed(top, [strobe, *(getattr(core, port.name) for port in outputs)])
-        seen = shown(core) if vcd is not None else {}
+        seen = shown(core) if watch.vcd is not None else {}
         seen_values = _packed(top, list(seen.values()))
         simulator = Simulator(top)
         simulator.add_clock(_PERIOD)
@@ -98,14 +88,14 @@ class PySim:
         simulator.add_testbench(partial(drive, trace=trace, pins=pins, period=_PERIOD))
         rows: list[tuple[int, int]] = []
         simulator.add_process(partial(_collect, values=values, rows=rows))
-        begin, end = window or (0, trace.n_clocks)
+        begin, end = watch.window or (0, trace.n_clocks)
         with ExitStack() as stack:
             waveform = None
-            if vcd is not None:
+            if watch.vcd is not None:
                 widths = {name: (len(value), value.shape().signed) for name, value in seen.items()}
-                waveform = stack.enter_context(Waveform(vcd, spec.timing.clock_hz, widths))
+                waveform = stack.enter_context(Waveform(watch.vcd, spec.timing.clock_hz, widths))
                 _watch(simulator, waveform, seen_values, begin, end)
-            done, interrupt = _played(simulator, trace.n_clocks, progress)
+            done, interrupt = _played(simulator, trace.n_clocks, watch.progress)
             if waveform is not None:
                 waveform.close(min(done, end))
 

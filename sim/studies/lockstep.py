@@ -1,11 +1,9 @@
 """Hardware and golden model on the same pins: the one place where they are run side by side and compared."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 from tachometry.sim import golden
-from tachometry.sim.engines.engine import Engine, Interrupted
+from tachometry.sim.engines.engine import NO_WATCH, Engine, Interrupted, Watch
 from tachometry.sim.signals.axes import Trace
 from tachometry.sim.signals.run import Mismatch, Run, compare
 from tachometry.spec import CoreSpec
@@ -29,15 +27,12 @@ def lockstep(
     engine: Engine,
     *,
     expected: Run | None = None,
-    vcd: Path | None = None,
-    window: tuple[int, int] | None = None,
-    progress: Callable[[int], None] | None = None,
+    watch: Watch = NO_WATCH,
     fewest: int | None = None,
 ) -> Lockstep:
     """Run a trace on the golden model and on an engine, and compare every bit of every row.
 
     - `expected`: What the golden model makes of the trace, if that is known already.
-    - `vcd`, `window`, `progress`: See `Engine.run`.
     - `fewest`: Ctrl-C after this many clocks gives what has been done by then; None: it always ends the run.
 
     It raises Interrupted at Ctrl-C before that.
@@ -45,7 +40,7 @@ def lockstep(
     if expected is None:
         expected = golden.run(spec, trace)
     try:
-        actual = engine.run(spec, trace, vcd=vcd, window=window, progress=progress)
+        actual = engine.run(spec, trace, watch)
     except Interrupted as early:
         if fewest is None or early.run.n_clocks < fewest:
             raise

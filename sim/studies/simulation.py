@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tachometry.sim.encoder.virtual import Encoding
+from tachometry.sim.engines.engine import Watch
 from tachometry.sim.engines.pick import pick
 from tachometry.sim.engines.waveform import Curve, add_curves
 from tachometry.sim.signals.arrays import Ints
@@ -129,7 +130,7 @@ def simulate(
         )
     shown, chosen, vcd = running.window(spec, trace.n_clocks), pick(running.engine), running.vcd
     with running.bar("simulating", trace.n_clocks, "clocks", rate=True) as progress:
-        found = lockstep(spec, trace, chosen, vcd=vcd, window=shown, progress=progress, fewest=fewest)
+        found = lockstep(spec, trace, chosen, watch=Watch(vcd, shown, progress), fewest=fewest)
     missing = " (there is no C++ compiler)" if (running.engine, chosen.name) == ("auto", "pysim") else ""
     known = [None] * len(recordings) if truths is None else truths
     each = enumerate(zip(recordings, known, strict=True))

@@ -15,6 +15,7 @@ from tachometry.sim.captures.read import read_capture
 from tachometry.sim.captures.waveform import Changes, Variable
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.engines.engine import Watch
 from tachometry.sim.engines.pysim import PySim
 from tachometry.spec import Encoder, STachometer, Timing
 
@@ -71,7 +72,7 @@ def test_the_waveform_of_a_simulation_replays_as_the_same_pins(tmp_path: Path, c
     speed = 0.1 * clock_hz / 2000
     encoder = VirtualEncoder(500, jitter=0.2, start_angle_rad=0.001)
     trace = encoder.record(parse_motion(f"constant:{speed}rev/s:{duration}s")).recording.place(clock_hz)
-    PySim().run(spec, trace, vcd=tmp_path / "w.vcd")
+    PySim().run(spec, trace, Watch(tmp_path / "w.vcd"))
     again = read_capture(tmp_path / "w.vcd").place(clock_hz)
     assert len(trace.clock) > 200
     for name in ("clock", "a", "b"):

@@ -14,7 +14,7 @@ from tachometry.hdl import Tachometer
 from tachometry.sim import build, golden
 from tachometry.sim.engines.compiled import CompiledEngine, Design
 from tachometry.sim.engines.cxxrtl import Cxxrtl, translate
-from tachometry.sim.engines.engine import Engine, Interrupted
+from tachometry.sim.engines.engine import Engine, Interrupted, Watch
 from tachometry.sim.engines.pick import ENGINES, NAMES, pick, present
 from tachometry.sim.engines.pysim import PySim
 from tachometry.sim.signals.recording import PinTrace
@@ -51,7 +51,7 @@ def test_the_waveform_is_that_of_pysim(name: str, window: tuple[int, int] | None
     for engine in (PySim(), pick(name)):
         folder = tmp_path / engine.name
         folder.mkdir()
-        run = engine.run(SPEC, trace, vcd=folder / "v.vcd", window=window)
+        run = engine.run(SPEC, trace, Watch(folder / "v.vcd", window))
         assert compare(golden.run(SPEC, trace), run) == (0, [])
         texts[engine.name] = [(folder / file).read_bytes() for file in ("v.vcd", "v.gtkw")]
     assert texts[name] == texts["pysim"]
@@ -70,7 +70,7 @@ def test_memory_and_python_calls_do_not_grow_with_clocks(name: str) -> None:
     engine, seen = pick(name), list[int]()
     engine.run(spec, replace(trace, n_clocks=1))
     tracemalloc.start()
-    run = engine.run(spec, trace, progress=seen.append)
+    run = engine.run(spec, trace, Watch(progress=seen.append))
     assert tracemalloc.get_traced_memory()[1] < 10_000_000
     tracemalloc.stop()
     assert len(run.ticks.clock) == 19
@@ -87,7 +87,7 @@ def test_an_interrupt_brings_what_was_simulated(name: str, tmp_path: Path) -> No
 
     trace = turning(2_000_000)
     with pytest.raises(Interrupted) as stop:
-        pick(name).run(SPEC, trace, vcd=tmp_path / "v.vcd", window=(100, 200), progress=ctrl_c)
+        pick(name).run(SPEC, trace, Watch(tmp_path / "v.vcd", (100, 200), ctrl_c))
     run = stop.value.run
     assert 3000 < run.n_clocks < 2_000_000
     assert compare(golden.run(SPEC, trace.until(run.n_clocks)), run) == (0, [])

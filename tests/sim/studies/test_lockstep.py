@@ -1,12 +1,10 @@
 """Lockstep may be interrupted; the engine is the golden model itself."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
 from tachometry.sim import golden
-from tachometry.sim.engines.engine import Interrupted
+from tachometry.sim.engines.engine import NO_WATCH, Interrupted, Watch
 from tachometry.sim.signals.axes import Trace
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.sim.signals.run import Run
@@ -24,10 +22,10 @@ class Stops:
     name = "stops"
 
     def __init__(self, after: int | None = None) -> None:
-        self.after, self.given = after, dict[str, Any]()
+        self.after, self.given = after, NO_WATCH
 
-    def run(self, spec: CoreSpec, trace: Trace, **given: Any) -> Run:
-        self.given = given
+    def run(self, spec: CoreSpec, trace: Trace, watch: Watch = NO_WATCH) -> Run:
+        self.given = watch
         if self.after is None:
             return golden.run(spec, trace)
         raise Interrupted(golden.run(spec, trace.until(self.after)))
@@ -35,11 +33,11 @@ class Stops:
 
 def test_all_that_was_asked_for() -> None:
     engine = Stops()
-    found = lockstep(SPEC, TRACE, engine, window=(3, 9))
+    found = lockstep(SPEC, TRACE, engine, watch=Watch(window=(3, 9)))
     assert found.trace is TRACE
     assert found.n_mismatches == 0 == len(found.first)
     assert len(found.actual.ticks) == len(found.expected.ticks) == 69
-    assert engine.given["window"] == (3, 9)
+    assert engine.given == Watch(window=(3, 9))
 
 
 def test_a_known_run_is_not_computed_again() -> None:
