@@ -25,10 +25,9 @@ from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.sim.encoder.sampled import encoder_of
 from tachometry.sim.encoder.virtual import Encoding
-from tachometry.sim.signals.progress import no_bar
 from tachometry.sim.signals.recording import Recording
 from tachometry.sim.signals.shown import Shown
-from tachometry.sim.studies.comparing.comparison import Comparison, Source, comparison
+from tachometry.sim.studies.comparing.comparison import Comparison, Judging, Source, comparison
 from tachometry.sim.studies.plan import Plan, default_range, plan_at
 from tachometry.sim.studies.simulation import Axis, Running, Simulation
 from tachometry.sim.studies.simulation import simulate as simulation_of
@@ -309,17 +308,7 @@ def compare(specs: Sequence[TachometerSpec], motion: str, **encoder: Unpack[Enco
         raise ValueError("specs must be of different methods, at least one")
     truth = _recorded(specs[0], motion, 0, encoder)
     source = Source("motion", truth.recording, truth.true_speed, truth.true_angle)
-    return comparison(
-        specs[0],
-        dict(named),
-        lambda method, texts: named[method],
-        source,
-        earliest=None,
-        latest=float("inf"),
-        tune=False,
-        tradeoff=False,
-        bar=no_bar,
-    )
+    return comparison(specs[0], dict(named), lambda method, texts: named[method], source, Judging())
 
 
 def generate(

@@ -20,7 +20,7 @@ from tachometry.hdl.export import export
 from tachometry.sim.signals.files import write_csv
 from tachometry.sim.signals.recording import Recording
 from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES
-from tachometry.sim.studies.comparing.comparison import Comparison, Source, comparison
+from tachometry.sim.studies.comparing.comparison import Comparison, Judging, Source, comparison
 from tachometry.sim.studies.size import CORE, SEEDS, TARGETS, Measurement, measure_core, versions
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras import EXTRAS
@@ -150,18 +150,9 @@ def compare(
     if source.true_speed is None and (tune or tradeoff is not None):
         raise ValueError(f"{'--tune' if tune else '--tradeoff'} must be given together with --motion")
     with outputs:
-        result = comparison(
-            spec,
-            named.specs,
-            make,
-            source,
-            earliest=earliest,
-            latest=latest,
-            tune=tune,
-            tradeoff=tradeoff is not None,
-            bar=progress_bar,
-            read_delay=delay("read_delay", read_delay),
-        )
+        late = delay("read_delay", read_delay)
+        judging = Judging(earliest, latest, late, tune, tradeoff is not None, progress_bar)
+        result = comparison(spec, named.specs, make, source, judging)
         sizes = _sizes(result, tools) if size else {}
         _write(result, sizes, outputs)
     print_comparison(result, sizes, named.left_out | missing)

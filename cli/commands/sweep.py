@@ -148,7 +148,7 @@ def _plot(path: Path, result: SweepResult, across: dict[str, list[str]], metric:
         what = what.format(unit=unit.name)
         values = [None if value is None else unit.of(value) for value in values]
     at = [result.grid.at[point] for point in result.columns["point"]]
-    save_heat_maps(path, result.columns["method"], at, values, across, what, log)
+    save_heat_maps(path, [*zip(result.columns["method"], at, values, strict=True)], across, what, log)
 
 
 def _axes(text: str | None, grid: Points) -> dict[str, list[str]]:

@@ -35,11 +35,10 @@ from tachometry.cli.reports.compare import shown_scores, shown_time
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.sim.encoder.virtual import Encoding
-from tachometry.sim.signals.progress import no_bar
 from tachometry.sim.signals.recording import Recording
 from tachometry.sim.signals.temporary import scratch
 from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES
-from tachometry.sim.studies.comparing.comparison import Source, comparison
+from tachometry.sim.studies.comparing.comparison import Judging, Source, comparison
 from tachometry.sim.studies.estimate import FAMILIES
 from tachometry.sim.studies.plan import Plan, Plans, cells_of, default_range
 from tachometry.sim.studies.size import CORE, SEEDS, measure_core, versions
@@ -264,9 +263,7 @@ def _response(options: Texts, core: TachometerSpec, source: Source) -> Answer:
     methods = _methods(options, core)
     rivals = [name for name, one in BASELINES.items() if not one.missing]
     specs = {core.method: core} | methods.specs | {core.method: core} | dict.fromkeys(rivals)
-    found = comparison(
-        core, specs, of_texts, source, earliest=None, latest=math.inf, tune=False, tradeoff=False, bar=no_bar
-    )
+    found = comparison(core, specs, of_texts, source, Judging())
     unit = core.scale.shown_unit
     heads, rows = shown_scores(found, unit)
     at = found.instants[0][:: -(-len(found.instants[0]) // _POINTS_OF_TIME)]

@@ -25,9 +25,7 @@ _WITH_UNIT = re.compile(r"[-+.\de]+\s*([a-zA-Z/]+)")
 
 def save_heat_maps(
     path: Path,
-    methods: Sequence[str],
-    at: Sequence[Mapping[str, str]],
-    figures: Sequence[float | None],
+    points: Sequence[tuple[str, Mapping[str, str], float | None]],
     axes: Mapping[str, Sequence[str]],
     what: str,
     log: bool,
@@ -36,18 +34,15 @@ def save_heat_maps(
 
     A field is the median over all points there. A method without one of the axes has the same value all along it.
 
-    - `methods`, length n: Of each point.
-    - `at`, length n: Where each is: values of the axes that its method has.
-    - `figures`, length n: What is shown of each.
+    - `points`: Method, values of the axes that this method has, and the value to show, of each.
     - `axes`: One axis or two, with their values: across, and upwards.
     - `what`: What is shown, with its unit.
     - `log`: Colours go by the logarithm.
     """
-    names = list(dict.fromkeys(methods))
-    fields = {}
-    for name in names:
-        mine = [(where, value) for method, where, value in zip(methods, at, figures, strict=True) if method == name]
-        fields[name] = _field(mine, axes)
+    by_method: dict[str, list[tuple[Mapping[str, str], float | None]]] = {}
+    for method, where, value in points:
+        by_method.setdefault(method, []).append((where, value))
+    fields = {name: _field(mine, axes) for name, mine in by_method.items()}
     save_figure(path, lambda: _draw(fields, axes, what, log))
 
 

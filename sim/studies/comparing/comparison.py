@@ -1,5 +1,6 @@
 """Methods are compared as they are given, or each with the best of its settings, and what all settings cost."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -9,7 +10,7 @@ import numpy as np
 
 from tachometry.sim.encoder.motion import FloatArray, parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
-from tachometry.sim.signals.progress import Bar
+from tachometry.sim.signals.progress import Bar, no_bar
 from tachometry.sim.signals.recording import PinTrace, Recording
 from tachometry.sim.signals.shown import Shown
 from tachometry.sim.studies.comparing.baseline_catalogue import baseline_model, settings, steps_curve
@@ -54,7 +55,19 @@ class Source:
     true_angle: TrueSpeed | None = None  # rad
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@dataclass(frozen=True)
+class Judging:
+    """Describes which errors count, and which settings are tried."""
+
+    earliest: float | None = None  # seconds before which errors are left out; None: until every method has a value
+    latest: float = math.inf  # seconds after which they are
+    read_delay: float = 0.0  # seconds by which all values are read later
+    tune: bool = False  # each baseline, and M/T, takes part with the best of its settings
+    tradeoff: bool = False  # what all settings cost is measured
+    bar: Bar = no_bar
+
+
+@dataclass(frozen=True, repr=False)
 class Comparison(Shown):
     """Holds what has come of all methods.
 
@@ -117,56 +130,35 @@ def comparison(
     specs: Specs,
     make: Make,
     source: Source,
-    *,
-    earliest: float | None,
-    latest: float,
-    tune: bool,
-    tradeoff: bool,
-    bar: Bar,
-    read_delay: float = 0.0,
+    judging: Judging,
 ) -> Comparison:
     """Run methods on the same edges, and compare them with the truth.
 
     - `spec`: Whose encoder, clock and tick hold for all, and with which float models are read.
     - `make`: Makes a core of a method and its own options.
     - `source`: With the true speed, where there is to be `tune` or `tradeoff`.
-    - `earliest`, `latest`, seconds: Errors before and after are left out; None: only those before all methods have a
-      value.
-    - `tune`: Each baseline, and M/T, takes part with the best of its settings.
-    - `tradeoff`: Measure what all settings cost.
-    - `read_delay`, seconds: All values are read this much later.
 
     It raises ValueError if a method cannot be on these edges, or they end too early.
     """
     for name in (name for name, one in specs.items() if one is None):
         baseline_model(name)  # what is wrong is reported at once
     edges = source.recording, steps_beside(spec, source.recording)
-    duration, begin = source.recording.duration, earliest or 0.0
-    judge = Judge(source.true_speed, begin, min(duration, latest), read_delay)
+    duration, begin = source.recording.duration, judging.earliest or 0.0
+    judge = Judge(source.true_speed, begin, min(duration, judging.latest), judging.read_delay)
     costs, speed, n_tried = dict[str, list[Cost]](), 0.0, dict[str, int]()
-    if (tune or tradeoff) and source.true_speed is not None:
+    if (judging.tune or judging.tradeoff) and source.true_speed is not None:
         if len(judge.among(edges[1].reads)) < 2:
             raise ValueError(f"{source.name} must last longer than --from, not {_time(duration)}")
-        trial = _Trial(spec, make, edges, judge, bar)
-        if tradeoff:
+        trial = _Trial(spec, make, edges, judge, judging.bar)
+        if judging.tradeoff:
             costs, speed = trial.costs(specs)
-        if tune:
+        if judging.tune:
             specs, n_tried = trial.tuned(specs)
     curves = [Setting(name, one).curve(*edges) for name, one in specs.items()]
-    judge, instants = _instants(source, curves, judge, earliest)
+    judge, instants = _instants(source, curves, judge, judging.earliest)
     scores = [score(curve, duration, at, source.true_speed) for curve, at in zip(curves, instants, strict=True)]
-    result = Comparison(
-        spec=spec,
-        specs=specs,
-        curves=curves,
-        scores=scores,
-        instants=instants,
-        true_speed=source.true_speed,
-        recording=source.recording,
-        n_tried=n_tried,
-        costs=costs,
-        rms_speed=speed,
-    )
+    seen = source.true_speed, source.recording
+    result = Comparison(spec, specs, curves, scores, instants, *seen, n_tried, costs, speed)
     angles = judged_angles(spec, curves, edges[1], source.true_angle, judge) if source.true_angle else []
     return _with_angles(result, angles) if angles else result
 

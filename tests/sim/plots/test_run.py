@@ -100,7 +100,8 @@ def test_equal_maps_give_equal_files(tmp_path: Path) -> None:
     for suffix, log in ((".png", True), (".pdf", False)):
         paths = [tmp_path / f"{k}{suffix}" for k in range(2)]
         for path in paths:
-            save_heat_maps(path, methods, at * 4, [None, *np.arange(23.0).tolist()], AXES, "error", log)
+            points = [*zip(methods, at * 4, [None, *np.arange(23.0).tolist()], strict=True)]
+            save_heat_maps(path, points, AXES, "error", log)
         assert paths[0].read_bytes() == paths[1].read_bytes()
         assert paths[0].stat().st_size > 5000
 
@@ -108,6 +109,5 @@ def test_equal_maps_give_equal_files(tmp_path: Path) -> None:
 def test_maps_of_nothing_and_of_one_value(tmp_path: Path) -> None:
     for value in (None, 0.0, 3.0):
         for log in (True, False):
-            save_heat_maps(
-                tmp_path / "m.png", ["s"], [{"speed": "1rad/s"}], [value], {"speed": AXES["speed"]}, "x", log
-            )
+            points = [("s", {"speed": "1rad/s"}, value)]
+            save_heat_maps(tmp_path / "m.png", points, {"speed": AXES["speed"]}, "x", log)

@@ -1,7 +1,6 @@
 """Methods on the same edges: what is told of each, on curves whose answer is known."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -9,12 +8,11 @@ from support.lines import PPR, record
 
 from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.plots.compare import save_comparison
-from tachometry.sim.signals.progress import no_bar
 from tachometry.sim.studies.comparing import baselines
 from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES, steps_curve
 from tachometry.sim.studies.comparing.baselines import Steps
 from tachometry.sim.studies.comparing.compare import Curve, Judge, begun, core_curve, score
-from tachometry.sim.studies.comparing.comparison import Source, comparison, steps_beside
+from tachometry.sim.studies.comparing.comparison import Judging, Source, comparison, steps_beside
 from tachometry.spec import METHODS, Encoder, Timing, of_texts
 
 
@@ -107,8 +105,7 @@ def compared(
     texts = {"ppr": "500", "clock": clock, "tick": "100us", "max-time": "10ms", "max-speed": "400rad/s"}
     specs = {name: None if name in BASELINES else of_texts(name, texts) for name in methods}
     spec, source = of_texts(methods[0], texts), Source("", truth.recording, truth.true_speed)
-    options: dict[str, Any] = {"tune": False, "tradeoff": False, "bar": no_bar, "read_delay": read_delay}
-    found = comparison(spec, specs, lambda *_: spec, source, earliest=0.04, latest=1.0, **options)
+    found = comparison(spec, specs, lambda *_: spec, source, Judging(0.04, 1.0, read_delay))
     for at, one in zip(found.instants, specs.values(), strict=True):
         late = (one or spec).latency.tick_to_velocity + 1  # float models are read with the first core
         assert len(at) in (1599, 1600)
