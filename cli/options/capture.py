@@ -108,7 +108,8 @@ def _read(
         rate = None if samplerate is None else float(parse_frequency("samplerate", samplerate))
         second = SAME if sensor == "pulses" else line_b
         third = (c or "c") if sensor == "hall" else None
-        recording = read_capture(capture, line_a, second, rate, index, tick, text, third, alone.front_end.complemented)
+        named = {"c": third, "z": index, "tick_in": tick} | {f"{n}_n": f"{n}_n" for n in alone.front_end.complemented}
+        recording = read_capture(capture, line_a, second, rate, text=text, **named)
         return with_last_tick(fitted(recording, alone.encoder), spec)
 
     if others.get("capture", ...) is None:

@@ -9,7 +9,7 @@ import stat
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from io import BufferedReader
 from pathlib import Path
 from typing import NamedTuple, cast
@@ -21,7 +21,6 @@ from tachometry.spec.language.option import ParameterError
 
 Channel = str | int
 SAME = -(1 << 16)  # as the channel of B: that of A
-NONE: Mapping[str, Channel] = {}
 _LISTED = 40  # channels in a message
 NO_VECTORS: Mapping[int, str] = {}
 
@@ -31,6 +30,18 @@ class Line(NamedTuple):
 
     number: int  # of its channel
     bit: int | None = None  # of the number that the channel is; None: it is a level
+
+
+@dataclass(frozen=True)
+class Channels:
+    """Channels of the lines that are read, each by its name or number; None: see `choose_channels`."""
+
+    a: Channel | None = None
+    b: Channel | None = None
+    others: Mapping[str, Channel] = field(default_factory=dict)  # by the names of further lines
+
+
+ANY = Channels()
 
 
 class CaptureError(ValueError):
@@ -115,9 +126,7 @@ def _find(channels: Mapping[int, str], vectors: Mapping[int, str], wanted: Chann
 def choose_channels(
     path: Path,
     channels: Mapping[int, str],
-    a: Channel | None = None,
-    b: Channel | None = None,
-    others: Mapping[str, Channel] = NONE,
+    wanted: Channels,
     vectors: Mapping[int, str] = NO_VECTORS,
 ) -> tuple[Line, ...]:
     """Return the encoder lines among the channels of a capture: A, B and others, by their names.
@@ -129,7 +138,7 @@ def choose_channels(
     """
     texts = [f"{name} ({number})" for number, name in channels.items()]
     texts += [f"{name}[bit]" for number, name in vectors.items() if number not in channels]
-    listed, one_line = _listed(texts), b == SAME
+    listed, one_line, a, b = _listed(texts), wanted.b == SAME, wanted.a, wanted.b
     if len(channels) < 2 - one_line and not (vectors and str(a).endswith("]")):
         needed = "one logic channel" if one_line else "two logic channels"
         example = next(iter(vectors.values()), None)
@@ -140,7 +149,7 @@ def choose_channels(
     defaults = [*channels, *channels, None, None][:2] if None in named else named
     first, second = (default if given is None else given for default, given in zip(defaults, (a, b), strict=True))
     lines: dict[str, Line] = {}
-    for line, channel in {"a": first, "b": first if one_line else second, **others}.items():
+    for line, channel in {"a": first, "b": first if one_line else second, **wanted.others}.items():
         if (place := find(channel)) is None:
             near = difflib.get_close_matches(str(channel), texts, 3, 0.5) if len(texts) > _LISTED else []
             close = f"; near it are {', '.join(near)}" * bool(near)

@@ -7,12 +7,11 @@ import re
 import struct
 import subprocess
 import sys
-from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from tachometry.sim.captures.file import NONE, CaptureError, Channel, OptionError, check_regular, reading
+from tachometry.sim.captures.file import ANY, CaptureError, Channels, OptionError, check_regular, reading
 from tachometry.sim.captures.waveform import Changes, Names, Variable
 from tachometry.sim.signals.recording import Recording
 from tachometry.sim.signals.temporary import run_tool
@@ -42,13 +41,7 @@ def _head(path: Path, samplerate_hz: float | None) -> bytes:
     return head
 
 
-def read_fst(
-    path: str | os.PathLike[str],
-    a: Channel | None = None,
-    b: Channel | None = None,
-    samplerate_hz: float | None = None,
-    others: Mapping[str, Channel] = NONE,
-) -> Recording:
+def read_fst(path: str | os.PathLike[str], wanted: Channels = ANY, samplerate_hz: float | None = None) -> Recording:
     """Read two to four lines of an FST file: variables of one bit, or bits of vectors, as of `read_vcd`.
 
     Bit 0 of a vector is its last one, as pywellen does not tell how it was declared. It raises CaptureError if pywellen
@@ -64,7 +57,7 @@ def read_fst(
     for name, _ in known["variables"]:
         names.add(name)
     variables = [Variable(name, size, code, size - 1, 0) for code, (name, size) in enumerate(known["variables"])]
-    changes = Changes(path, variables, a, b, others)
+    changes = Changes(path, variables, wanted)
     codes = sorted(map(int, changes.codes))
     *_, end = _HEADER.unpack(head)
     time = -1

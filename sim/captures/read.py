@@ -2,12 +2,12 @@
 
 import functools
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
-from tachometry.sim.captures.file import NONE, SAME, CaptureError, Channel, OptionError, is_stream, kind_of
+from tachometry.sim.captures.file import SAME, CaptureError, Channel, Channels, OptionError, is_stream, kind_of
 from tachometry.sim.captures.fst import read_fst
 from tachometry.sim.captures.header import PLAIN, TextOptions
 from tachometry.sim.captures.sigrok import read_sr
@@ -20,15 +20,7 @@ from tachometry.spec import CoreSpec
 class Reader(Protocol):
     """Describes a function that reads one kind of capture."""
 
-    def __call__(
-        self,
-        path: Path,
-        a: Channel | None,
-        b: Channel | None,
-        samplerate_hz: float | None,
-        others: Mapping[str, Channel],
-        /,
-    ) -> Recording: ...
+    def __call__(self, path: Path, wanted: Channels, samplerate_hz: float | None, /) -> Recording: ...
 
 
 TEXTS = (".csv", ".txt", ".tsv", ".teeth", ".msl")
@@ -68,11 +60,9 @@ def read_capture(
     a: Channel | None = None,
     b: Channel | None = None,
     samplerate_hz: float | None = None,
-    z: Channel | None = None,
-    tick_in: Channel | None = None,
+    *,
     text: TextOptions = PLAIN,
-    c: Channel | None = None,
-    complemented: Iterable[str] = (),
+    **others: Channel | None,
 ) -> Recording:
     """Read the encoder lines from a capture, whose kind its suffix gives.
 
@@ -81,21 +71,19 @@ def read_capture(
     - `a`, `b`: Name of the channel, else its number from 0, as in sigrok's D0 to D7. When not given: the channels named
       A and B (in any case) if there are both, else the first two.
     - `samplerate_hz`, Hz: Only for a `.sr` or a text that has neither a samplerate nor times.
-    - `z`, `tick_in`, `c`: Channels of the index line, of the external tick and of a third line, likewise; what is not
-      given, the recording has not.
     - `text`: Only for a text, see `read_csv`.
-    - `complemented`: Lines whose complements are channels as well, which are named a_n for a.
+    - `others`: Channels of `z`, the index line, of `tick_in`, the external tick, of `c`, a third line, and of `a_n`,
+      the complement of A, and so on, likewise; what is not given, the recording has not.
 
     It raises CaptureError if the suffix is another one, or as the reader of that kind says.
     """
     path = Path(path)
     reader = _reader(path, text)
-    others = {name: channel for name, channel in (("c", c), ("z", z), ("tick_in", tick_in)) if channel is not None}
-    others |= {f"{line}_n": f"{line}_n" for line in complemented}
-    recording = reader(path, a, b, samplerate_hz, others)
+    given = {name: channel for name, channel in others.items() if channel is not None}
+    recording = reader(path, Channels(a, b, given), samplerate_hz)
     if is_stream(path):
         return recording
-    return _with_moving(recording, lambda number: reader(path, number, SAME, samplerate_hz, NONE))
+    return _with_moving(recording, lambda number: reader(path, Channels(number, SAME), samplerate_hz))
 
 
 def _with_moving(recording: Recording, read: Callable[[int], Recording]) -> Recording:

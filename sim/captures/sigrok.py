@@ -11,7 +11,7 @@ import re
 import struct
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.captures.file import (
-    NONE,
+    ANY,
     CaptureError,
-    Channel,
+    Channels,
     check_edges,
     check_regular,
     choose_channels,
@@ -46,13 +46,7 @@ ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, NotImpleme
 
 
 def read_sr(
-    path: str | os.PathLike[str],
-    a: Channel | None = None,
-    b: Channel | None = None,
-    samplerate_hz: float | None = None,
-    others: Mapping[str, Channel] = NONE,
-    *,
-    _piece: int = CHUNK,
+    path: str | os.PathLike[str], wanted: Channels = ANY, samplerate_hz: float | None = None, *, _piece: int = CHUNK
 ) -> Recording:
     """Read two to four channels of a sigrok session, version 1 or 2.
 
@@ -60,8 +54,8 @@ def read_sr(
     number of samples / samplerate. Change times are rounded down to float64 and the duration up, hence
     `Recording.place` on a clock that is a multiple of the samplerate finds sample k at clock k * multiple, exactly.
 
-    A channel is a name or a number: N is sigrok's D<N>, bit N of a sample. `others` are channels of further lines, by
-    the names of these; the other arguments are as of `read_capture`. It raises CaptureError if the file is none, for an
+    A channel is a name or a number: N is sigrok's D<N>, bit N of a sample. The other arguments are as
+    of `read_capture`. It raises CaptureError if the file is none, for an
     unknown channel, or for a samplerate that is missing or is not the one in the file.
     """
     path = Path(path)
@@ -71,13 +65,13 @@ def read_sr(
     with reading(path), _damage_named(path), _Bounded(path) as file, zipfile.ZipFile(file) as archive:
         session = _read_session(path, archive)
         rate = agreed_samplerate(path, session.samplerate_hz, samplerate_hz)
-        lines = choose_channels(path, session.channels, a, b, others)
+        lines = choose_channels(path, session.channels, wanted)
         bits = tuple(line.number for line in lines)
         sample, level, n_samples = _changes(session, bits, _pieces(path, archive, session, _piece))
     if n_samples == 0:
         raise CaptureError(f"{path} must have at least one sample, not 0")
     duration = float(divide(np.array([n_samples]), rate, up=True)[0])
-    recording = Recording.of_level(divide(sample, rate, up=False), level, duration, ("a", "b", *others))
+    recording = Recording.of_level(divide(sample, rate, up=False), level, duration, ("a", "b", *wanted.others))
     return named(recording, session.channels, lines)
 
 

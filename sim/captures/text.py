@@ -3,7 +3,7 @@
 import os
 import re
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from tachometry.sim.captures import cell_parsers
 from tachometry.sim.captures.file import (
-    NONE,
+    ANY,
     SAME,
     CaptureError,
-    Channel,
+    Channels,
     Line,
     OptionError,
     check_edges,
@@ -43,10 +43,8 @@ def _refuse_outputs(path: Path, source: Lines) -> None:
 
 def read_csv(
     path: str | os.PathLike[str],
-    a: Channel | None = None,
-    b: Channel | None = None,
+    wanted: Channels = ANY,
     samplerate_hz: float | None = None,
-    others: Mapping[str, Channel] = NONE,
     options: TextOptions = PLAIN,
     *,
     _block: int = BLOCK,
@@ -69,15 +67,15 @@ def read_csv(
         _refuse_outputs(path, source)
         header = read_header(path, source.head, options, samplerate_hz)
         if own is not None or not header.channels:
-            return _pulses(path, source, header, options, one_line=b == SAME)
-        if len(header.channels) == 1 and a is None and b is None:
+            return _pulses(path, source, header, options, one_line=wanted.b == SAME)
+        if len(header.channels) == 1 and wanted.a is None and wanted.b is None:
             _refuse_numbers(path, source, header)
-        lines = choose_channels(path, header.channels, a, b, others, header.channels)
+        lines = choose_channels(path, header.channels, wanted, header.channels)
         times, pins, changes = Times(path, header), _Pins(path, header, options, lines), _Changes(path)
         for number, columns in blocks(path, source, header, _block):
             changes.add(times.of(number, columns), pins.of(number, columns))
         pins.check_end(source.ended)
-    recording = changes.recording(header, ("a", "b", *others))
+    recording = changes.recording(header, ("a", "b", *wanted.others))
     apart = np.diff(recording.time[1:][(np.diff(recording.a) != 0) | (np.diff(recording.b) != 0)])
     check_seconds(path, header, options.slowest_s, apart, "edges", whole=times.whole)
     return named(recording, header.channels, lines, (*times.notes, *pins.notes, *changes.notes))

@@ -2,12 +2,12 @@
 
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import BinaryIO
 
-from tachometry.sim.captures.file import NONE, CaptureError, Channel, OptionError, opened_bytes, reading
+from tachometry.sim.captures.file import ANY, CaptureError, Channels, OptionError, opened_bytes, reading
 from tachometry.sim.captures.waveform import Changes, Names, Variable
 from tachometry.sim.signals.recording import Recording
 
@@ -22,13 +22,7 @@ _SCALARS, _WITH_BLANK = b"01xXzZuUwWlLhH-", b"bBrRsS"  # how changes begin, of o
 _SECTIONS = (b"$dumpvars", b"$dumpall", b"$dumpon", b"$dumpoff", b"$end")
 
 
-def read_vcd(
-    path: str | os.PathLike[str],
-    a: Channel | None = None,
-    b: Channel | None = None,
-    samplerate_hz: float | None = None,
-    others: Mapping[str, Channel] = NONE,
-) -> Recording:
+def read_vcd(path: str | os.PathLike[str], wanted: Channels = ANY, samplerate_hz: float | None = None) -> Recording:
     """Read two to four lines of a Value Change Dump: variables of one bit, or bits of vectors.
 
     The recording begins when all of them have first been 0 or 1, and ends with the last time in the file. Where a line
@@ -47,7 +41,7 @@ def read_vcd(
     with reading(path), opened_bytes(path) as file:
         words = _Words(path, file)
         variables, codes, unit = _declarations(path, words)
-        changes = Changes(path, variables, a, b, others)
+        changes = Changes(path, variables, wanted)
         last = _read_changes(path, words, codes, changes)
         return changes.recording(unit, words.end_notes(last, codes))
 

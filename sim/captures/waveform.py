@@ -2,13 +2,14 @@
 
 from array import array
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from tachometry.sim.captures.file import CaptureError, Channel, check_edges, choose_channels, named
+from tachometry.sim.captures.file import CaptureError, Channels, check_edges, choose_channels, named
 from tachometry.sim.signals.recording import Recording
 from tachometry.spec.language.units import plural
 
@@ -61,20 +62,13 @@ class Changes:
     `choose_channels`; numbers count the variables of one bit.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        variables: Sequence[Variable],
-        a: Channel | None,
-        b: Channel | None,
-        others: Mapping[str, Channel],
-    ) -> None:
-        self._path, self._lines = path, ("a", "b", *others)
+    def __init__(self, path: Path, variables: Sequence[Variable], wanted: Channels) -> None:
+        self._path, self._lines = path, ("a", "b", *wanted.others)
         ordered = sorted(variables, key=lambda variable: variable.size > 1)
         self._names = {number: variable.name for number, variable in enumerate(ordered)}
         scalars = {number: self._names[number] for number, variable in enumerate(ordered) if variable.size == 1}
         vectors = {number: name for number, name in self._names.items() if number not in scalars}
-        self._chosen = choose_channels(path, scalars, *_default(scalars, a, b), others, vectors)
+        self._chosen = choose_channels(path, scalars, _default(scalars, wanted), vectors)
         of = [(ordered[line.number], line.bit) for line in self._chosen]
         self._sources = [(variable, variable.position(path, bit)) for variable, bit in of]
         self._value = {variable.code: "x" for variable, _ in of}
@@ -159,13 +153,14 @@ class Changes:
         return named(recording, self._names, self._chosen, told)
 
 
-def _default(names: Mapping[int, str], a: Channel | None, b: Channel | None) -> tuple[Channel | None, Channel | None]:
-    """Return A and B; one that is not given by the last part of its name, where that is unique."""
+def _default(names: Mapping[int, str], wanted: Channels) -> Channels:
+    """Return channels with A and B by the last parts of their names where these are unique, if not given."""
 
     def only(line: str) -> int | None:
         alike = [number for number, name in names.items() if name.rpartition(".")[2].casefold() == line]
         return alike[0] if len(alike) == 1 else None
 
-    if only("a") is None or only("b") is None:
-        return a, b
-    return only("a") if a is None else a, only("b") if b is None else b
+    a, b = only("a"), only("b")
+    if a is None or b is None:
+        return wanted
+    return replace(wanted, a=a if wanted.a is None else wanted.a, b=b if wanted.b is None else wanted.b)

@@ -13,7 +13,7 @@ import pytest
 from support import docs
 from support.captures import MEGAHERTZ, assert_same, make_csv, make_sr, random_trace
 
-from tachometry.sim.captures.file import CaptureError
+from tachometry.sim.captures.file import CaptureError, Channels
 from tachometry.sim.captures.header import TextOptions
 from tachometry.sim.captures.read import read_capture
 from tachometry.sim.captures.sigrok import divide, read_sr, write_sr
@@ -113,7 +113,7 @@ def test_all_unit_sizes_and_disabled_probes(tmp_path: Path, unitsize: int) -> No
     make_sr(tmp_path / "x.sr", [data[:split], data[split:]], {first: "SCK", last: "MISO"}, unitsize=str(unitsize))
     bits = np.unpackbits(samples, axis=1, bitorder="little")
     for piece in (1, 24, 1 << 20):
-        trace = read_sr(tmp_path / "x.sr", "MISO", "SCK", _piece=piece).place(MEGAHERTZ)
+        trace = read_sr(tmp_path / "x.sr", Channels("MISO", "SCK"), _piece=piece).place(MEGAHERTZ)
         row = np.searchsorted(trace.clock, np.arange(500), "right") - 1
         np.testing.assert_array_equal(trace.a[row], bits[:, last - 1])
         np.testing.assert_array_equal(trace.b[row], bits[:, first - 1])

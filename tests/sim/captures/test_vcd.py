@@ -10,7 +10,7 @@ import pytest
 from support.captures import assert_same
 
 from tachometry.sim.captures import vcd
-from tachometry.sim.captures.file import CaptureError
+from tachometry.sim.captures.file import CaptureError, Channels
 from tachometry.sim.captures.read import read_capture
 from tachometry.sim.captures.waveform import Changes, Variable
 from tachometry.sim.encoder.motion import parse_motion
@@ -182,7 +182,7 @@ def test_of_many_variables_those_are_shown_that_are_near(tmp_path: Path) -> None
 def test_a_change_takes_some_bytes(late: Fraction | int) -> None:
     """Its time is exact, also beyond 64 bits and with a fraction."""
     n, step = 20_000, 10_000
-    changes = Changes(Path("c.vcd"), [Variable(name, 1, name.encode(), 0, 0) for name in "ab"], None, None, {})
+    changes = Changes(Path("c.vcd"), [Variable(name, 1, name.encode(), 0, 0) for name in "ab"], Channels())
     tracemalloc.start()
     for k in range(n):
         changes.at(step * k)
