@@ -68,7 +68,8 @@ def of_texts(method: str, texts: Mapping[str, str | None], build_core: Build = _
     for name in better:
         try:
             spec = _with_tick(name, given, few_machines)
-            _check_room(spec)
+            if (clocks := spec.wanted_room) > spec.tick.room:
+                raise ParameterError("tick_cycles", f"must be at least {clocks}", f"needs a tick of {clocks} clocks")
             return _explained(spec, build_core, refused, asked)
         except ParameterError as error:
             refused.append(f"{name} {error.brief}")
@@ -143,12 +144,6 @@ def _few_machines(build_core: Build, spec: TachometerSpec) -> None:
     if isinstance(core, AxesSpec) and (machines := core.plan.machines) > _MOST_MACHINES:
         other = f"--tick {core.tick_of(_MOST_MACHINES)}"
         raise _Crowded("tick_cycles", f"must be longer: try {other}", f"needs {machines} machines or {other}")
-
-
-def _check_room(spec: TachometerSpec) -> None:
-    """Refuse a method with a ParameterError where its work takes longer than a tick."""
-    if (clocks := spec.wanted_room) > spec.tick.room:
-        raise ParameterError("tick_cycles", f"must be at least {clocks}", f"needs a tick of {clocks} clocks")
 
 
 def _of_method(method: str, texts: Mapping[str, str]) -> TachometerSpec:

@@ -49,7 +49,8 @@ def bitstream(board: Board, place: Path) -> Path:
     if not place.is_dir():
         if place.suffix != board.suffix:
             raise ValueError(f"a bitstream for {board.name} must end in {board.suffix}, not {place.name!r}")
-        _check_board(board, place)
+        if (other := _board_of(place)) not in (None, board.name):
+            raise ValueError(f"{place} must be a bitstream for {board.name}, not for {other}")
         return place
     found = [file for file in sorted(place.glob(f"*{board.suffix}")) if _board_of(file) == board.name]
     if len(found) != 1:
@@ -59,12 +60,6 @@ def bitstream(board: Board, place: Path) -> Path:
             f"not {names}"
         )
     return found[0]
-
-
-def _check_board(board: Board, file: Path) -> None:
-    other = _board_of(file)
-    if other not in (None, board.name):
-        raise ValueError(f"{file} must be a bitstream for {board.name}, not for {other}")
 
 
 def _board_of(file: Path) -> str | None:

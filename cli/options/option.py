@@ -148,11 +148,6 @@ def _other(name: str, help: str) -> str:
     return no if no and f"default: {yes.removeprefix('--')}]" in help else yes.partition(" ")[0]
 
 
-def _within(block: str) -> list[str]:
-    """Return lines of a paragraph that are no longer than those of --help."""
-    return [part for line in block.splitlines() for part in textwrap.wrap(line, 79) or [""]]
-
-
 def _show_short(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
     if value and not ctx.resilient_parsing:
         assert isinstance(ctx.command, GroupedCommand)
@@ -233,7 +228,7 @@ class GroupedCommand(click.Command):
         last = f"{(ctx.parent or ctx).command_path} help {self.name} [--OPTION] explains them."
         for block in (self.epilog or "").replace("\b\n", "").split("\n\n"):
             if len(lines) + len(block.splitlines()) + 3 <= _MOST_LINES:
-                lines += ["", *_within(block)]
+                lines += ["", *(part for line in block.splitlines() for part in textwrap.wrap(line, 79) or [""])]
         formatter.write("\n".join([*lines, "", last]) + "\n")
 
     def invoke(self, ctx: click.Context) -> Any:

@@ -69,12 +69,12 @@ def _still(source: Source | None) -> list[str]:
         return []
     names = [source.lines[line] for line in source.still]
     options = " and ".join(f"--{line.replace('_', '-')}" for line in source.still)
-    do = f"; {' and '.join(source.moving)} {_do(source.moving)}: see {options}" if source.moving else ""
+    do = (
+        f"; {' and '.join(source.moving)} {'does' if len(source.moving) == 1 else 'do'}: see {options}"
+        if source.moving
+        else ""
+    )
     return [f"{' and '.join(names)} never {'changes' if len(names) == 1 else 'change'}{do}"]
-
-
-def _do(names: tuple[str, ...]) -> str:
-    return "does" if len(names) == 1 else "do"
 
 
 def _index(axis: Axis) -> list[str]:

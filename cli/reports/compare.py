@@ -66,6 +66,7 @@ def shown_scores(
     def time(seconds: float | None) -> str:
         return "-" if seconds is None else ("-" if seconds < 0 else "") + shown_time(abs(seconds))
 
+    shown = _SIZE if sizes else {}
     rows = [
         (
             row.name,
@@ -76,18 +77,14 @@ def shown_scores(
             "-" if row.max is None else f"{unit.of(row.max):.4g}",
             time(row.delay),
             *(() if row.angle_rms_deg is None else (f"{row.angle_rms_deg:.3g}", f"{row.angle_max_deg:.3g}")),
-            *(_size_cells(sizes.get(row.name)) if sizes else ()),
+            *(form.format(sizes[row.name].figures[name]) if row.name in sizes else "-" for name, form in shown.items()),
         )
         for row in comparison.scores
     ]
     errors = (f"RMS ({unit.name})", f"max ({unit.name})")
     angles = ("angle RMS (deg el.)", "angle max") if comparison.position_angle else ()
     heads = ("method", "updates/s", "T_m mean", "T_m worst", *errors, "delay", *angles)
-    return [*heads, *(_SIZE if sizes else ())], rows
-
-
-def _size_cells(size: Measurement | None) -> list[str]:
-    return ["-" if size is None else form.format(size.figures[figure]) for figure, form in _SIZE.items()]
+    return [*heads, *shown], rows
 
 
 def comparison_table(

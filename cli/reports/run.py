@@ -11,7 +11,6 @@ from tachometry.cli.reports.capture import axis_warnings, capture_rows, channels
 from tachometry.cli.reports.core import choice
 from tachometry.cli.reports.standard_streams import INTERRUPTED, printable
 from tachometry.cli.reports.terminal import print_rows, stdout_console
-from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.simulation import Axis, Simulation
 from tachometry.spec import AxesSpec, CoreSpec
 from tachometry.spec.language.port import MISSED, WIDE
@@ -50,7 +49,9 @@ def _summary(spec: CoreSpec, axes: Sequence[Axis], mismatches: _Row) -> tuple[li
     """Return rows of the table of a core, and warnings."""
     if spec.axes is None:
         (axis,) = axes
-        return [*capture_rows(axis), _updates(axis.run), mismatches, *_rows(axis)], _warnings(axis)
+        new = axis.run.updates
+        updates = "updates", f"{len(new.clock)} ({np.count_nonzero(new.forced)} of them forced)"
+        return [*capture_rows(axis), updates, mismatches, *_rows(axis)], _warnings(axis)
     warnings = [_merged_looks(spec, number, axis.n_merged) for number, axis in enumerate(axes) if axis.n_merged]
     warnings += [f"axis {number}: {warning}" for number, axis in enumerate(axes) for warning in _of_capture(axis)]
     rows = [mismatches, *((f"axis {number}", _line(axis)) for number, axis in enumerate(axes))]
@@ -92,10 +93,6 @@ def _merged_looks(spec: AxesSpec, number: int, n_merged: int) -> str:
         f"axis {number}: {plural(n_merged, 'edge')} came within {spec.slots} clocks of another, in which an axis "
         "is looked at once: counts and velocity are wrong there"
     )
-
-
-def _updates(run: Run) -> tuple[str, str]:
-    return "updates", f"{len(run.updates.clock)} ({np.count_nonzero(run.updates.forced)} of them forced)"
 
 
 def _index(axis: Axis) -> str:

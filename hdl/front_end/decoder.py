@@ -107,7 +107,7 @@ class SensorDecoder(wiring.Component):
         else:
             illegal = Signal()
             told = Signal()
-            m.d.comb += illegal.eq(~_among(sensor.legal, level))
+            m.d.comb += illegal.eq(~level.matches(*map(packed_levels, sensor.legal)))
             m.d.sync += told.eq(illegal & self.ready)
             with m.If(~illegal | ~self.ready):
                 m.d.sync += past.eq(level)
@@ -127,11 +127,6 @@ class SensorDecoder(wiring.Component):
             self.decode_error.eq(self.ready & wrong),
         ]
         return m
-
-
-def _among(some: tuple[Levels, ...], level: Value) -> Value:
-    """Return whether the lines have one of these levels."""
-    return level.matches(*map(packed_levels, some))
 
 
 def _looked_up(m: Module, pairs: set[tuple[Levels, Levels]], level: Value, past: Value) -> Value:

@@ -36,11 +36,6 @@ from tachometry.spec.language.units import plural
 _FILES = {"--trace": "interval,forced,velocity_raw", "--counts": "tick,pulse_count", "--events": "clock,event"}
 
 
-def _refuse_outputs(path: Path, source: Lines) -> None:
-    for option in (name for name, columns in _FILES.items() if any(columns in line for line in source.head[:1])):
-        raise CaptureError(f"{path} has outputs of a core, from {option}: replay what --save-capture wrote")
-
-
 def read_csv(
     path: str | os.PathLike[str],
     wanted: Channels = ANY,
@@ -64,7 +59,8 @@ def read_csv(
         options = replace(options, time=own)
     with reading(path), opened(path) as file:
         source = Lines(path, file)
-        _refuse_outputs(path, source)
+        for option in (name for name, columns in _FILES.items() if any(columns in line for line in source.head[:1])):
+            raise CaptureError(f"{path} has outputs of a core, from {option}: replay what --save-capture wrote")
         header = read_header(path, source.head, options, samplerate_hz)
         if own is not None or not header.channels:
             return _pulses(path, source, header, options, one_line=wanted.b == SAME)

@@ -40,13 +40,6 @@ def _draw_error(
     axes.text(0.995, 0.84, shown, transform=axes.transAxes, ha="right", fontsize=8, weight="bold")
 
 
-def _draw_truth(axes: Axes, at: NDArray[np.float64], truth: NDArray[np.float64]) -> None:
-    """Draw the true speed as a broad band, from which a curve that is wrong stands out."""
-    kept = columns(at, truth)
-    band: dict[str, Any] = {"color": "0.82", "linewidth": 5, "zorder": 1.5, "solid_capstyle": "butt"}
-    axes.plot(at[kept], truth[kept], label="shaft (true)", **band)
-
-
 def _draw(
     spec: TachometerSpec, curves: list[Curve], scores: list[Score], instants: Instants, true_speed: TrueSpeed | None
 ) -> Figure:
@@ -72,7 +65,11 @@ def _draw(
         _draw_error(panels[curve.name], at, error, colour, words, rms == least)
     first = instants[0]
     if true_speed is not None:
-        _draw_truth(panels["velocity"], first, unit.of(true_speed(first)))
+        # A broad band, from which a curve that is wrong stands out.
+        band: dict[str, Any] = {"color": "0.82", "linewidth": 5, "zorder": 1.5, "solid_capstyle": "butt"}
+        truth = unit.of(true_speed(first))
+        kept = columns(first, truth)
+        panels["velocity"].plot(first[kept], truth[kept], label="shaft (true)", **band)
         # Most of all errors set the scale; what leaves the panel is a spike.
         reach = np.percentile([most for *_, most in errors], 60)
         reach *= 1.1 if curves[0].angle is None else 1.7  # which leaves room for the words

@@ -249,13 +249,8 @@ def limit(path: Sequence[Mapping[str, Any]]) -> str:
     return f"{start} → {end}{over and f' over {over}'}: logic {logic:.1f} ns, routing {routing:.1f} ns"
 
 
-def split_name(cell: str) -> list[str]:
-    """Return instances and signal in the name of a cell, made by Yosys of a net; an unnamed signal is empty."""
-    return [ADDED_TO_NAME.sub("", part) for part in cell.split(".") if not part.isdigit()]
-
-
 def signal_name(cell: str) -> str:
     """Return `box.signal` for a cell of the wrapped core; the datapath, in which most boxes lie, is left out."""
-    path = split_name(cell)
+    path = [ADDED_TO_NAME.sub("", part) for part in cell.split(".") if not part.isdigit()]  # as Yosys made it of a net
     inside = [part for part in path[1:] if part not in ("datapath", "")]
     return ".".join(inside if path[0] == "core" else ["wrapper", *path])

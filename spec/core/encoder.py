@@ -95,11 +95,8 @@ def _polynomial(what: str, text: str) -> str:
     return hex(int(word, 16))
 
 
-def _takes_reads(spec: Any) -> bool:
-    return bool(spec.facts.takes_reads)
-
-
-_READ: dict[str, Any] = {"fits": _takes_reads, "tests": (), "tacit": True}  # of options of an encoder that is read
+# Of options of an encoder that is read.
+_READ: dict[str, Any] = {"fits": lambda spec: bool(spec.facts.takes_reads), "tests": (), "tacit": True}
 
 
 @dataclass(frozen=True)

@@ -60,11 +60,6 @@ def parse_whole(what: str, text: str) -> int:
     raise ParameterError(what, f"must be a whole number, not {text!r}")
 
 
-def parse_text(what: str, text: str) -> str:
-    """Return the text as it is."""
-    return text
-
-
 @dataclass(frozen=True)
 class Option:
     """An option of the command line, of sweeps and of files: how a field of a spec is given as a text."""
@@ -79,7 +74,7 @@ class Option:
     limits: tuple[int, int] | None = None  # the least number that it may be, and the greatest
     shown: str | None = None  # the default, as `--help` shows it
     # makes the value from the name of the option in messages, and from the text
-    parse: Callable[[str, str], Any] = parse_text
+    parse: Callable[[str, str], Any] = lambda what, text: text
     # makes it instead, of a text that says nothing without other options: its third argument is what is known of the
     # fields of the same class and of `Timing`
     parse_at: Callable[[str, str, Mapping[str, Any]], Any] | None = None

@@ -91,12 +91,7 @@ class RegisterMap:
     def core_ports(self) -> tuple[Port, ...]:
         """Ports that the core has beside those of the bus; what is written is no input."""
         written = {field.port for field in self.settings}
-        return (*(port for port in self.core.ports if port.name not in written), *self.irq_ports)
-
-    @property
-    def irq_ports(self) -> tuple[Port, ...]:
-        """The port of the interrupt, if there is one."""
-        return (IRQ,) if self.irq else ()
+        return (*(port for port in self.core.ports if port.name not in written), *(IRQ,) * self.irq)
 
     @cached_property
     def interrupts(self) -> dict[str, str]:

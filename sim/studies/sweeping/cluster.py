@@ -129,12 +129,6 @@ def _deaf_to_interrupts() -> Iterator[None]:
             signal.raise_signal(number)
 
 
-def _tasks(digests: list[str]) -> dict[str, list[str]]:
-    """Return digests of points that make a task together, by the first of them."""
-    size = min(max(len(digests) // _TASKS, 1), _MOST)
-    return {digests[first]: digests[first : first + size] for first in range(0, len(digests), size)}
-
-
 def rows(client: Client, points: Mapping[str, Point | LoopPoint], study: str = "sweeping.sweep") -> Iterator[Row]:
     """Yield rows of points, by their digests, as they come; Dask schedules them, and again where a worker was lost.
 
@@ -150,7 +144,8 @@ def rows(client: Client, points: Mapping[str, Point | LoopPoint], study: str = "
 
         return [*import_module(f"tachometry.sim.studies.{study}").run_packed(code, packed)]
 
-    tasks = _tasks([*points])
+    digests, size = [*points], min(max(len(points) // _TASKS, 1), _MOST)
+    tasks = {digests[first]: digests[first : first + size] for first in range(0, len(digests), size)}
     # Keys of one kind: what the scheduler does for a task grows with the number of kinds.
     keys = [("point", first) for first in tasks]
     futures = client.map(run, *_packed(points, tasks), key=keys, batch_size=_AT_ONCE, pure=False)
@@ -176,16 +171,16 @@ def rows(client: Client, points: Mapping[str, Point | LoopPoint], study: str = "
         raise _summed(failed[0], f"; {len(failed)} of {plural(len(points), 'point')} could not be run")
 
 
-def _packed(points: Mapping[str, Point | LoopPoint], tasks: Mapping[str, list[str]]) -> tuple[list[str], list[bytes]]:
-    """Return the code of each task, and its points together: what they share is sent once, and computed once."""
-    codes = [points[group[0]].code for group in tasks.values()]
-    return codes, [pickle.dumps([points[digest] for digest in group]) for group in tasks.values()]
-
-
 def _killed(group: list[Point | LoopPoint], error: Exception) -> list[Exception]:
     """Return an error for each point of a task at which workers died."""
     which = f"one of {len(group)} points, the first that" if len(group) > 1 else "the point"
     return [OSError(f"every worker died at {which} of {group[0].method} on {group[0].text}: {error}")] * len(group)
+
+
+def _packed(points: Mapping[str, Point | LoopPoint], tasks: Mapping[str, list[str]]) -> tuple[list[str], list[bytes]]:
+    """Return the code of each task, and its points together: what they share is sent once, and computed once."""
+    codes = [points[group[0]].code for group in tasks.values()]
+    return codes, [pickle.dumps([points[digest] for digest in group]) for group in tasks.values()]
 
 
 def _summed(first: Exception, more: str) -> Exception:
