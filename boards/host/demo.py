@@ -16,9 +16,6 @@ SETTINGS = ("RATE", "ERRORS", "NOISE", "WIRES", "SPEED", "DEMO")
 class DemoBoard:
     """Talks to the demo on a board, or to a simulated one.
 
-    - `manifest`: What `NAME.json` of the demo says.
-    - `timeout`: Seconds in which an answer must come.
-
     It raises ValueError if the manifest is not that of a demo; NoAnswer if nothing answers; WrongBoard if another
     demo answers.
     """
@@ -34,12 +31,8 @@ class DemoBoard:
     def set(self, **values: int) -> int:
         """Change settings of the emulator by the names of their fields; one whole register is `speed` or `rate`.
 
-        The registers are written one after the other. What acts once, such as `jump`, is done once.
-
-        Returns
-        -------
-        clock : int
-            When the last of them was written, since the restart.
+        The registers are written one after the other; return the clock since the restart of the last one. What acts
+        once, such as `jump`, is done once.
         """
         if unknown := values.keys() - set(self.settings):
             raise ValueError(f"settings must be some of {', '.join(self.settings)}, not {', '.join(sorted(unknown))}")

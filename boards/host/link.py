@@ -135,11 +135,7 @@ class Receiver:
 
 
 class Link:
-    """Reads and writes the registers of a core over a UART.
-
-    - `timeout`: Seconds in which an answer must come.
-    - `tries`: Times that a request is sent.
-    """
+    """Reads and writes the registers of a core over a UART."""
 
     def __init__(self, port: Port, registers: HostRegisters, timeout: float = 0.5, tries: int = 4) -> None:
         self._port = port

@@ -23,8 +23,6 @@ _COMMANDS = {
 class LoopClient(Client):
     """Reads and writes a core with a control loop on a bus.
 
-    - `read`, `write`, `manifest`: See `Client`.
-
     It raises ValueError if the manifest is that of a core without registers or without a loop; WrongBoard if
     another core answers.
     """

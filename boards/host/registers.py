@@ -9,9 +9,7 @@ from tachometry.boards.host.snapshot import Snapshot
 class HostRegisters:
     """Holds the registers by their names.
 
-    - `manifest`: What `NAME.json` of a core on a bus says.
-
-    It raises ValueError if it is that of a core without registers.
+    It raises ValueError if the manifest is that of a core without registers.
     """
 
     def __init__(self, manifest: Mapping[str, Any]) -> None:

@@ -11,7 +11,6 @@ class Snapshot(Mapping[str, int]):
 
     Ports of one bit are there as 0 or 1, and so are `updated` and `indexed`, the events since the capture before.
 
-    - `flags`: Names of those that are flags.
     - `rad_per_s_per_lsb`: What one LSB of `velocity` is.
     """
 

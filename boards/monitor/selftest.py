@@ -85,9 +85,7 @@ def selftest(
 ) -> list[Result]:
     """Run all steps, and hold what the board says against the golden models; NoAnswer if the board falls silent.
 
-    - `registers`: Of the core on the board.
     - `period`: Ticks between frames; 0: about 2 ms.
-    - `told`: Is called after each step.
     - `chosen`: None: those of `steps`.
     """
     timing = registers.spec.timing

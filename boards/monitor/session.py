@@ -55,13 +55,9 @@ def connected(name: str, port: Port, manifest: Mapping[str, Any], timeout: float
 class Session:
     """Gives the telemetry of a board.
 
-    - `name`: What messages call the port.
     - `opened`: Opens the port; raises `Unplugged` where there is none for now.
-    - `manifest`: What `NAME.json` of the demo says.
     - `period`: Ticks from a frame of telemetry to the next.
     - `settings`: What the emulator is set to after each connection, see `DemoBoard.set`.
-    - `told`: Called with one line when the state changes.
-    - `timeout`: Seconds in which an answer must come.
     """
 
     def __init__(

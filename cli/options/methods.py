@@ -23,7 +23,6 @@ def named_methods(text: str, make: Make, others: Collection[str] = ()) -> Method
     It raises ValueError if a name is not known, or a method that is named cannot be with its options.
 
     - `text`: Of names, a core's with options after a colon: `m:average=10`.
-    - `make`: See `core.COMMON_CORE_OPTIONS`.
     - `others`: Names that are no methods of cores; what is behind a colon of such a name is not read here.
     """
     if text.strip() == "all":

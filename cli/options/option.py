@@ -90,7 +90,6 @@ def options_named() -> Iterator[None]:
 class Option(click.Option):
     """An option that is listed in a group of its command's help.
 
-    - `group`: Heading of the group.
     - `help`, `metavar`: A function is asked whenever the help is shown, of what may have been registered by then.
     - `fractional`: Whether plain numbers need not be whole; so is every option of a float.
     """

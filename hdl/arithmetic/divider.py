@@ -25,8 +25,6 @@ class Divider(wiring.Component):
     together with it, begins the next division.
 
     - `integer_bits`: Of the quotient, without its sign: the quotient has as many, and s and the sign.
-    - `scale_bits`: s.
-    - `nearest`: Round to the nearest integer, a tie up.
     - `zeros`: Bits at the end of each part of the dividend that are 0.
     """
 

@@ -20,7 +20,6 @@ class AxisCounters(wiring.Component):
     when the axis has its next slot at the earliest: a round has four at least.
 
     - `rounds`: Rounds of a tick: most steps of an axis in it.
-    - `reverse`: Forward is B before A.
     """
 
     def __init__(self, *, slots: int, rounds: int, decoding: int, reverse: bool = False) -> None:

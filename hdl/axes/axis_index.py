@@ -14,8 +14,6 @@ class AxisIndex(wiring.Component):
     It adds up all steps once more: the positions of the datapath are those of ticks.
 
     Latency: a rise that is seen in a slot is at the outputs four clocks later.
-
-    - `resets`: A rise sets the position to 0.
     """
 
     def __init__(self, *, slots: int, width: int, resets: bool) -> None:

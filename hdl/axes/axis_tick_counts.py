@@ -34,8 +34,6 @@ class AxisTickCounts(AxisCounters):
 
     It does what `TickCounts` does for one axis. Members and latency are those of `AxisCounters`, but `count`:
     Out(counts_layout(form)), of this tick so far.
-
-    - `reverse`: Forward is B before A.
     """
 
     def __init__(self, *, slots: int, form: Tracking, decoding: int, reverse: bool = False) -> None:

@@ -9,7 +9,6 @@ class AxisWindow(wiring.Component):
     """Does the work of `AlterationDetector` and `IntervalAccumulator`; their registers come in and go out. No latency.
 
     - `max_ticks`, `kept_ticks`: Longest window, and what a forced update leaves of it.
-    - `cancel`: Eq. (21) of Tsuji 2009 instead of eq. (17).
     """
 
     def __init__(

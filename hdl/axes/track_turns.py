@@ -42,10 +42,7 @@ def turn_layout(axis: TrackAxis) -> data.StructLayout:
 
 
 class TrackTurns(wiring.Component):
-    """Gives one machine to one axis after the other.
-
-    - `machine`: Which of `spec.plan.machines` it is.
-    """
+    """Gives one machine to one axis after the other."""
 
     def __init__(self, spec: AxesSpec, machine: int) -> None:
         axis = spec.axis

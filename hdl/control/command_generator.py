@@ -42,8 +42,6 @@ class CommandGenerator(wiring.Component):
 
     The commands are those of a control tick from its clock on, for at least two clocks. The next `tick` may come
     `generator_clocks` after it.
-
-    - `multiplier`: `serial` or `parallel`.
     """
 
     def __init__(self, form: GeneratorForm, multiplier: str = "serial") -> None:

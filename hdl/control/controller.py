@@ -63,8 +63,6 @@ class Controller(wiring.Component):
     whether there has been an update or not.
 
     Latency: `valid` is high `LoopSpec.latency` clocks after `tick`. The next `tick` may come a clock later.
-
-    - `multiplier`: `serial` or `parallel`.
     """
 
     def __init__(self, form: ControlForm, multiplier: str = "serial") -> None:

@@ -115,7 +115,6 @@ def peripheral(spec: AnySpec, bus: str = "wishbone", *, irq: bool = False) -> Pe
     """Return a core with its registers on a bus of an Amaranth SoC; ParameterError for another bus.
 
     - `bus`: `wishbone` (classic, 32 bits, granularity 8, with `err`), `csr` (32 bits), or `axi-lite`.
-    - `irq`: Whether the core has an interrupt.
     """
     if bus not in _LINES:
         raise ParameterError("bus", f"must be {', '.join(_LINES)}, not {bus}: try wishbone")

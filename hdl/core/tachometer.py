@@ -37,14 +37,7 @@ class Tachometer(wiring.Component):
     """Takes encoder pins, gives position and velocity.
 
     Latencies are those of the spec: `pin_to_count`, `tick_latency`, `tick_to_velocity`, in clocks of the `sync` domain.
-
-    - `spec`: For instance an `STachometer`.
-
-    Members
-    -------
-    The ports of the spec, less `clk` and `rst`, which are those of the `sync` domain: the lines in; `velocity`,
-    `velocity_valid`, `interval`, `forced`, `tick`, `pulse_count`, `position`, `decode_error`, `overflow`, `standstill`
-    out; and those of its options.
+    Members are the ports of the spec, less `clk` and `rst`, which are those of that domain.
     """
 
     _skipped: tuple[str, ...] = ("conditioner", "datapath")  # boxes that a simulation may move on

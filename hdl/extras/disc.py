@@ -25,7 +25,6 @@ class Gates(wiring.Component):
     - `entries`: The table after configuration, of each edge.
     - `looks`: Without a step, `displaced` is that of the next edge in the direction of the last step.
     - `place`: Where the index comes; None: there is none, and turns move the place.
-    - `shift`: That of the entries.
     """
 
     def __init__(

@@ -32,7 +32,6 @@ class Gates(wiring.Component):
     Counts that are wrong between two indices are seen in the clock after `index_valid`. Edges and errors are counted
     for a second, then anew. A turn in which the position is preset is not checked.
 
-    - `second`: Clocks.
     - `edges`: Edges of a line without one of the other that are a fault of the other.
     - `errors`: The greatest number of illegal transitions that is no fault.
     - `turn`: None: there is no index, or no number of counts between two.

@@ -39,8 +39,6 @@ class Gates(wiring.Component):
 
     Latency: a step that is in `position` in clock c begins a pulse in clock c + 1.
 
-    - `clocks`: Of a pulse.
-    - `width`: Bits of a position.
     - `aims`: The position may be set. Only with both directions, and without a list.
     - `latency`: Clocks from a step to the position that has it.
 
@@ -163,9 +161,6 @@ class FineGates(Gates):
 
     A place that goes back because of an update makes no second pulse; one that leaps over several positions makes all
     their pulses. The place is that of the shaft at the pins in the first clock of the pulse.
-
-    - `width`: Bits of the position in counts.
-    - `native_width`: Bits of `velocity`.
 
     - `native_valid`, `native_velocity`, `native_position_fine`: An update of the method, which stays until the
       next.

@@ -19,8 +19,7 @@ class InputConditioner(wiring.Component):
 
     Latency: a level that is sampled at clock edge c is at the output in clock c + 2 + `filter_clocks`.
 
-    - `filter_clocks`: Clocks for which a level must hold; 0 for no filter.
-    - `complemented`: Those of them that come with their complements.
+    - `complemented`: Lines that come with their complements.
     - `blanked`: Boxes behind the filters of lines whose echoes are ignored.
     """
 

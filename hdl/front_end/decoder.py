@@ -18,10 +18,7 @@ class QuadratureDecoder(wiring.Component):
     is low, rising forward and falling backward, so that a line which dithers on one edge never creeps. A clock in
     which both lines change has no direction: it counts nothing and is reported.
 
-    - `decoding`: Counts per period: 1, 2 or 4.
-    - `reverse`: Forward is B before A.
-
-    It raises ValueError if `decoding` is none of these.
+    It raises ValueError if `decoding` is not 1, 2 or 4.
     """
 
     def __init__(self, decoding: int, *, reverse: bool = False) -> None:

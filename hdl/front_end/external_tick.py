@@ -18,7 +18,6 @@ class ExternalTick(wiring.Component):
     Latency: a rise that is sampled at clock edge c makes c + 2 the last clock of its window; `tick_error` is high
     `latency` clocks after its cause. For a tick that did not come it is high together with `tick`.
 
-    - `min_cycles`, `max_cycles`: Fewest and most clocks in a window.
     - `latency`: That of `tick`, at least 2.
     - `synchronous`: `tick_in` is of the clock domain already, and a rise in a clock makes it the last of its window.
 

@@ -14,7 +14,6 @@ class IndexCapture(wiring.Component):
     Latency: if `level_z` rises in clock c, `index_valid` is high in clock c + `latency`, and `index_position` is the
     sum of all steps through clock c. `position` has this value in that clock, unless the index sets it to 0.
 
-    - `latency`: That of the position, at least 2.
     - `once`: An index is taken only if `arm` was high since the one before.
     """
 

@@ -10,7 +10,6 @@ from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
 class OpenCircuit(wiring.Component):
     """Pulse when a line has equalled its complement for longer than `clocks`, once until they differ again.
 
-    - `equal`: The line equals its complement.
     - `clear`: What lasts is told again.
     - `open`: High in clock c + `clocks` if they have been equal from clock c on.
     """

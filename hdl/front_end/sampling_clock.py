@@ -36,7 +36,6 @@ class SamplingClock(wiring.Component):
     The first window begins with the first clock after reset. Nothing needs its clocks counted, and the shift register
     takes fewer cells. Whatever state an upset brings, it comes to the last one of a window.
 
-    - `tick_cycles`: T, clocks in a window.
     - `lead`: Clocks before the last one of a window in which `early` is high; 0: it has no such output.
 
     It raises ValueError if `tick_cycles` is less than 1.

@@ -14,7 +14,6 @@ class CountWay(wiring.Component):
     decays, the way is that of a count and a half. With a `displacement`, that of the count before is taken
     off each count.
 
-    - `half`: Of a count.
     - `decays`, `reversals`: Whether there are decays, and whether a count of the other sign leads nowhere.
     """
 

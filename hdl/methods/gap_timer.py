@@ -12,7 +12,6 @@ class GapTimer(wiring.Component):
     looks a clock ahead, so that a division starts from registers.
 
     - `max_periods`: Periods without a count after which `overdue` is high, and the time begins anew.
-    - `on_lattice`: Timer periods are ticks.
     """
 
     def __init__(self, max_periods: int, *, on_lattice: bool) -> None:

@@ -17,7 +17,6 @@ class IntervalAccumulator(wiring.Component):
     is forced, and the window keeps its newer half. Without latency.
 
     - `max_ticks`, `kept_ticks`: Longest window, and what a forced update leaves of it.
-    - `cancel`: Eq. (21) instead of eq. (17).
     - `seldom`: A tick has at least three clocks, so that what the numerator has of the ticks before waits in a
       register.
 

@@ -51,7 +51,8 @@ class Disc:
 
 
 def find_crossings(shaft: Shaft, disc: Disc) -> tuple[FloatArray, IntArray]:
-    """Return every passage of an edge, in the order of time.
+    """Return the times of all passages of edges, in order, and the quarters that begin with them: the edge itself
+    forwards, the one below it backwards.
 
     Time is cut into cells in which the angle is monotone, so that the quarters at a cell's ends tell which edges lie
     in it; each is then located between two neighbouring floats. A passage is the first instant at which
@@ -59,12 +60,6 @@ def find_crossings(shaft: Shaft, disc: Disc) -> tuple[FloatArray, IntArray]:
 
     It raises ValueError if the shaft is so long in motion at so high a frequency that there are more than `MAX_CELLS`
     cells.
-
-    Returns
-    -------
-    time : float64 array, seconds, more than 0, not decreasing
-    quarter : int64 array
-        Quarter that begins with the passage: the edge itself forwards, the one below it backwards.
     """
     length = np.diff(shaft.breakpoints, append=shaft.breakpoints[-1])  # the end is a cell of no length
     with np.errstate(over="ignore"):

@@ -180,8 +180,6 @@ def pulsed(
     """Return times and levels of pulses, each of which lasts for half the time to the next one.
 
     - `time`, shape (n + 1,), seconds: The start, and the times of the steps.
-    - `step`, shape (n,), −1 or +1
-    - `duration`, seconds
     - `directed`: Pulses are on line A, and B is high for those forward, from the end of the pulse before; else they are
       on A for those forward and on B for those backward.
     - `both_edges`: Each edge of A is a step, with `directed`; the direction still changes between them.

@@ -91,7 +91,6 @@ class VirtualEncoder(EncoderOptions):
     Forward is A before B: the quarters k mod 4 = 0, 1, 2, 3 show (A, B) = 00, 10, 11, 01. Edge k, between the quarters
     k - 1 and k, lies at (k + offset[k mod 4 pulses_per_rev]) pitches of 2 pi / (4 pulses_per_rev) rad.
 
-    - `pulses_per_rev`: Lines of the disc: pulses of A per revolution.
     - `start_angle_rad`, rad: Added to the angle of the motion. At 0, a motion from angle 0 begins exactly on edge 0,
       which has been passed.
     - `index`: Whether there is an index line Z: high once a turn, in the first period from shaft angle 0, and gated as
@@ -286,7 +285,6 @@ def _placed(pattern: str, there: NDArray[np.bool_], seen: IntArray) -> NDArray[n
 class Encoding:
     """Holds the recording that an encoder made of a motion, and the truth about it.
 
-    - `recording`: The lines, in seconds.
     - `n_illegal`: Number of instants at which both lines change.
     - `n_lost`: Number of edges that are missing, two for each pulse.
     """

@@ -87,15 +87,7 @@ class BoardSimulation:
                 self._board = None
 
     def run(self, n_clocks: int, data: bytes = b"") -> tuple[bytes, bytes]:
-        """Let clocks pass while bytes are sent to the core one after the other.
-
-        Returns
-        -------
-        received : bytes
-            What the core has sent.
-        left : bytes
-            What of `data` has not begun to be sent.
-        """
+        """Return the bytes that the core sends in these clocks, and those of `data` that have not begun to reach it."""
         given, found = np.frombuffer(data, dtype=np.uint8), []
         transfer = _Transfer(
             clocks=n_clocks, n_in=len(data), lines=self._lines, out=self._out.ctypes.data, capacity=_ROOM

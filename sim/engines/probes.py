@@ -34,9 +34,7 @@ def shown(core: AnyTachometer) -> dict[str, Value]:
 class Watched(wiring.Component):
     """Wraps a core, so that the signals to be shown are outputs.
 
-    Members
-    -------
-    The ports of the core, and `shown_0`, `shown_1` … of 32 bits, out: the shown signals, the first in the lowest bits.
+    Members are the ports of the core, and `shown_0`, `shown_1` … of 32 bits, with the first signal in the lowest bits.
     """
 
     def __init__(self, spec: CoreSpec) -> None:

@@ -23,7 +23,6 @@ class Waveform:
     Signals are those of the clock that begins at the time stamp; `clk` itself comes with `add_curves`, as it would be
     nearly all of a long file. Use as a context manager.
 
-    - `clock_hz`: Frequency of the clock in Hz.
     - `widths`: Bits of each signal and whether it is signed, in the order in which they are shown.
     """
 
@@ -80,11 +79,7 @@ class Waveform:
 
 
 def add_curves(path: Path, clock_hz: int, window: tuple[int, int], curves: Mapping[str, Curve]) -> None:
-    """Add real signals to a waveform and its save file, which show them as curves; and `clk`, if it is not too long.
-
-    - `path`: Of a file that a `Waveform` has written.
-    - `window`: First clock, and the one behind the last.
-    """
+    """Add real signals to a waveform and its save file, which show them as curves; and `clk`, if it is not too long."""
     begin, end = (clock * 10**12 // clock_hz for clock in window)
     added: list[Iterator[Change]] = []
     declared = []

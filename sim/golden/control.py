@@ -25,7 +25,6 @@ class Control:
     """Keeps the state of a loop between two control ticks.
 
     - `y`, `w`, `z`: In 2^−f of an LSB of the velocity; w = z − y.
-    - `current`: Of the last control tick, in its LSB.
     - `saturated`: Whether it was held within the limit.
     """
 
@@ -115,9 +114,7 @@ def control(
     """Return what the loop shows with `current_valid`, of a shaft whose motion does not follow from its currents.
 
     - `clock`, shape (n,): Clocks of the control ticks.
-    - `position`, shape (n,): What the tachometer shows in them.
     - `updates`: Of the tachometer, with `velocity`.
-    - `commands`: One for each control tick.
     - `gains`: One for each control tick, where they are inputs.
     """
     loop = Control(spec.form)

@@ -101,12 +101,7 @@ class _Line:
 
 
 class GoldenEmulator:
-    """Computes the emulator from a restart on.
-
-    - `lines_per_rev`: Periods in a revolution, for the index line; None: there is none.
-    - `index_place`: Quarter of its period in which the index is high, 0 to 3.
-    - `complemented`: Lines whose complements are there as well.
-    """
+    """Computes the emulator from a restart on."""
 
     def __init__(
         self, lines_per_rev: int | None = None, index_place: int = 0, complemented: tuple[str, ...] = ()

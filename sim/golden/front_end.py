@@ -22,17 +22,9 @@ _PHASE = np.array([[0, 3], [1, 2]], dtype=np.uint8)
 
 
 def decode(a: NDArray[np.uint8], b: NDArray[np.uint8], decoding: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Step and illegal transition of each change of a list of levels.
+    """Return the step, −1, 0 or +1, of each change of levels, and whether both lines changed; shape (n − 1,).
 
     - `a`, `b`, shape (n,): Levels, each row different from the one before.
-    - `decoding`: 1, 2 or 4.
-
-    Returns
-    -------
-    step : int64 array, shape (n − 1,)
-        −1, 0 or +1.
-    illegal : bool array, shape (n − 1,)
-        Both lines changed.
     """
     turn = np.diff(_PHASE.ravel()[2 * a + b]) & 3
     step = np.array([0, 1, 0, -1], dtype=np.int64)[turn]
@@ -45,16 +37,10 @@ def decode(a: NDArray[np.uint8], b: NDArray[np.uint8], decoding: int) -> tuple[N
 def looked_up(
     encoder: Encoder, levels: Sequence[NDArray[np.uint8]], *, brief: bool
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Step of each row of a list of levels of any sensor, 0 for the first, and whether it is wrong.
+    """Return the step, −1, 0 or +1, of each row of levels of any sensor, 0 for the first, and whether it is wrong.
 
     - `levels`, shape (n,): Of each line of the sensor, each row different from the one before.
     - `brief`: The first row lasts for a clock only, in which the decoder does not yet look.
-
-    Returns
-    -------
-    step : int64 array, shape (n,)
-        −1, 0 or +1.
-    wrong : bool array, shape (n,)
     """
     bits = len(levels)
     table = np.zeros((1 << bits, 1 << bits, 2), dtype=np.int64)
@@ -85,17 +71,9 @@ def counted(
 def filter_line(
     clock: NDArray[np.int64], level: NDArray[np.uint8], clocks: int
 ) -> tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.int64]]:
-    """Return glitch filter: a level counts only when it holds for so many clocks; before the first one that does, none
-    counts.
+    """Return the changes of a line that pass the glitch filter, and the clocks at which other levels went back.
 
-    - `clock`, `level`, shape (n,): Change list of one line.
-
-    Returns
-    -------
-    clock, level : arrays
-        Change list of what passes, dated when it was first sampled.
-    returned : int64 array
-        Clocks at which a level that did not pass went back.
+    A level passes if it holds for `clocks`, and is dated when it was first sampled.
     """
     lasts = np.append(clock[1:] - clock[:-1] >= clocks, True)
     first = int(np.argmax(lasts))

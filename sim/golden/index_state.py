@@ -11,15 +11,10 @@ from tachometry.spec.core.sensors import packed_levels
 
 
 def in_state(spec: TachometerSpec, levels: Sequence[NDArray[np.uint8]]) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
-    """Return the index as it is in the state in which it is taken, and where it meets that state a second time.
+    """Return Z in the state in which it is taken, and where it has been high since the lines left the state on the
+    other side; shape (n,).
 
     - `levels`, shape (n,): Of the lines as they are on the pins, and of Z as it should be read, at each change.
-
-    Returns
-    -------
-    z : uint8 array, shape (n,)
-    again : bool array, shape (n,)
-        Z has been high since the lines left the state on the other side.
     """
     *lines, z = levels
     kind, state = spec.encoder.kind, spec.front_end.index_state
@@ -51,7 +46,6 @@ def passed_by(
     Times of Z with no step between them, in a clock in which Z is low as in the one before, are one.
 
     - `stepped`, `step`, shape (m,): Clocks of the steps, and the steps, −1 or +1.
-    - `clock`, shape (n,)
     - `z`, `taken`, shape (n,): From each clock on Z, and Z in its state.
     """
     change = np.diff(z.astype(np.int8))

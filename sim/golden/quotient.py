@@ -12,7 +12,6 @@ def round_quotient(
     Where 64 bits do not hold the shifted numerators, it is a long division, some bits at a time, so that no remainder
     overflows. The result must fit.
 
-    - `numerator`, `denominator`, shape (n,)
     - `towards`: ⌊x + ½⌋ (0), ⌊x⌋ (−1) or ⌈x⌉ (1).
     """
     bits = int(np.max(np.abs(numerator), initial=0)).bit_length() + frac_bits

@@ -36,8 +36,6 @@ def save_heat_maps(
 
     - `points`: Method, values of the axes that this method has, and the value to show, of each.
     - `axes`: One axis or two, with their values: across, and upwards.
-    - `what`: What is shown, with its unit.
-    - `log`: Colours go by the logarithm.
     """
     by_method: dict[str, list[tuple[Mapping[str, str], float | None]]] = {}
     for method, where, value in points:

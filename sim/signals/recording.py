@@ -174,9 +174,7 @@ class PinTrace(_Lines):
     - `clock`, shape (n,), strictly increasing, first entry 0: Clock edge from which the levels of the same row are
       sampled (clock edge 0 is the first after reset).
     - `a`, `b`, shape (n,), 0 or 1
-    - `n_clocks`: Number of clocks to run.
     - `z`, `tick_in`, shape (n,), 0 or 1: Index line and external tick; None if it is absent.
-    - `c`, shape (n,), 0 or 1: A third line.
     - `more`, shape (n,): Further inputs by name, such as `preset`. `probe` and `probe_arm` have a bit for each probe,
       the first lowest; a setting, such as `probe_edges`, is what a program has written.
     """

@@ -132,16 +132,9 @@ class Mismatch:
 
 
 def compare(expected: Run, actual: Run) -> tuple[int, list[Mismatch]]:
-    """Hold two runs against each other, every row and every bit.
+    """Return how many rows of two runs differ, summed over all signals, and the first in each signal that differs.
 
-    It raises ValueError if they are not runs of the same ports.
-
-    Returns
-    -------
-    count : int
-        Rows that differ, summed over all signals; a row that only one run has is one.
-    first : list of Mismatch
-        The first of them in each signal that differs.
+    A row that only one run has is one. It raises ValueError if they are not runs of the same ports.
     """
     shapes = [{strobe: list(table.columns) for strobe, table in run.tables.items()} for run in (expected, actual)]
     if shapes[0] != shapes[1]:

@@ -22,7 +22,6 @@ class HeldVelocity:
 
     - `time`, shape (n,), seconds: Of each tick the clock in which an update that it causes is valid. A core that ends
       its ticks itself is read after each nominal tick.
-    - `velocity_rad_s`, shape (n,), rad/s
     """
 
     time: NDArray[np.float64]

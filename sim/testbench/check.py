@@ -94,11 +94,9 @@ def check(
 ) -> Checked:
     """Make the core of a manifest again, and compare its files and its behaviour with what lies beside the manifest.
 
-    - `path`: The manifest.
     - `simulation`: Whether the Verilog plays a motion that the golden model plays, too.
     - `netlists`: Verilog to be simulated in place of NAME.v, a netlist with the models of its cells, for example.
     - `waves`: Folder for the waveform of a core that differs; it is made then.
-    - `say`: Told what is being done.
 
     It raises ValueError if the file is no manifest; if this version makes no such core; OSError if there is no cocotb
     or no simulator, or it fails.

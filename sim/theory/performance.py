@@ -253,7 +253,6 @@ def disc_counts(spec: TachometerSpec) -> float:
 def disc_error(spec: TachometerSpec, speed: Floats, found: Performance) -> Floats:
     """Return how much a real disc adds to the greatest error, in rad/s, shape (n,); NaN where a method cannot measure.
 
-    - `speed`, shape (n,), rad/s
     - `found`: Of the core at these speeds, with an ideal disc.
 
     Notes

@@ -22,17 +22,12 @@ _STEPS = 16  # values of X in an octave for which errors are computed
 
 @functools.cache
 def velocity_errors(x: float) -> tuple[float, float]:
-    """Return what errors of the places of events make of the velocity that is shown.
+    """Return standard deviation and greatest error of the velocity, in counts per time between two events.
 
-    - `x`: X of a memory that has grown, at most 1/4.
-
-    Returns
-    -------
-    standard deviation, greatest : float
-        In counts per time between two events. The first is for independent errors with a standard deviation of a
-        count: √12·X^1.5, that of a least-squares line through the events of the memory, times 0.83 to 0.88 as older
-        events fade (3.2 times √12·X^1.5 at X = 1/4, where the acceleration is seen). The second is for errors of at
-        most a count: the sum of |impulse response|, 3·X (9.5·X).
+    `x` is X of a memory that has grown, at most 1/4. The first is for independent errors with a standard deviation of a
+    count: √12·X^1.5, that of a least-squares line through the events of the memory, times 0.83 to 0.88 as older events
+    fade (3.2 times √12·X^1.5 at X = 1/4, where the acceleration is seen). The second is for errors of at most a count:
+    the sum of |impulse response|, 3·X (9.5·X).
     """
     if x < _SMALL:
         deviation, greatest = velocity_errors(_SMALL)
@@ -62,16 +57,10 @@ def errors(
     tick_seconds: float,
     max_memory: float = MOST_MEMORY_SECONDS,
 ) -> tuple[Floats, Floats]:
-    """Return the errors of the velocity, in rad/s, when offsets are learned and the memory has grown.
+    """Return standard deviations and greatest errors of the velocity, in rad/s, at speeds in rad/s greater than 0.
 
-    - `speed`, shape (n,), rad/s, greater than 0
-    - `edge_error`, counts: Standard deviation of the independent errors of edges; for the second result the greatest
-      error of any.
-    - `tick_seconds`, `max_memory`, seconds
-
-    Returns
-    -------
-    standard deviation, greatest : float64 arrays, shape (n,), rad/s
+    Offsets are learned, and the memory has grown. For the first, `edge_error` is the standard deviation of independent
+    errors of edges, in counts; for the second the greatest error of any.
     """
     unit = tsuji.unit_velocity(counts_per_rev, tick_seconds)
     ratio = speed / unit

@@ -19,7 +19,6 @@ REQUIRED: Any = MISSING  # default of an option that must be given
 class ParameterError(ValueError):
     """A parameter is not what it must be; the message begins with the parameter, "max_ticks must be …".
 
-    - `parameter`: Name of the field, or of the option that was read; the command line shows its option in its place.
     - `rest`: The message behind the name.
     - `brief`: Why, in a few words behind the name of a method that another one is taken for; empty: the message.
     - `refused`: The spec, if this is all that is wrong with it; what is made of it may say better what is allowed.
@@ -152,7 +151,6 @@ def option(default: Any, help: str, *, text: str | None = None, also: tuple[Opti
     - `default`: Default of the field; with a text, None for that of the text, or `REQUIRED` where only `read_options`
       has one.
     - `text`: The default as a text, read as it would be if it were given.
-    - `also`: Other options for the same field.
     - `**about`: See `Option`. Without `parse`, the kind of the default tells how the text is read.
     """
     if isinstance(default, bool) or "part" in about:

@@ -19,11 +19,8 @@ STREAM = "m_axis"  # names of ports of a stream begin with it
 class Port:
     """Describes a scalar port of the exported core.
 
-    - `direction`: `input` or `output`.
-    - `width`: Bits.
     - `held_by`: Of an output, the strobe in whose clocks it is read; a strobe is read with itself.
     - `unit`: What one LSB is.
-    - `help`: What the port means, in a sentence or two.
     """
 
     name: str

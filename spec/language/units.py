@@ -67,8 +67,6 @@ def read_quantity(what: str, text: str, units: Units, default: str = "", also: s
     """Return the decimal number in a text, exactly, and its unit.
 
     - `what`: What the message calls the quantity.
-    - `units`: Those that it may have.
-    - `default`: Unit of a number without one.
     - `also`: What else may stand there, which the caller reads, for the message.
 
     It raises ParameterError if the text is not of this form, or the number absurdly large or small.

@@ -106,7 +106,6 @@ class AxesSpec(WithTachometer):
     clock is a round: see `axis`.
 
     - `tachometer`: What each axis would be as a core of its own; its clock and tick are those of this core.
-    - `axes`: N, 1 to 64.
     - `parallel`: Every output has a port for each axis, which holds it.
 
     It raises ParameterError if there cannot be such a core.

@@ -60,17 +60,9 @@ def shown(
 def records(
     spec: TachometerSpec, trace: PinTrace, steps: Steps, tables: Mapping[str, Table]
 ) -> tuple[Ints, NDArray[np.void]]:
-    """Return the records that are sent.
+    """Return the first clock of each record on the stream, and the records, with the `dtype` of the manifest.
 
-    - `steps`: Those of the trace.
-    - `tables`: `sim.golden.tables` of them.
-
-    Returns
-    -------
-    clock : int64 array, shape (n,)
-        The first clock of each record on the stream.
-    records : structured array, shape (n,)
-        With the `dtype` of the manifest. What belongs to updates, the velocity aside, is not defined before the first.
+    Fields of updates, but the velocity, are not defined before the first. `tables` are `sim.golden.tables` of `steps`.
     """
     extra = Stream.of(spec.extras)
     assert extra is not None

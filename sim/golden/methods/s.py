@@ -18,12 +18,6 @@ def alterations(m_e: NDArray[np.int64]) -> NDArray[np.bool_]:
 
     While the number changes in every tick, only a tick that equals b does not alter, which leaves b as it is. So b is
     the pulse number of the last tick that equals its predecessor, and nothing has to be followed tick by tick.
-
-    - `m_e`, shape (n,)
-
-    Returns
-    -------
-    bool array, shape (n,)
     """
     numbers = np.concatenate([[0], m_e])  # m_e(−1) = b = 0
     changes = np.concatenate([[False], numbers[1:] != numbers[:-1]])
@@ -34,17 +28,10 @@ def alterations(m_e: NDArray[np.int64]) -> NDArray[np.bool_]:
 def windows(
     alteration: NDArray[np.bool_], max_ticks: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
-    """Return closing tick i, length m_s and origin of every update.
+    """Return closing tick i, length m_s of every update, and whether it is forced; shape (u,).
 
     A window closes at an alteration, which opens the next, or when it has grown to `max_ticks`: then it keeps its newer
     half, ⌊max_ticks/2⌋ ticks. The first opens at tick −1.
-
-    - `alteration`, shape (n,)
-
-    Returns
-    -------
-    closing, m_s : int64 arrays, shape (u,)
-    forced : bool array, shape (u,)
     """
     at = np.flatnonzero(alteration)
     opening = np.concatenate([[-1], at])

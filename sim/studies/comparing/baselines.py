@@ -144,7 +144,6 @@ def low_pass(value: ArrayLike, period_s: float, filter_s: float) -> FloatArray:
 def finite_difference(steps: Steps, period_s: float, filter_s: float = 5e-3) -> Estimate:
     """Return counts of each period over the period, then a low-pass filter.
 
-    - `period_s`, seconds
     - `filter_s`, seconds: Time constant of the filter; 0 for none. SimpleFOC's default is 5 ms.
     """
     readings = read(steps, period_s)
@@ -195,7 +194,6 @@ def mixed_method(steps: Steps, period_s: float, timeout_s: float = 0.1, clock_s:
     half a period is left out, and the speed is 0 once Th is more than `timeout_s`. SimpleFOC controls with what
     `low_pass` makes of this, with a time constant of 5 ms by default.
 
-    - `period_s`, seconds
     - `timeout_s`, seconds: 0.1 s in SimpleFOC.
     - `clock_s`, seconds: Unit of the times of counts: 1 us in SimpleFOC.
     """

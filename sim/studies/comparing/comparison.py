@@ -73,8 +73,6 @@ class Comparison(Shown):
 
     - `spec`: Whose clock, tick and unit hold for all, and with which float models are read.
     - `specs`: Of the methods that are compared, by their names with their settings.
-    - `instants`, shape (n,), seconds: See `Judge`.
-    - `recording`: The edges.
     - `n_tried`: Number of settings of which one is the best, by the name of this one.
     - `costs`: Of all settings, by the method; empty if they were not asked for.
     - `rms_speed`, rad/s: Of the motion, with which delays were measured.

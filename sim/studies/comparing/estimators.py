@@ -72,7 +72,6 @@ def least_squares(
     - `edges`, more than `order`, at most 10,000: Number of edges that the polynomial is fitted to.
     - `order`, from 1 to 5: Of the polynomial: 1 for a straight line, which lags by half of its length, 2 with
       acceleration.
-    - `timeout_s`, seconds
     - `bound`, counts: Distance that the shaft may go without an edge: the slots of a bad disc are uneven.
 
     It raises ValueError if a parameter is out of range.
@@ -153,7 +152,6 @@ def adaptive_window(
     that reading passes all others in the window within the noise bound. The slope of the line is that between the ends
     of the window (end-fit), or that of the least squares (best-fit).
 
-    - `period_s`, seconds
     - `noise_bound`, counts, at least 0: The paper's d: greatest distance of a reading from the line. Counting alone
       needs 1.
     - `longest`, periods, from 1 to 10,000: No window is longer.
@@ -234,7 +232,6 @@ def kalman(steps: Steps, period_s: float, process_noise: float = 300.0, order: i
     bandwidth of about sqrt(a sqrt(12) / count in rad), rad/s. With order 3 it changes at random from each to the next,
     by its derivative j times the period; the bandwidth is about the cube root of (j sqrt(12) / count in rad).
 
-    - `period_s`, seconds
     - `process_noise`, more than 0, rad/s^2 with order 2, rad/s^3 with order 3: Standard deviation of the acceleration,
       or of its derivative; the tracking index that follows from it must be as for `kalman_gains`.
     - `order`, 2 or 3: States: position and speed, and acceleration with order 3.
