@@ -1,6 +1,6 @@
 """A client reads the registers of a core on a bus, by the names of the ports."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from tachometry.boards.host.registers import HostRegisters
@@ -73,6 +73,32 @@ class Client:
         """
         for offset, word in self.registers.written(name, value):
             self._write(offset, word)
+
+    def write_disc(self, displacement: Sequence[float]) -> bool:
+        """Write a map of the disc, and return whether the core has it then; it forgets its place in the turn.
+
+        `displacement` is where each edge lies, in counts, as in the file of `tachometry calibrate`. What captures are
+        held does not show the map: False. It raises KeyError if the core has no table that is written; ValueError if
+        the map has another number of edges, or one that does not fit; then nothing is written.
+        """
+        about = self.registers.disc
+        if about is None or not about["writable"]:
+            raise KeyError("there is no map of the disc that is written: see --disc-table")
+        unit, number = about["counts_per_lsb"], about["entries"]
+        if len(displacement) != number:
+            raise ValueError(f"displacement must have {number} edges, not {len(displacement)}")
+        entries = [round(each / unit) for each in displacement]
+        if not -128 <= min(entries) <= max(entries) < 128:
+            raise ValueError(f"displacement must be from {-128 * unit:g} to {127 * unit:g} counts")
+        for edge, entry in enumerate(entries):
+            self.write("DISC_ADDRESS", edge)
+            self.write("DISC_DATA", self.registers.with_fields("DISC_DATA", entry & 255, {"write": 1}))
+        return all(self._has_entry(*each) for each in enumerate(entries))
+
+    def _has_entry(self, edge: int, entry: int) -> bool:
+        self.write("DISC_ADDRESS", edge)
+        self._word(self.registers.captured[0]["name"])
+        return self._word("DISC_ENTRY") == entry & self.registers.word_mask
 
     def hold(self, on: bool) -> None:
         """Let only the input `capture` of the core capture (True), or `snapshot`, too (False, as after reset)."""

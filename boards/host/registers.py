@@ -24,6 +24,7 @@ class HostRegisters:
         self.captured = [one for one in self._registers.values() if one["captured"]]
         self._rad_per_s_per_lsb: float = manifest["velocity"]["rad_per_s_per_lsb"]
         self._flags = frozenset(field["name"] for field in self._registers["STATUS"]["fields"])
+        self.disc: Mapping[str, Any] | None = manifest.get("disc")
         self._unused = [self._unused_of(register) for register in self.captured]
 
     def __contains__(self, name: str) -> bool:

@@ -9,6 +9,8 @@ from support.lockstep import random_case
 
 from tachometry.boards.host import client
 from tachometry.boards.host.snapshot import Snapshot
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.golden.registers import Access, GoldenBank
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TachometerSpec, of_texts
@@ -126,3 +128,26 @@ def test_a_manifest_without_registers_is_refused() -> None:
     described = manifest(of_texts("s", {"ppr": "8"}))
     with pytest.raises(ValueError, match=r"^manifest must be that of a core on a bus, which tachometry generate --bus"):
         client.Client(lambda offset: 0, lambda offset, value: None, described)
+
+
+def test_a_map_of_the_disc_is_written_and_read_back() -> None:
+    texts = {"ppr": "2", "clock": "1MHz", "tick": "20clk", "max-time": "60clk", "index": "yes", "disc-table": "edges"}
+    spec = of_texts("mt", texts)
+    trace = PinTrace.of(VirtualEncoder(2, index=True).record(parse_motion("stop:9ms")).recording, spec).completed(spec)
+    board, described = GoldenBoard(RegisterMap(spec), trace, 9), manifest(spec, "spindle")
+    bench = client.Client(board.read, board.write, described | {"registers": RegisterMap(spec).described()})
+    entries = [(7 * edge) % 41 - 20 for edge in range(8)]
+    displacement = [entry * described["disc"]["counts_per_lsb"] for entry in entries]
+    assert bench.write_disc(displacement)
+    bench.hold(True)
+    assert not bench.write_disc(displacement)
+    for wrong, message in (
+        (displacement[:7], "must have 8 edges, not 7"),
+        ([7.0] * 8, "from -6.4 to 6.35 counts"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            bench.write_disc(wrong)
+    spec, trace, described = case("s", 4)
+    board = GoldenBoard(RegisterMap(spec), trace, 9)
+    with pytest.raises(KeyError, match="no map of the disc that is written: see --disc-table"):
+        client.Client(board.read, board.write, described).write_disc(displacement)

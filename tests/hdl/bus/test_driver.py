@@ -414,6 +414,41 @@ def test_what_is_written_in_c_is_what_the_client_in_python_writes(tmp_path: Path
             client.write(name, value)
 
 
+def test_a_map_of_the_disc_is_written_and_read_back(tmp_path: Path) -> None:
+    """The table is in memory here; one entry is read back wrong."""
+    texts = {"ppr": "25", "clock": "1MHz", "tick": "20clk", "max-time": "60clk", "index": "yes", "disc-table": "edges"}
+    registers = RegisterMap(of_texts("mt", texts))
+    entries = [(7 * edge) % 41 - 20 for edge in range(100)]
+    places = {one.name: one.offset for one in registers}
+    (first,) = (one.offset for one in registers if one.captures)
+    address, data, shown = (places[f"DISC_{name}"] for name in ("ADDRESS", "DATA", "ENTRY"))
+    main = f"""
+#include <stdio.h>
+#include "spindle_driver.h"
+static uint32_t edge, taken;
+static uint8_t table[100];
+static uint32_t reads(void *wrong, uint32_t offset) {{
+  if (offset == {first}) taken = (uint32_t)(int8_t)(table[edge] ^ (wrong && edge == 73));
+  return offset == {shown} ? taken : 0;
+}}
+static void writes(void *wrong, uint32_t offset, uint32_t value) {{
+  (void)wrong;
+  if (offset == {address}) edge = value;
+  if (offset == {data} && value >> 8 == 1) table[edge] = (uint8_t)value;
+}}
+int main(void) {{
+  static const int8_t entries[] = {{{", ".join(map(str, entries))}}};
+  const struct spindle_bus right = {{reads, writes, 0}}, wrong = {{reads, writes, &edge}};
+  printf("%d %d\\n", spindle_write_disc(&right, entries), spindle_write_disc(&wrong, entries));
+  return 0;
+}}
+"""
+    for file, text in {**register_files(registers, NAME), "main.c": main}.items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    build.run([*build.compiler(), *STRICT, "main.c", "-o", "main"], "compiler", tmp_path)
+    assert build.run([tmp_path / "main"], "main") == "1 0\n"
+
+
 # A word of a driver's unit in rad/s, from school.
 UNITS = {"rad/s": 1.0, "rev/s": 2 * math.pi, "rpm": 2 * math.pi / 60, "count/tick": 2 * math.pi / 2000 / 100e-6}
 _CONVERSIONS = """
