@@ -54,16 +54,9 @@ _WORDS = [f"--{about.name}" for about in _OPTIONS.values()]
 def Tachometer(**options: Unpack[CoreOptions]) -> AnySpec:  # a noun, as it makes what it says
     """Return a core, as `tachometry generate` makes it of options of these names, with _ for each - within a name.
 
-    Parameters
-    ----------
-    **options
-        Texts as on the command line, numbers, and True or False for flags: `ppr=500, max_speed="400rad/s"`. Also
-        `method` (without it the best that fits the tick), `axes`, `parallel` and `loop`.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such option, or it is not what it must be.
+    Values are texts as on the command line, numbers, and True or False for flags: `ppr=500, max_speed="400rad/s"`.
+    There are also `method` (without it the best that fits the tick), `axes`, `parallel` and `loop`. It raises
+    ParameterError if there is no such option, or its value is wrong.
 
     Examples
     --------
@@ -118,16 +111,11 @@ def _in_python() -> Iterator[None]:
 class Run(Shown):
     """Holds what a core has shown, compared with its golden model in every bit.
 
-    Parameters
-    ----------
-    simulation : Simulation
-        All of it: `simulation.lockstep` has the rows of every port, `simulation.axes` what each axis made of them.
-    axis : int
-        The axis whose arrays are shown.
+    `simulation.lockstep` has the rows of every port, `simulation.axes` what each axis made of them.
     """
 
     simulation: Simulation
-    axis: int = 0
+    axis: int = 0  # whose arrays are shown
 
     @property
     def _axis(self) -> Axis:
@@ -191,11 +179,7 @@ class Run(Shown):
 def plan(spec: AnySpec, speeds: Sequence[float] | None = None) -> Plan:
     """Return what a core measures at constant speeds of an ideal encoder, as `tachometry plan` prints it.
 
-    Parameters
-    ----------
-    spec : AnySpec
-    speeds : sequence of float or None, rad/s
-        None: eight speeds over the range of the core.
+    Speeds are in rad/s; None: eight over the range of the core.
 
     Examples
     --------
@@ -212,21 +196,9 @@ def simulate(
 ) -> Run:
     """Run a core on a virtual encoder, against its golden model, as `tachometry simulate` does.
 
-    Parameters
-    ----------
-    spec : AnySpec
-        Of a core with a loop, the tachometer alone is run.
-    motion : str or sequence of str
-        As of `--motion`, `"ramp:0:40rad/s:500ms"`; for many axes one for each.
-    engine : str
-        As of `--engine`.
-    **encoder
-        What is wrong with the encoder, as the command's options: `jitter=0.05, nonuniformity=0.1, seed=2`.
-
-    Raises
-    ------
-    ValueError
-        If a motion, an engine or an option is not what it must be.
+    Of a core with a loop, the tachometer alone is run. A motion is that of `--motion`, `"ramp:0:40rad/s:500ms"`; many
+    axes have one each. Faults of the encoder are the command's options: `jitter=0.05, nonuniformity=0.1, seed=2`. It
+    raises ValueError if a motion, an engine or an option is wrong.
 
     Examples
     --------
@@ -251,20 +223,8 @@ def replay(
 ) -> Run:
     """Run a core on captured signals, one capture for each axis, as `tachometry replay` does.
 
-    Parameters
-    ----------
-    spec : AnySpec
-    *captures : path or Recording
-        Files whose channels are found by their names; or what `read_capture` reads, which takes the names of others.
-    engine : str
-        As of `--engine`.
-    count, angle : str or None
-        Column of a log, as of the command.
-
-    Raises
-    ------
-    ValueError
-        If a capture is not what it must be.
+    Channels of files are found by their names; `read_capture` takes other names, and gives a Recording. `count` or
+    `angle` is the column of a log, as of the command. It raises ValueError if a capture is wrong.
     """
     text = TextOptions(slowest_s=float(spec.tachometer.tick.seconds(spec.tachometer.times.longest)))
 
@@ -284,18 +244,8 @@ def replay(
 def compare(specs: Sequence[TachometerSpec], motion: str, **encoder: Unpack[EncoderFaults]) -> Comparison:
     """Compare cores on the same edges of a virtual encoder, as `tachometry compare` does.
 
-    Parameters
-    ----------
-    specs : sequence of TachometerSpec
-        Of different methods; the first one's encoder, clock and tick are those of all.
-    motion : str
-    **encoder
-        As of `simulate`.
-
-    Raises
-    ------
-    ValueError
-        If a method is there twice; if a motion or an option is not what it must be.
+    The first one's encoder, clock and tick are those of all; `motion` and `encoder` are as of `simulate`. It raises
+    ValueError if a method is there twice; if a motion or an option is wrong.
 
     Examples
     --------
@@ -323,26 +273,9 @@ def generate(
 ) -> list[Path]:
     """Write a core as Verilog, with its manifest and all that it takes to build it in, as `tachometry generate` does.
 
-    Parameters
-    ----------
-    spec : AnySpec
-    folder : path
-        It is made if it does not exist, and files in it are overwritten.
-    name : str
-        Of the module and of the files.
-    bus, baud, target, irq
-        See `tachometry.hdl.export.export`.
-
-    Returns
-    -------
-    list of Path
-
-    Raises
-    ------
-    ValueError
-        If the name, the bus or the target cannot be.
-    OSError
-        If the files cannot be written.
+    The folder is made if it does not exist, and files in it are overwritten; `name` is that of the module and of the
+    files. For the others see `tachometry.hdl.export.export`. It returns the paths, and raises ValueError for a name, a
+    bus or a target that cannot be, OSError if the files cannot be written.
     """
     texts = export(spec, name, bus, baud, target, irq)
     places = {file: Path(folder) / file for file in texts}

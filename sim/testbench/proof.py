@@ -108,14 +108,7 @@ class _Side:
 def differences(gold: str, gate: str, name: str, names: Mapping[str, str], yosys: str) -> list[str]:
     """Return how the Verilog `gate` differs from `gold`; nothing if it is proven to be the same circuit.
 
-    Parameters
-    ----------
-    name : str
-        The top of both.
-    names : mapping
-        Paths of registers, wires and memories in `gate` by those in `gold`; empty if they are the same.
-    yosys : str
-        The program.
+    `names` has paths of registers, wires and memories in `gate` by those in `gold`; it is empty if they are the same.
     """
     with scratch() as folder:
         for side, text in (("gold", gold), ("gate", gate)):
