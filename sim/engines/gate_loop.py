@@ -105,7 +105,7 @@ class GateLoop:
         first, delay = spec.latency.first_tick, spec.latency.tick_to_result + 1
         controller = CONTROLLER(clocks=int(spec.period), first=first, delay=delay)
         there = ctypes.cast(ctypes.byref(gates), ctypes.c_void_p).value
-        found = self._simulation.call(motor, edges, controller, course, log, 1e-5, there)
+        found = self._simulation.call(motor, edges, controller, course, log, there)
         if gates.n_edges >= MOST_EDGES:
             raise ValueError(f"a run must have less than {MOST_EDGES} edges")
         trace = _traced(lines[: gates.n_edges], n_clocks)

@@ -18,6 +18,7 @@ from tachometry.spec.language.option import ParameterError
 
 PARTS = ("plant.h", "control.h", "loop.h")
 COLUMNS = ("time", "command", "speed", "angle", "held", "y", "z", "disturbance", "current", "driven", "position")
+_STEP = 1e-5  # seconds
 FloatArray = NDArray[np.float64]
 Log = dict[str, FloatArray]
 
@@ -132,11 +133,13 @@ def struct(name: str, **members: Any) -> type[ctypes.Structure]:
 
 _D, _I, _P = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p
 _MOTOR = struct("Motor", **{field.name: _D for field in fields(Motor)})
+_GAINS = ("position", "velocity", "observer", "filter", "inertia", "torque_constant", "current_limit")
+_WAYS = ("way", "on_filtered", "feed_forward")
 _ENCODER = struct("Encoder", pitch=_D, offset=_P, n_edges=_I, jitter=_P, n_jitter=_I)
 CONTROLLER = struct(
     "Controller",
-    **dict.fromkeys(("position", "velocity", "observer", "filter", "inertia", "torque_constant", "current_limit"), _D),
-    **dict.fromkeys(("way", "on_filtered", "feed_forward", "clocks", "first", "delay"), _I),
+    **dict.fromkeys(_GAINS, _D),
+    **dict.fromkeys((*_WAYS, "clocks", "first", "delay"), _I),
 )
 _CORE = struct(
     "Core",
@@ -174,19 +177,14 @@ class LoopSimulation:
         """End all runs at once, also those that begin later, until they may go on again."""
         self._stop.value = ending
 
-    def run(
-        self, motor: Motor, edges: Edges, gains: Gains, course: Course, *, log: float = 1e-4, step: float = 1e-5
-    ) -> Log:
+    def run(self, motor: Motor, edges: Edges, gains: Gains, course: Course, *, log: float = 1e-4) -> Log:
         """Return a run as long as the course, from rest: a column of values at times `log` seconds apart for each name.
 
-        The motor goes on in steps of `step` seconds, or from event to event. It raises ValueError if the shaft runs
-        away.
+        The motor goes on in steps of 10 us, or from event to event. It raises ValueError if the shaft runs away.
         """
-        return self.call(motor, edges, self._controller(gains), course, log, step, None)
+        return self.call(motor, edges, self._controller(gains), course, log, None)
 
-    def call(
-        self, motor: Motor, edges: Edges, controller: Any, course: Course, log: float, step: float, gates: int | None
-    ) -> Log:
+    def call(self, motor: Motor, edges: Edges, controller: Any, course: Course, log: float, gates: int | None) -> Log:
         """Run as `run` does; `gates` describes a controller in gates, in place of one in double precision."""
         spec = self._spec
         arrays = (edges.offset, edges.jitter, course.speed, course.angle, course.load, course.current)
@@ -205,7 +203,7 @@ class LoopSimulation:
             controller=controller,
             core=self._core(controller.clocks),
             course=_COURSE(*(one.ctypes.data for one in tables), len(course.speed), self.clocks(course.seconds)),
-            **{"step": self.clocks(step), "end": end, "log": apart, "rows": rows.ctypes.data},
+            **{"step": self.clocks(_STEP), "end": end, "log": apart, "rows": rows.ctypes.data},
             away=-1,
             stop=ctypes.addressof(self._stop),
             gates=gates,
@@ -228,21 +226,7 @@ class LoopSimulation:
         # It comes when the velocity of a tick is there.
         first = (spec.latency.pin_to_count + spec.latency.tick + spec.latency.tick_to_velocity + 1) % clocks
         delay = min(round(gains.delay * spec.timing.clock_hz), clocks)
-        return CONTROLLER(
-            gains.position,
-            gains.velocity,
-            gains.observer,
-            gains.filter,
-            gains.inertia,
-            gains.torque_constant,
-            gains.current_limit,
-            gains.way,
-            gains.on_filtered,
-            gains.feed_forward,
-            clocks,
-            first,
-            delay,
-        )
+        return CONTROLLER(*(getattr(gains, name) for name in (*_GAINS, *_WAYS)), clocks, first, delay)
 
     def _core(self, period: int) -> Any:
         spec, names = self._spec, [port.name for port in self._design.outputs]
