@@ -115,9 +115,9 @@ class AxesTrackDatapath(wiring.Component):
         found = Signal(turn_layout(self._axis))
         turns = [Value.cast(turns.turn) for turns in self.machines]
         m.d.comb += [known.eq(self._of(reads, turns)), found.eq(self._of(shows, turns))]
-        after, counts = self._added(m, read.data, known)
-        m.d.comb += [write.addr.eq(of_axis), write.data.eq(after), write.en.eq(reduce(or_, shows))]
-        return self._held(m, write.en, of_axis, after, counts, found)
+        added = self._added(m, read.data, known)
+        m.d.comb += [write.addr.eq(of_axis), write.data.eq(added[0]), write.en.eq(reduce(or_, shows))]
+        return self._held(m, write.en, of_axis, added, found)
 
     def _added(self, m: Module, kept: data.View, known: data.View) -> tuple[data.View, Sequence[Value]]:
         """Return the values to keep of an axis from this turn on, and its counts of the tick with their overflow."""
@@ -142,10 +142,10 @@ class AxesTrackDatapath(wiring.Component):
         return after, delay(m, pulses, overflow)
 
     def _held(
-        self, m: Module, now: Value, of_axis: Signal, after: data.View, counts: Sequence[Value], found: data.View
+        self, m: Module, now: Value, of_axis: Signal, added: tuple[data.View, Sequence[Value]], found: data.View
     ) -> tuple[Signal, Signal, data.View, data.View]:
         """Return a strobe a clock after `now`, and what holds with it from then on."""
-        axis = self._axis
+        axis, (after, counts) = self._axis, added
         valid = Signal()
         whose = Signal.like(self.axis)
         ticks = Signal(tick_layout(axis))

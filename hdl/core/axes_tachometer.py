@@ -96,8 +96,8 @@ class AxesTachometer(wiring.Component):
         m.d.comb += [
             box.eq(value) for box, value in zip((datapath.complete, datapath.slot, datapath.count), handed, strict=True)
         ]
-        self._show(m, TICK, datapath.tick, "axis", datapath.axis, datapath)
-        self._show(m, UPDATE, datapath.velocity_valid, "axis", datapath.axis, datapath)
+        self._show(m, TICK, "axis", datapath)
+        self._show(m, UPDATE, "axis", datapath)
         if self.axis_index is not None:
             self._index(m, self.axis_index, at, level, known)
         return m
@@ -116,7 +116,7 @@ class AxesTachometer(wiring.Component):
         ]
         if front.index_resets:
             m.d.comb += self.datapath.handed_position.eq(index.position)
-        self._show(m, INDEX, index.index_valid, "index_axis", index.axis, index)
+        self._show(m, INDEX, "index_axis", index)
 
     def _looks(self, m: Module, levels: _Values) -> tuple[_Values, _Values, _Values]:
         """Return place in the tick and levels of the axis whose slot it is, and whether these are known by then."""
@@ -131,10 +131,10 @@ class AxesTachometer(wiring.Component):
         drive(m, box, level, "level_{}")
         return by_name(box, names, "seen_{}"), by_name(box, level, "filtered_{}"), by_name(box, level, "known_{}")
 
-    def _show(self, m: Module, name: str, strobe: Value, axis_name: str, axis: Value, box: wiring.Component) -> None:
+    def _show(self, m: Module, name: str, axis_name: str, box: wiring.Component) -> None:
         """Show what is new with a strobe: as it comes, or held for each axis."""
         values = by_name(box, (port.name for port in self._spec.axis.ports.outputs if port.held_by == name))
-        del values[name]
+        strobe, axis = values.pop(name), box.axis
         if self._spec.parallel:
             shapes = {value: signal.shape() for value, signal in values.items()}
             held = HeldOutputs(self._spec.axes, len(axis), shapes)
