@@ -109,14 +109,6 @@ def _bounce(spec: TachometerSpec, text: str) -> Fields:
     return {"bounce": clocks}
 
 
-def _drop(spec: TachometerSpec, text: str) -> Fields:
-    return {"drop": _steps("drop", text, 1 << DROP_WIDTH, 0, (1 << DROP_WIDTH) - 1)}
-
-
-def _glitches(spec: TachometerSpec, text: str) -> Fields:
-    return {"glitches": _steps("glitches", text, 1 << 2 * NOISE_WIDTH, 0, (1 << NOISE_WIDTH) - 1)}
-
-
 def _wires(name: str) -> Callable[[TachometerSpec, str], Fields]:
     """Return which lines are at fault."""
 
@@ -145,8 +137,8 @@ _READERS: dict[str, Callable[[TachometerSpec, str], Fields]] = {
     **{name: _error(name) for name in ("phase-error", "duty-a", "duty-b")},
     "jitter": _jitter,
     "bounce": _bounce,
-    "drop": _drop,
-    "glitches": _glitches,
+    "drop": lambda _, text: {"drop": _steps("drop", text, 1 << DROP_WIDTH, 0, (1 << DROP_WIDTH) - 1)},
+    "glitches": lambda _, text: {"glitches": _steps("glitches", text, 1 << 2 * NOISE_WIDTH, 0, (1 << NOISE_WIDTH) - 1)},
     **{name: _wires(name) for name in ("broken", "stuck")},
     "source": _source,
 }

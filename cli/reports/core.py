@@ -36,7 +36,8 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
     per_tick = fastest / spec.scale.unit_velocity
     greatest = f"{speed_text(spec, fastest)} ({per_tick:.6g} count{'s' * (per_tick != 1)} per tick)"
     latencies = manifest(spec)["latency_cycles"]
-    memory = spec.words.memory
+    memory, rest = spec.words.memory, spec.times.standstill_ticks
+    time = short_time(rest * timing.tick_seconds)
     return [
         ("method", f"{spec.method.upper()}, {f'{spec.chosen}: ' if spec.chosen else ''}{spec.words.description}"),
         ("encoder", counts),
@@ -55,7 +56,7 @@ def configuration(spec: TachometerSpec) -> list[tuple[str, str]]:
         *([] if memory is None else [("reciprocal", memory_text(*memory))]),
         *([("reciprocal", spec.words.division)] if spec.words.division else []),
         *((name, f"{plural(n, 'clock')} ({short_time(spec.tick.seconds(n))})") for name, n in latencies.items()),
-        ("standstill", _standstill(spec)),
+        ("standstill", f"reads 0 at most {time} ({plural(rest, 'tick')}) after the last count's tick"),
         *(("note", note) for note in spec.words.notes),
     ]
 
@@ -157,12 +158,6 @@ def registers_row(spec: AnySpec, bus: Bus) -> tuple[str, str]:
 def memory_text(kind: str, entries: int, width: int) -> str:
     """Return a memory, and how many bits it has."""
     return f"{kind}: {entries} x {width} = {entries * width} bits of block RAM"
-
-
-def _standstill(spec: TachometerSpec) -> str:
-    rest = spec.times.standstill_ticks
-    time = short_time(rest * spec.timing.tick_seconds)
-    return f"reads 0 at most {time} ({plural(rest, 'tick')}) after the last count's tick"
 
 
 def speed_text(spec: TachometerSpec, rad_per_s: float, digits: int = 6) -> str:

@@ -62,11 +62,6 @@ class RemainderScaler(wiring.Component):
             }
         )
 
-    def _up(self, doubled: Value, m: Value) -> Value:
-        """Return whether ⌊N·R/m⌋ must be increased by one; `doubled` is twice its remainder, less m."""
-        nearest = ~doubled[-1]
-        return (nearest, doubled + m != 0, Const(0))[self._towards]
-
     def elaborate(self, platform: object) -> Module:
         m = Module()
         result = registers(self.results.p.shape(), "result")
@@ -96,7 +91,8 @@ class RemainderScaler(wiring.Component):
                 m, valid, tag, total, quotient, _reduce(remainder, divisor)[: len(r) + place + 1].as_signed()
             )
             quotient = Cat(~remainder[-1], quotient)
-        up = self._up(_reduce(remainder << 1, tag.m), tag.m)
+        doubled = _reduce(remainder << 1, tag.m)  # twice the remainder, less m
+        up = (~doubled[-1], doubled + tag.m != 0, Const(0))[self._towards]
         valid, tag, total, quotient, up = delay(m, valid, tag, total, quotient, up)
         m.d.sync += self.results.valid.eq(valid)
         with m.If(valid):

@@ -259,7 +259,10 @@ class PinTrace(_Lines):
         that is missing low, but probes armed, a stream ready, and complements those of their lines.
         """
         if spec.external_tick and self.tick_in is None:
-            return self.with_tick_in(nominal_ticks(spec, self.n_clocks)).completed(spec)
+            cycles = spec.timing.tick_cycles  # in step with the reset of the core
+            first = 2 * cycles - 1 if cycles <= TICK_IN_TO_WINDOW_END + 1 else cycles - 1
+            rises = np.arange(first, self.n_clocks, cycles, dtype=np.int64) - TICK_IN_TO_WINDOW_END
+            return self.with_tick_in(rises).completed(spec)
         low = {name: np.zeros_like(self.a) for name in spec.front_end.controls if name not in self.lines}
         low |= {pin.port.name: np.full_like(self.a, pin.rest) for pin in spec.front_end.pins if not pin.of}
         low |= {f"{line}_n": self.lines[line] ^ np.uint8(1) for line in spec.front_end.complemented}
@@ -275,10 +278,3 @@ def check_ticks(duration: float, spec: TachometerSpec, most: int = MAX_TICKS, of
             f"what is run must have at most {most} ticks{of}, {longest} of this tick, not {ticks:.6g}: shorten it, or "
             "take longer ticks"
         )
-
-
-def nominal_ticks(spec: TachometerSpec, n_clocks: int) -> NDArray[np.int64]:
-    """Return clocks at which an external tick rises that is exactly nominal, in step with the core's reset."""
-    cycles = spec.timing.tick_cycles
-    ends = np.arange(2 * cycles - 1 if cycles <= TICK_IN_TO_WINDOW_END + 1 else cycles - 1, n_clocks, cycles)
-    return ends.astype(np.int64) - TICK_IN_TO_WINDOW_END

@@ -44,12 +44,8 @@ class TrackAxis(OneAxis, TrackTachometer):
         cycles = program.all_clocks + 1
         latency = program.clocks + output_cycles(self)
         found = [Plan(self.axes_of_tick, cycles, latency, n) for n in range(1, self.axes_of_tick + 1)]
-        return next((plan for plan in found if plan.end + self.slots <= self._room), found[0])
-
-    @property
-    def _room(self) -> int:
-        # External ticks may come in half the time.
-        return self.tick_clocks // (1 + self.external_tick)
+        room = self.tick_clocks // (1 + self.external_tick)  # external ticks may come in half the time
+        return next((plan for plan in found if plan.end + self.slots <= room), found[0])
 
     def at(self, axis: int, clocks: int) -> TrackAxis:
         """Return the core that one of the axes is, which is shown so many clocks after its last look."""
