@@ -135,6 +135,7 @@ class Circuit(nir.Netlist):
             whole = self.whole[number]
             if not whole or whole[0] in self.connections:
                 continue
+            cell.resolve_nets(self)  # cells are mostly behind those that they read
             match isinstance(cell, nir.Operator) and (cell.operator, *cell.inputs):
                 case "b" | "r|", a:
                     cell.operator, cell.inputs = "!=", (a, nir.Value.zeros(len(a)))

@@ -67,12 +67,7 @@ def bundled_yosys() -> Iterator[None]:
 def verilog_of(
     top: wiring.Component, described: Mapping[str, Any], ports: Iterable[Port] = (), writer: str = WRITERS[0]
 ) -> str:
-    """Return the text of a module.
-
-    - `described`: Its manifest, which gives its name and the lines above it.
-    - `ports`: The order and the comments of its ports.
-    - `writer`: One of `WRITERS`.
-    """
+    """Return the text of a module by one of `WRITERS`, with the head that its manifest, `described`, gives."""
     name = described["module"]
     text = yosys_text(top, name) if writer == "yosys" else write(top, name, ports).text
     return render("NAME.v", **described, name=name, writer=writer, verilog=text.removesuffix("\n"))
