@@ -21,7 +21,7 @@ _KINDS = dict(zip(["+", "-", "*", "m"], ["sum", "difference", "product", "choice
 _KINDS |= dict.fromkeys(["<<", "u>>", "s>>"], "shifted")
 _WORDS = {"==": "is", "!=": "is_not", "u<": "below", "u>=": "from", "u>": "above", "u<=": "to", "&": "and", "|": "or"}
 _WORDS |= {"^": "xor", "+": "plus", "-": "minus", "s<": "below", "s>=": "from"}
-_OPPOSITE = {"==": "!=", "!=": "=="}
+_OPPOSITE = {"==": "!=", "!=": "==", "~": ""}
 _CHAINS = {"+": "+-", "-": "+-", "&": "&", "|": "|", "^": "^"}  # operators of one precedence, whose order is free
 _BRACKETS = re.compile(r"[\[({][^\[\](){}]*[\])}]")
 _LONGEST_NAME = 32  # of a name that is made of operands
@@ -142,18 +142,21 @@ class Scope:
             return self._chosen(cell)
         if isinstance(cell, nir.AsyncReadPort):
             return f"{self.memories[cell.memory]}[{self.text(cell.addr)}]"
-        if len(cell.inputs) == 1:
-            net = cell.inputs[0][0]
-            inner: Any = self.circuit.source(net) if net.is_cell and net.cell in self.inline else None
-            if cell.operator == "~" == operator_of(inner):
-                return self.text(*inner.inputs)
-            if cell.operator == "~" and operator_of(inner) in _OPPOSITE:
-                return self._binary(_OPPOSITE[inner.operator], *inner.inputs)
-            return f"{cell.operator.removeprefix('r')}{operand(self.text(*cell.inputs))}"
-        if cell.operator != "m":
-            return self._binary(cell.operator, *cell.inputs)
-        test, yes, no = (operand(self.text(value)) for value in cell.inputs)
+        operator, inputs = self._meant(cell)
+        if len(inputs) == 1:
+            return f"{operator.removeprefix('r')}{operand(self.text(*inputs))}"
+        if operator != "m":
+            return self._binary(operator, *inputs)
+        test, yes, no = (operand(self.text(value)) for value in inputs)
         return f"{test} ? {yes} : {no}"
+
+    def _meant(self, cell: Any) -> tuple[str, Any]:
+        """Return the operator and the operands of a cell; of one that negates another, those of its opposite."""
+        operator, inputs = operator_of(cell), [*self.circuit.inputs(cell)]
+        inner: Any = self.circuit.source(inputs[0][0]) if operator == "~" and inputs[0][0].is_cell else None
+        if operator_of(inner) in _OPPOSITE and self.is_inline(inputs[0][0].cell):
+            return _OPPOSITE[inner.operator], inner.inputs
+        return operator, inputs
 
     def _binary(self, operator: str, a: Any, b: Any) -> str:
         if operator == "*":
@@ -266,8 +269,9 @@ class Scope:
             if self.compared(full):
                 branches = [one for one in branches if one[1] != last]
                 if len(branches) > _LONGEST_CHAIN:  # synthesis takes fewer cells for a sum of products
-                    terms = " | ".join(f"({{{width}{{{test}}}}} & {operand(then)})" for test, then in branches)
-                    branches = [(" | ".join(operand(test) for test, _ in branches), terms)]
+                    bits = [test if to == "1'b1" else f"{{{width}{{{test}}}}} & {operand(to)}" for test, to in branches]
+                    tests, terms = (" | ".join(map(operand, each)) for each in ([one[0] for one in branches], bits))
+                    branches, last = ([], terms) if last in ("1'b0", f"{width}'d0") else ([(tests, terms)], last)
             for condition, then in reversed(branches):
                 if then != last:
                     chosen = f"{operand(condition)} ? {operand(then)} : {last}"
@@ -308,10 +312,9 @@ class Scope:
         """Return a name for a cell that has none: of its low bits, its reader, or its operands."""
         circuit, whole = self.circuit, self.circuit.whole[cell_number]
         cell = circuit.cells[cell_number]
-        operator = operator_of(cell)
-        if operator in _WORDS and all(net.is_const or net in self.home for value in cell.inputs for net in value):
-            a = cell.inputs[0]
-            texts = [self.literal(a, value) if value.is_const else self.text(value) for value in cell.inputs]
+        operator, inputs = self._meant(cell)
+        if operator in _WORDS and all(net.is_const or net in self.home for value in inputs for net in value):
+            texts = [self.literal(inputs[0], value) if value.is_const else self.text(value) for value in inputs]
             bare = (plain(re.sub(r"^\d+'[bdh]", "", text)).strip("_").lower() for text in texts)
             made = f"_{_WORDS[operator]}_".join(bare)
             if len(made) <= _LONGEST_NAME and made[0].isalpha():
@@ -341,7 +344,7 @@ class Scope:
         alone = long or isinstance(cell, (nir.Part, nir.AsyncReadPort)) or operator_of(cell) in ("*", "s>>")
         if alone or whole in self.called or not circuit.flow[self.index].keys().isdisjoint(whole):
             return False
-        trivial = operator_of(cell) == "~" and len(whole) == 1
+        trivial = self._meant(cell)[0] == "~" and len(whole) == 1
         return (len(reads) == 1 or trivial) and {(first, count) for _, first, count in reads} <= {(0, len(whole))}
 
 
