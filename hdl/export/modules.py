@@ -119,7 +119,7 @@ class ModuleWriter(Scope):
         copies = [port for port in self.ports if port.way == "output" and port.name not in self.driven]
         ends = [f"assign {port.name} = {self.text(port.value)};" for port in copies]
         written = {word for lines in (wires, *clocked) for line in lines for word in re.findall(r"[A-Z]\w+", line)}
-        read = (one for one in self.constants.items() if one[0] in written)
+        read = sorted((one for one in self.constants.items() if one[0] in written), key=lambda one: one[1])
         constants = [f"localparam {span(width)}{name} = {value};" for name, (width, value) in read]
         memories = [[*self._contents(cell)] for cell in self.memories]
         boxes = []
@@ -185,8 +185,8 @@ class ModuleWriter(Scope):
             kind = "reg " if port.name in self.registers else "wire"
             yield from comment(self.comments.get(port.name, ""), "    //").splitlines()
             yield from (f"    {text}".rstrip() for text in [attributes or _attributes(own)] if text)
-            comma = "," if port is not self.ports[-1] else ""
-            yield f"    {port.way:6} {kind} {span(len(port.value)):8}{port.name}{level}{comma}"
+            line = f"    {port.way:6} {kind} {span(len(port.value)):8}{port.name}{level}"
+            yield line + "," * (port is not self.ports[-1])
 
     def _clocked(self, choices: Mapping[int, int | None]) -> Iterator[list[str]]:
         """Yield processes: of the registers with the reset, and of those without."""
