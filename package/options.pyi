@@ -63,6 +63,7 @@ class CoreOptions(TypedDict, total=False):
     over_speed: Value | None
     paper_exact: bool | None
     parallel: bool | None
+    period: Value | None
     pole_pairs: Value | None
     position_compare: Value | None
     position_fine_bits: Value | None

@@ -40,6 +40,7 @@ class SampledPosition(wiring.Component):
                 "number": Out(1),  # of reads that were taken in the tick: the last one, or none
                 "times": Out(range(self._most_age + longest)),  # clocks from when the shaft was there to its end
                 "length": Out(range(longest + 1), init=spec.timing.tick_cycles),  # clocks of the tick
+                "phase": Out(sampled.width),  # the read
                 "silent": Out(range(spec.timing.max_ticks + 1), init=spec.timing.max_ticks),  # ticks since a read
                 "elapsed": Out(range(spec.timing.max_ticks + 1), init=spec.timing.max_ticks),  # from the read before
             }
@@ -84,6 +85,7 @@ class SampledPosition(wiring.Component):
             off.eq(self.open_sample - self.sample_before),
             moved.eq(Mux(known, off[:width], 0)),
             self.position_valid.eq(self.silent != most_ticks),
+            self.phase.eq(self.sample_before),
             self.position.eq(Cat(self.sample_before, self.turns)),
         ]
         held, overflow = saturate(m, moved, self._spec.widths.max_pulse_count)

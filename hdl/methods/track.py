@@ -15,6 +15,7 @@ from tachometry.hdl.wires.ports import drive, follow, only_if
 from tachometry.spec import TrackTachometer
 from tachometry.spec.formats.displacement import DISPLACED
 from tachometry.spec.formats.tracking_code import SMOOTH_DELAY_BITS
+from tachometry.spec.formats.tracking_sampled import SampledTracking
 
 
 def delay_of(shown: Value, time_bits: int) -> Value:
@@ -45,6 +46,7 @@ class TrackMethod(wiring.Component):
                     self._reads,
                     number=In(1),
                     times=In(spec.form.times_bits),
+                    phase=In(spec.form.period_bits),
                     silent=In(range(spec.timing.max_ticks + 1)),
                     elapsed=In(range(spec.timing.max_ticks + 1)),
                     length=In(range(spec.tick.longest + 1)),
@@ -110,6 +112,9 @@ class TrackMethod(wiring.Component):
         if (counts := self.tick_counts) is None:
             follow(m, self.machine, self, ("number", "times", "length"))
             drive(m, self.machine, {"moved": self.pulse_count, "last": self.silent})
+            if isinstance(form := self._spec.form, SampledTracking) and form.period_bits:
+                kind, fine = form.phase(self.phase)
+                drive(m, self.machine, {"kind": kind, "end": kind + 1, "places": fine})
             return Value.cast(self.elapsed)
         m.submodules.tick_counts = counts
         m.d.comb += [counts.tick.eq(self.tick), counts.step.eq(self.step)]

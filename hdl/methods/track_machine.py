@@ -307,7 +307,6 @@ class TrackMachine(wiring.Component):
                 m.d.sync += self.sum_.eq(0)
         with m.If(self.go & self.now.keep):
             m.d.sync += self.sign.eq(self.total[-1])
-
         m.d.comb += [
             self._write.en.eq(self.go & self.now.writes),
             self._write.addr.eq(self._at(self._stored(self.now.store))),
@@ -372,8 +371,9 @@ class TrackMachine(wiring.Component):
         return [ports[name] << shifts.get(name, 0) for name in INPUTS]
 
     def _stored(self, word: Value) -> Value:
-        """Return the address of a word that is stored, which may be the offset of the last count's edge."""
-        return self._offset(word, Cat(self.kind, word[2]))
+        """Return the address of a word that is stored, which may be that of the last count's edge, or the next."""
+        kind = Mux(word[0], self.end, self.kind) if self._program.form.period_bits else self.kind
+        return self._offset(word, Cat(kind, word[2]))
 
     def _chosen(self, m: Module, word: Value) -> Value:
         """Return the address of a word that is read, which may be one that the tick chooses among the offsets."""

@@ -85,6 +85,7 @@ def ticks_of(spec: TachometerSpec, reads: Reads, last: NDArray[np.int64]) -> Tab
         "position_valid": silent < most,
         "number": has,
         "times": last - reads.clock[row] + reads.age[row] if len(reads.sample) else np.zeros_like(last),
+        "phase": sample,
         "silent": silent,
         "elapsed": np.minimum(before + 1, most),
         "length": np.diff(last, prepend=-1),

@@ -147,7 +147,7 @@ _READ = "--clock 48000000 --sensor sampled --bits"
 WHEELS = (
     (*_WHEEL.split(), "--teeth", "12-2"),
     (*f"--method m {_READ} 3+9 --tick 40clk --max-time 400clk --average 3 --external-tick --reverse".split(),),
-    (*f"--method track {_READ} 17 --tick 900clk --max-time 9000clk --unit rad/s".split(),),
+    (*f"--method track {_READ} 17 --tick 1000clk --max-time 10000clk --period 128".split(),),
 )
 
 

@@ -73,6 +73,7 @@ class Tracking:
     displacement: Displacement | None = None  # of edges off their places
 
     sampled: ClassVar[bool] = False  # whether positions are read in place of counted edges
+    period_bits: int = 0  # bits of a period whose error is learned, in LSB of the read; 0: none is
 
     @cached_property
     def factor_bits(self) -> int:

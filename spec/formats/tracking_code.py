@@ -174,8 +174,10 @@ def assembled(listing: str = LISTING, apart: int = 2, ports: int = 1, **kind: bo
     """
     code: list[Instruction] = []
     labels: dict[str, int] = {}
-    wanted = {"block": ports > 1, "serial": ports == 1, "smooth": False, "reads": False, "map": False, **kind}
+    wanted = dict.fromkeys(("smooth", "reads", "map", "period"), False)
+    wanted |= {"block": ports > 1, "serial": ports == 1, **kind}
     within, wanted["edges"], wanted["plain"] = True, not wanted["reads"], not wanted["map"]
+    wanted["kinds"] = wanted["edges"] or wanted["period"]
     for line in re.sub("#.*", "", listing).replace(";", "\n").splitlines():
         words = line.split()
         while words and words[0] in wanted:
@@ -183,9 +185,7 @@ def assembled(listing: str = LISTING, apart: int = 2, ports: int = 1, **kind: bo
                 within = wanted[words[0]]
             words = words[1:] if wanted[words[0]] else []
         within |= words == ["}"]
-        if words in (["{"], ["}"]) or not within:
-            continue
-        if not words:
+        if words in (["{"], ["}"], []) or not within:
             continue
         if words[0].endswith(":"):
             labels[words[0][:-1]] = len(code)
@@ -334,8 +334,8 @@ class Program:
 
     @property
     def _kind(self) -> dict[str, bool]:
-        mapped = self.form.displacement is not None
-        return {"smooth": self.smooth, "reads": self.form.sampled, "map": mapped}
+        form, mapped = self.form, self.form.displacement is not None
+        return {"smooth": self.smooth, "reads": form.sampled, "map": mapped, "period": form.period_bits > 0}
 
     @property
     def outputs(self) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ what is begun with the sum`.
     keep          the sign of the sum         log, exp      begin log2|sum|, 2^sum       out name      an output
     gain k        begin: log of the gain of p (0), v (1), a (2)  block, serial  before a line: for that machine only
     smooth, edges, reads   before a line, or several in braces: with --smooth, of counted edges, of read positions
+    period, kinds          the same: of reads with --period, of edges or reads with offsets
     map, plain    before a line: for a core with a map of the disc, without one
     by            the factor of products      product name  begin: sum·factor/2^shift of that name
     over n        begin: shift right by n     over by       by ⌊log2⌋ of the factor's whole part
@@ -20,22 +21,22 @@ what is begun with the sum`.
 LISTING = """
 reset:                                  # before the first tick
     edges D = quarter log; reads D = least_noise log
-    noises = noises_first; turn = zero; edges o0 = zero; edges o1 = zero
-    edges o2 = zero; edges o3 = zero; p = zero; phase = minus_two
+    noises = noises_first; turn = zero; kinds o0 = zero; kinds o1 = zero
+    kinds o2 = zero; kinds o3 = zero; p = zero; phase = minus_two
     limit = order + ~ + ~; doubt = log_8; edges quiet = zero; after = minus_one
 tick:
     if empty goto silent
     reads {; tau = $times               # the place is that of the end of the tick
-    since = $length + since min most_since; dt = sum - tau max clock log
-    turn = turn + one chance; moved = $moved; c = sum; block dt by; phase; }
+    turn = turn + one chance; moved = $moved; c = sum
+    period $places by; period o@up - o@last product mean; period c = moved - o@last - ~
+    since = $length + since min most_since; dt = sum - tau max clock log; block dt by; phase; }
     edges {; $number log; if one goto single
     t = o@m1 + o@m2 + o@m3              # about the mean time, by logarithms; what is left goes into e
     minus_log_n = zero - ~
     $times log
     since = $length + since min most_since
     minus_log_n + ~ exp
-    quiet = $last
-    turn = turn + one
+    quiet = $last; turn = turn + one
     block $number by
     serial tau = ~
     serial $number by
@@ -50,9 +51,7 @@ tick:
     log_64 + minus_log_n + ~ exp
     raw = zero s+ ~
     dt log
-    turn chance
-    c = raw
-    phase; }
+    turn chance; c = raw; phase; }
 known:
     if neg goto young
     log_dt = ~
@@ -210,7 +209,7 @@ short:
     t = zero s+ a min most
     D = D + ~ min most_noise max least_noise
     a = zero s+ t
-    edges if one goto offsets
+    edges if one goto offsets; period v log; period log_X + past_4; period if neg goto offsets
 ready:                                  # growth of the memory and noise, for the next event
     smooth a keep log; smooth log_T - of_slope + ~ exp  # in the middle of the memory
     smooth of_v = v s- ~; smooth tick by; smooth of_v product shown
@@ -280,17 +279,18 @@ edges {; single:
     moved = $moved
     block dt by
     phase
-    goto known
-offsets:
-    log_X + past_4; if pos goto ready
-    noises max noises_least by
-    e keep
-    zero s+ e min half over by          # a quarter of what the kind's offset learns
-    o@last = o@last s+ ~ s+ ~ s+ ~ s+ ~
-    o0 = o0 s- ~
-    o1 = o1 s- ~
-    o2 = o2 s- ~
-    o3 = o3 s- ~
+    goto known; }
+kinds {; offsets:
+    edges log_X + past_4; edges if pos goto ready
+    period log_T - of_period + ~; period if neg goto ready
+    noises max noises_least by; e keep
+    edges zero s+ e min half over by    # a quarter of what the kind's offset learns
+    period zero s+ e min step over by
+    edges o@last = o@last s+ ~ s+ ~ s+ ~ s+ ~
+    period t = zero s+ ~; period o@last = o@last + t + t + t + t
+    o0 = o0 s- ~; o1 = o1 s- ~; o2 = o2 s- ~; o3 = o3 s- ~
+    period $places by; period t + t + t + t product mean    # the next one has its share
+    period o@last = o@last - ~; period o@up = o@up + ~
     goto ready; }
 lone:
     e = c - P keep log

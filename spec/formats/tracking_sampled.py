@@ -7,6 +7,7 @@ fraction bits of the place.
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, ClassVar
 
 from tachometry.spec.formats.tracking import GAIN_STEPS, GAINS, PLACE_BITS, Tracking, fixed_log
 
@@ -23,6 +24,7 @@ class SampledTracking(Tracking):
     max_ticks: int  # ticks without a read after which all is forgotten
 
     sampled = True
+    PHASE_BITS: ClassVar[int] = 6  # of the place within a quarter of a period
     number_bits = 1
 
     @property
@@ -36,6 +38,20 @@ class SampledTracking(Tracking):
     @property
     def times_bits(self) -> int:
         return (self.most_age + self.longest_tick - 1).bit_length()
+
+    @property
+    def placed_bits(self) -> int:
+        return self.PHASE_BITS + 1 if self.period_bits else super().placed_bits
+
+    @cached_property
+    def shifts(self) -> dict[str, int]:
+        return super().shifts | {"mean": self.PHASE_BITS + 13}
+
+    def phase(self, sample: Any) -> tuple[Any, Any]:
+        """Return the quarter of a period in which a read is, and its place there, of an int or an array of them."""
+        within, rest, more = sample & (1 << self.period_bits) - 1, self.period_bits - 2, self.PHASE_BITS
+        fine = within & (1 << rest) - 1
+        return within >> rest, fine >> rest - more if rest >= more else fine << more - rest
 
     @property
     def most_last(self) -> int:
@@ -65,6 +81,7 @@ class SampledTracking(Tracking):
             "minus_change": -3 * lsb // 2,
             "minus_mean": -2 * lsb,  # of twice a mean
             "most_silent": self.max_ticks << t,
+            "of_period": fixed_log(self.period_bits + 2 + self.moved_shift + self.shifts["place"]),
             "carried": (_CARRIED + 1) << t,
             "most_shown": shown,
             "least_shown": -shown,

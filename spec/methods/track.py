@@ -28,6 +28,7 @@ NOISE = Fraction(1, 4 * 20_000)  # rad/s that an LSB has at 2000 counts: a quart
 LOOP_MEMORY = Fraction(3, 5)  # over k_v: the longest memory in a loop
 _MAX_TIME = "100ms"  # by default
 _MULTIPLIERS = ("auto", "serial", "block")
+LEAST_PERIOD = 8  # LSB
 
 
 @dataclass(frozen=True)
@@ -107,6 +108,16 @@ class TrackTachometer(TachometerSpec):
         shown="6",
         tests=("", "1", "16"),
     )
+    period: int | None = option(
+        None,
+        "Period of the interpolation error of an encoder that is read. It is a power of two, in LSB: 128 for 1024 "
+        "periods of 17 bits. The core learns that error, as four offsets a period.",
+        shown="none is learned",
+        metavar="N",
+        parse=parse_whole,
+        tests=(),
+        tacit=True,
+    )
     smooth: bool = option(
         False,
         "Outputs velocity_smooth and smooth_delay. The velocity in the middle of the memory, some ms ago, has a "
@@ -168,8 +179,14 @@ class TrackTachometer(TachometerSpec):
         )
         if (sampled := self.encoder.sampled) is None:
             return Tracking(**common)
-        age, max_ticks = sampled.most_age(self.tick.longest), self.timing.max_ticks
-        return SampledTracking(**common, shift=self._shift, most_moved=most, most_age=age, max_ticks=max_ticks)
+        return SampledTracking(
+            **common,
+            period_bits=(self.period or 1).bit_length() - 1,
+            shift=self._shift,
+            most_moved=most,
+            most_age=sampled.most_age(self.tick.longest),
+            max_ticks=self.timing.max_ticks,
+        )
 
     @cached_property
     def acceleration(self) -> Acceleration:
@@ -248,6 +265,7 @@ class TrackTachometer(TachometerSpec):
         if self.max_memory is not None and not shortest <= self.max_memory <= longest:
             least, given = (format_time(self.tick.seconds(clocks)) for clocks in (shortest, self.max_memory))
             raise ParameterError("max_memory", f"must be from {least}, a tick, to {MOST_MEMORY}s, not {given}")
+        self._check_period()
         if self.position_fine_bits is None:
             needed = max((extra.least_fine_bits(self) for extra in self.extras), default=0)
             object.__setattr__(self, "position_fine_bits", min(max(6, needed), 16))
@@ -275,6 +293,15 @@ class TrackTachometer(TachometerSpec):
                 f"must be from 2 to {most} with method track, not {self.timing.max_ticks}: try --max-time {typed}",
                 f"takes at most {most} ticks",
             )
+
+    def _check_period(self) -> None:
+        if self.period is None:
+            return
+        if (sampled := self.encoder.sampled) is None:
+            raise ParameterError("period", "must be left out: only positions that are read have a period")
+        if not (LEAST_PERIOD <= self.period <= 1 << sampled.bits and self.period.bit_count() == 1):
+            rest = f"must be a power of two from {LEAST_PERIOD} to {1 << sampled.bits} LSB, a turn, not {self.period}"
+            raise ParameterError("period", rest)
 
     @property
     def method_ports(self) -> tuple[Port, ...]:

@@ -88,10 +88,11 @@ class Windows:
         )
 
     @classmethod
-    def of_reads(cls, ticks: Table) -> "Windows":
-        """Return the reads of ticks; `end` then has the ticks since one."""
+    def of_reads(cls, ticks: Table, form: SampledTracking) -> "Windows":
+        """Return the reads of ticks: `kind` and `places` are their phase, `end` has the ticks since one."""
         none, number = np.zeros(len(ticks), dtype=np.int64), ticks.number.astype(np.int64)
-        return cls(number, ticks.times, none, none, ticks.pulse_count, none, none, ticks.silent, ticks.length)
+        kind, fine = form.phase(ticks.phase) if form.period_bits else (none, none)
+        return cls(number, ticks.times, fine, none, ticks.pulse_count, kind, none, ticks.silent, ticks.length)
 
     def rows(self) -> Iterator[tuple[int, ...]]:
         """Yield what `Recursion.tick` takes, tick by tick."""
@@ -181,7 +182,8 @@ class Model:
             if spec.encoder.sampled is None:
                 windows = Windows.of(steps, last, spec.form.most_number, begin, reached)
             else:
-                windows = Windows.of_reads(ticks.rows(piece))
+                assert isinstance(spec.form, SampledTracking)
+                windows = Windows.of_reads(ticks.rows(piece), spec.form)
             begin, reached = int(last[-1]), reached + int(windows.moved.sum())
             velocity, place, velocity_std, acceleration, standstill, smooth, delay = shown(windows).T
             fine = (ticks.position[piece] << spec.position_fine_bits) + ((place + (1 << shift - 1)) >> shift)

@@ -12,12 +12,14 @@ class SampledRecursion(Recursion):
         self._reads, k = form, form.constants
         self.noise, self.slips = k["least_noise"], k["none"]
         self.log_limit = 2 * log2(self.noise) + k["order"]
+        self._kind = self._fine = 0
         self.more = self._log_dt = 0  # what the lag adds to the place; the logarithm of the time since the last read
 
     def _event(self, n: int, times: int, places: int, kind: int, down: int) -> Row:
         """Take a read, whose place is that of the end of the tick; the shaft was there `times` before."""
         self._count_event()
-        at, tau = self._moved, times
+        tau, self._kind, self._fine = times, kind, places << 13
+        at = self._moved - self._error_of_period
         if self.phase == REST:
             return self._first(at, at, tau)
         dt = max(self.since - tau, self._k["clock"])
@@ -38,6 +40,24 @@ class SampledRecursion(Recursion):
         log_lag, sign = log2(self.lag) + self.log_share + self._k["log_half"], -1 if self.lag < 0 else 1
         self.shown_v += self._power(log_lag - self._log_dt + self._k["of_velocity"] + self._gain(3), sign)
         self.more = self._round(self.lag, 1) - self._power(log_lag + self._gain(0), sign)
+
+    @property
+    def _error_of_period(self) -> int:
+        here, ahead = self.offsets[self._kind], self.offsets[self._kind + 1 & 3]
+        return here + self._product(ahead - here, self._fine, "mean")
+
+    def _learn(self, n: int, e: int, change: int, kind: int) -> None:
+        most = 2 * self.noise
+        super()._learn(n, e, change, kind)
+        k, seen = self._k, self.log_share + self._k["past_4"] < 0
+        if not (self._form.period_bits and seen and self.log_memory - k["of_period"] + log2(self.v) >= 0):
+            return
+        quarter = self._round(min(abs(e), most), self._shift(max(self.noises, k["noises_least"])))
+        quarter = -quarter if e < 0 else quarter
+        share = self._product(4 * quarter, self._fine, "mean")
+        self.offsets = [offset - quarter for offset in self.offsets]
+        self.offsets[self._kind] += 4 * quarter - share
+        self.offsets[self._kind + 1 & 3] += share
 
     def _learn_lag(self, e: int) -> None:
         """Leave the lag, which was learned before it was shown."""

@@ -1,15 +1,17 @@
 """Cores whose encoder is read: hardware against golden model, exported Verilog, and what each read does."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from amaranth import Module
+from amaranth import Cat, Module
 from support.nightly import nightly, only
 from support.verilog import smoke
 
 from tachometry.hdl.front_end import sampled_position
+from tachometry.hdl.methods.track_machine import TrackMachine
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.sampled import encoder_of, read_lines, stress_reads
@@ -37,9 +39,14 @@ CASES = {
     "m fixed": {"bits": "12", "sample-age": "7", "position-width": "48", "lowpass": "20kHz", "age": "yes"},
     "track": SLOW,
     "track fine": SLOW
-    | {"bits": "16+24", "multiplier": "block", "smooth": "yes", "external-tick": "yes", "position-width": "48"},
+    | {"bits": "16+24", "multiplier": "block", "smooth": "yes", "external-tick": "yes"}
+    | {"position-width": "48", "period": "64"},
     "track coarse": SLOW | {"bits": "5", "unit": "rpm", "sample-age": "100", "reverse": "yes", "max-memory": "5ms"},
+    "track period": SLOW | {"multiplier": "serial", "tick": "1000clk", "max-time": "10000clk", "period": "128"},
 }
+
+
+INPUTS_OF = TrackMachine._inputs
 
 
 def core(case: str) -> TachometerSpec:
@@ -155,6 +162,37 @@ def test_the_virtual_encoder_reads_what_the_core_tracks(reverse: str) -> None:
     assert 20 < len(run.errors) < 100
 
 
+@pytest.mark.parametrize(
+    ("name", "gate"),
+    [
+        ("_stored", lambda self, word: self._offset(word, Cat(self.kind, word[2]))),  # not at the next offset
+        ("_inputs", lambda self: [value >> (place == 2) for place, value in enumerate(INPUTS_OF(self))]),
+    ],
+)
+def test_a_wrong_offset_is_seen(monkeypatch: pytest.MonkeyPatch, name: str, gate: Callable[..., Any]) -> None:
+    spec = core("track fine")
+    monkeypatch.setattr(TrackMachine, name, gate)
+    found = lockstep(spec, stress_reads(spec, 1, 30).completed(spec), Cxxrtl())
+    assert found.n_mismatches > 0
+
+
+@pytest.mark.parametrize(("bits", "noise", "most"), [("20", 2.0, 0.1), ("23", 2.0, 0.05)])
+def test_an_interpolation_error_is_learned(bits: str, noise: float, most: float) -> None:
+    """Four offsets leave so little of a sine that the noise is more."""
+    errors = []
+    period = (1 << int(bits)) // 1024
+    for more in ({"period": str(period)}, {}):
+        spec = of_texts("track", BASE | {"tick": "100us", "max-time": "10ms", "bits": bits, "unit": "rad/s"} | more)
+        encoder = encoder_of(spec, noise=noise, interpolation=(period / 850, 1024), seed=3)
+        motion = parse_motion("constant:20rad/s:500ms+ramp:20rad/s:0.1rad/s:50ms+constant:0.1rad/s:400ms")
+        truth = encoder.record(motion)
+        run = golden.run(spec, PinTrace.of(truth.recording, spec))
+        time = (run.updates.clock + 1) / spec.timing.clock_hz
+        off = run.updates.velocity * spec.velocity.rad_per_s_per_lsb - truth.true_speed(time)
+        errors.append(np.sqrt(np.mean(off[6500:] ** 2)))
+    assert errors[0] < most * errors[1]
+
+
 def test_a_core_is_made_again_from_its_options() -> None:
     spec = core("track coarse")
     assert of_options(spec.options) == spec
@@ -175,6 +213,9 @@ def test_a_core_is_made_again_from_its_options() -> None:
         ("m", {"health": "yes"}, "health must be left out with --sensor sampled: it needs edges"),
         ("m", {"sensor": "hall"}, "bits must be given with --sensor sampled or ssi or biss, not hall"),
         ("m", {"decoding": "4"}, "decoding must be 1 for sampled, not 4"),
+        ("m", {"period": "64"}, "period must not be given with method m"),
+        ("track", SLOW | {"period": "4"}, "period must be a power of two from 8 to 131072 LSB, a turn, not 4"),
+        ("track", SLOW | {"period": "100"}, "period must be a power of two from 8 to 131072 LSB, a turn, not 100"),
         ("auto", {"tick": "2us"}, "tick must be longer for method track"),
     ],
 )
