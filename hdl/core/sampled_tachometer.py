@@ -37,7 +37,7 @@ class SampledTachometer(Tachometer):
         drive(m, reader, {"last": self.sampling_clock.last})
         shown = ("tick", "pulse_count", "overflow", "position", "position_valid", "decode_error")
         follow(m, self, reader, shown)
-        names = ("coming", "next_count", "number", "times", "phase", "silent", "elapsed", "length")
+        names = ("coming", "next_count", "number", "times", "phase", "forgets", "silent", "elapsed", "length")
         return by_name(reader, names)
 
     def _read(self, m: Module, master: SerialEncoder) -> SerialEncoder:

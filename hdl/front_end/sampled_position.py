@@ -1,12 +1,13 @@
 """Positions that are read once a tick, in place of a decoder and its counters."""
 
-from amaranth import Cat, Module, Mux, Signal, signed
+from amaranth import C, Cat, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.wires.ports import by_name
 from tachometry.spec import TachometerSpec
+from tachometry.spec.core.sampled import Reach
 
 
 class SampledPosition(wiring.Component):
@@ -42,6 +43,8 @@ class SampledPosition(wiring.Component):
                 "length": Out(range(longest + 1), init=spec.timing.tick_cycles),  # clocks of the tick
                 "phase": Out(sampled.width),  # the read
                 "silent": Out(range(spec.timing.max_ticks + 1), init=spec.timing.max_ticks),  # ticks since a read
+                "forgets": Out(1),  # tracking begins anew after the tick
+                "jump": Out(1),  # a read is not taken, as it is too far from the one before
                 "elapsed": Out(range(spec.timing.max_ticks + 1), init=spec.timing.max_ticks),  # from the read before
             }
         )
@@ -50,23 +53,29 @@ class SampledPosition(wiring.Component):
         self.open_sample = Signal(sampled.width)
         self.open_times = Signal.like(self.times)
         self.sample_before = Signal(sampled.width)
+        self.anew = Signal()  # all that was known is not: a read of the window is far from those before it
         self.turns = Signal(signed(max(spec.position_width - sampled.width, 1)))
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         sampled = self._sampled
         age = by_name(self, ("sample_age",))["sample_age"] if sampled.age is None else sampled.age
+        good = Signal()
         taken = Signal()
+        read = Signal(sampled.width)
         m.d.comb += [
-            taken.eq(self.sample_valid & self.sample_ok & (1 if sampled.age is not None else age <= self._most_age)),
+            read.eq(-self.sample if self._spec.encoder.reverse else self.sample),
+            good.eq(self.sample_valid & self.sample_ok & (1 if sampled.age is not None else age <= self._most_age)),
+            taken.eq(good & ~self.jump),
             self.decode_error.eq(self.sample_valid & ~taken),
         ]
         m.d.sync += [self.coming.eq(self.last), self.tick.eq(self.coming), self.open_times.eq(self.open_times + 1)]
         with m.If(self.coming):
-            m.d.sync += self.open_number.eq(0)
+            m.d.sync += [self.open_number.eq(0), self.anew.eq(0), self.forgets.eq(self.anew)]
         with m.If(taken):
-            read = (-self.sample)[: sampled.width] if self._spec.encoder.reverse else self.sample
             m.d.sync += [self.open_number.eq(1), self.open_sample.eq(read), self.open_times.eq(age)]
+        if (reach := self._spec.reach) is not None:
+            self._find_jumps(m, reach, good, read)
         if self._spec.external_tick:
             length = Signal.like(self.length, name="open_length", init=1)
             m.d.sync += length.eq(length + 1)
@@ -75,10 +84,33 @@ class SampledPosition(wiring.Component):
         self._close(m)
         return m
 
+    def _find_jumps(self, m: Module, reach: Reach, good: Value, read: Value) -> None:
+        """Refuse a good read out of reach of the last one, unless it is within reach of one that was just refused."""
+        held = Signal()  # a read has been taken
+        before = Signal(reach.width)  # the good read before, taken or not
+        value = Signal(range(reach.most + 1))
+        raised = value + reach.step
+
+        def is_far(name: str, other: Value) -> Value:
+            way = Signal(signed(reach.width), name=name)
+            m.d.comb += way.eq(read - other)
+            return Cat(way[-1], (way ^ way[-1].replicate(reach.width))[:-1]) > Cat(C(0, 1), value >> reach.frac_bits)
+
+        far = held & is_far("way", self.open_sample)
+        again = far & ~is_far("way_before", before)
+        m.d.comb += self.jump.eq(good & far & ~again)
+        m.d.sync += value.eq(Mux(raised > reach.most, reach.most, raised))
+        with m.If(good):
+            m.d.sync += before.eq(read)
+            with m.If(~self.jump):
+                m.d.sync += [held.eq(1), value.eq(reach.first)]
+            with m.If(again):
+                m.d.sync += self.anew.eq(1)
+
     def _close(self, m: Module) -> None:
         """Take the read of a window that has ended."""
         width, most_ticks = self._sampled.width, self._spec.timing.max_ticks
-        known = self.position_valid & self.open_number
+        known = self.position_valid & self.open_number & ~self.anew
         off = Signal(width + 1)
         moved = Signal(signed(width))
         m.d.comb += [

@@ -47,6 +47,7 @@ class TrackMethod(wiring.Component):
                     number=In(1),
                     times=In(spec.form.times_bits),
                     phase=In(spec.form.period_bits),
+                    forgets=In(1),
                     silent=In(range(spec.timing.max_ticks + 1)),
                     elapsed=In(range(spec.timing.max_ticks + 1)),
                     length=In(range(spec.tick.longest + 1)),
@@ -103,15 +104,17 @@ class TrackMethod(wiring.Component):
                 ),
                 new.interval.eq(elapsed),
                 new.forced.eq(~machine.number.any()),
-                new.standstill.eq(machine.standstill & ~machine.number.any()),
+                new.standstill.eq(machine.standstill & ~(self.number if self._reads else machine.number.any())),
             ]
         return m
 
     def _take_counts(self, m: Module) -> Value:
         """Give the machine the counts of a tick, or its read; return the ticks since the one before."""
         if (counts := self.tick_counts) is None:
-            follow(m, self.machine, self, ("number", "times", "length"))
-            drive(m, self.machine, {"moved": self.pulse_count, "last": self.silent})
+            follow(m, self.machine, self, ("times", "length"))
+            last = Mux(self.forgets, self._spec.timing.max_ticks, self.silent)
+            number = self.number & ~self.forgets
+            drive(m, self.machine, {"moved": self.pulse_count, "last": last, "number": number})
             if isinstance(form := self._spec.form, SampledTracking) and form.period_bits:
                 kind, fine = form.phase(self.phase)
                 drive(m, self.machine, {"kind": kind, "end": kind + 1, "places": fine})

@@ -10,6 +10,7 @@ from tachometry.sim.golden.sampling import windows
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
+from tachometry.spec.core.sampled import Reach
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,8 @@ class Reads:
     sample: NDArray[np.int64]
     age: NDArray[np.int64]
     errors: NDArray[np.int64]
+    anew: NDArray[np.bool_]  # after each of them tracking begins anew: it is far from those before
+    jumps: NDArray[np.int64]  # clocks of the errors that are too far from the read before
 
     @classmethod
     def of(cls, spec: TachometerSpec, trace: PinTrace) -> "Reads":
@@ -53,7 +56,31 @@ class Reads:
         taken = right & (age <= sampled.most_age(spec.tick.longest))
         if spec.encoder.reverse:
             sample = -sample & (1 << sampled.width) - 1
-        return cls(clock[taken], sample[taken], age[taken], clock[~taken])
+        good = np.flatnonzero(taken)
+        anew, jumps = np.zeros(len(clock), dtype=bool), good[:0]
+        if spec.reach is not None:
+            refused, again = _jumps(spec.reach, clock[good], sample[good])
+            anew[good], jumps = again, clock[good][refused]
+            taken[good] = ~refused
+        return cls(clock[taken], sample[taken], age[taken], clock[~taken], anew[taken], jumps)
+
+
+def _jumps(
+    reach: Reach, clock: NDArray[np.int64], sample: NDArray[np.int64]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which good reads are refused, and with which ones that are far all begins anew."""
+    size = 1 << reach.width
+    refused, anew = np.zeros(len(clock), dtype=bool), np.zeros(len(clock), dtype=bool)
+    held, since, before = int(sample[0]) if len(sample) else 0, int(clock[0]) if len(clock) else 0, 0
+    for row, (at, place) in enumerate(zip(clock.tolist(), sample.tolist(), strict=True)):
+        most = min(reach.first + reach.step * (at - since - 1), reach.most) >> reach.frac_bits
+        if far := abs((place - held + size // 2) % size - size // 2) > most:
+            anew[row] = abs((place - before + size // 2) % size - size // 2) <= most
+        refused[row] = far and not anew[row]
+        before = place
+        if not refused[row]:
+            held, since = place, at
+    return refused, anew
 
 
 def ticks_of(spec: TachometerSpec, reads: Reads, last: NDArray[np.int64]) -> Table:
@@ -72,7 +99,8 @@ def ticks_of(spec: TachometerSpec, reads: Reads, last: NDArray[np.int64]) -> Tab
     before = np.append(most, silent[:-1])
     sample = reads.sample[row] if len(reads.sample) else np.zeros_like(last)
     way = (np.diff(sample, prepend=0) + half & 2 * half - 1) - half
-    known = has & (before < most)
+    forgets = np.diff(np.append(0, np.cumsum(reads.anew))[through], prepend=0) > 0
+    known = has & (before < most) & ~forgets
     moved = np.where(known, way, 0)
     begun = np.maximum.accumulate(np.where(has & ~known, number, 0))  # the tick of the read that is absolute
     total = np.cumsum(moved)
@@ -83,7 +111,8 @@ def ticks_of(spec: TachometerSpec, reads: Reads, last: NDArray[np.int64]) -> Tab
         "position": (position + wrap & 2 * wrap - 1) - wrap,
         "overflow": np.abs(moved) > limit,
         "position_valid": silent < most,
-        "number": has,
+        "number": has & ~forgets,
+        "forgets": forgets,
         "times": last - reads.clock[row] + reads.age[row] if len(reads.sample) else np.zeros_like(last),
         "phase": sample,
         "silent": silent,

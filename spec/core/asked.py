@@ -9,6 +9,7 @@ from tachometry.spec.core.encoder import Encoder
 from tachometry.spec.core.facts import Facts
 from tachometry.spec.core.index import Index
 from tachometry.spec.core.reads import Reads
+from tachometry.spec.core.sampled import Reach
 from tachometry.spec.core.sensors import parse_modulo
 from tachometry.spec.core.timing import Timing, parse_clocks, parse_filter
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS, parse_lsb
@@ -168,6 +169,15 @@ class Asked:
     def reads(self) -> Reads | None:
         """Reads of the encoder that the core makes; None: it makes none."""
         return self.encoder.reads(self.timing.clock_hz, self.timing.tick_cycles)
+
+    @cached_property
+    def reach(self) -> Reach | None:
+        """How far a read may be from the one before, by --max-speed; None: any may be taken."""
+        if (sampled := self.encoder.sampled) is None or self.max_speed is None:
+            return None
+        counts = self.max_speed.counts(self.encoder.counts_per_rev, Fraction(1, self.timing.clock_hz))
+        spread = 0 if sampled.age is not None else 2 * self.timing.tick_cycles
+        return Reach.of(sampled.width, counts, self.reads.age_spread if self.reads else spread)
 
     def read_starts(self, n_clocks: int) -> range:
         """Return the clocks in which reads begin, with ticks that are nominal."""

@@ -88,6 +88,11 @@ class Reads:
         return self.delay + SYNCHRONISER + 2 * self.half * self.sent_bits + 1
 
     @property
+    def age_spread(self) -> int:
+        """Clocks by which ages differ, at most."""
+        return self.start_wait if self.biss else 0
+
+    @property
     def longest(self) -> int:
         """Clocks from the strobe that begins a read to the one that ends it, at most."""
         return self.taken + self.oldest

@@ -1,11 +1,14 @@
 """Sampled positions: an absolute encoder that is read once a tick, in place of lines whose edges are counted."""
 
+import math
 import re
 from dataclasses import dataclass
+from fractions import Fraction
 
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import Port, pin
 
+JUMP = 4  # LSB that a read may differ by at once
 _COUNT_BITS = 13  # of a turn in the counts of the tracking recursion: a finer LSB is a fraction of such a count
 _LEAST_BITS, _MOST_BITS, _MOST_WIDTH = 4, 24, 40
 
@@ -18,6 +21,32 @@ def parse_bits(what: str, text: str) -> str:
         limits = f"(B from {_LEAST_BITS} to {_MOST_BITS}, at most {_MOST_WIDTH} in all)"
         raise ParameterError(what, f"must be bits of turns and of a turn, as 12+17, or 17 {limits}, not {text!r}")
     return f"{turns}+{bits}" if turns else str(bits)
+
+
+@dataclass(frozen=True)
+class Reach:
+    """How far a read may be from the last one that was taken: more is a jump, and is not taken.
+
+    A register holds it, with `frac_bits` bits below an LSB of the read: it is `first` in the clock after a read
+    that is taken, and rises by `step` in each clock, up to `most`.
+    """
+
+    width: int  # bits of a read
+    first: int
+    step: int
+    frac_bits: int
+
+    @classmethod
+    def of(cls, width: int, counts_per_clock: Fraction, age_spread: int) -> "Reach":
+        """Return it for this greatest speed; ages of reads differ by at most `age_spread` clocks."""
+        bits = max(0, 10 - math.floor(math.log2(counts_per_clock)))
+        step = math.ceil(counts_per_clock * (1 << bits))
+        return cls(width, min((JUMP << bits) + step * (age_spread + 1), (1 << width - 1 + bits) - 1), step, bits)
+
+    @property
+    def most(self) -> int:
+        """Its greatest value: no read is further away than half of all."""
+        return (1 << self.width - 1 + self.frac_bits) - 1
 
 
 @dataclass(frozen=True)

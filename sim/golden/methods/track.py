@@ -92,7 +92,8 @@ class Windows:
         """Return the reads of ticks: `kind` and `places` are their phase, `end` has the ticks since one."""
         none, number = np.zeros(len(ticks), dtype=np.int64), ticks.number.astype(np.int64)
         kind, fine = form.phase(ticks.phase) if form.period_bits else (none, none)
-        return cls(number, ticks.times, fine, none, ticks.pulse_count, kind, none, ticks.silent, ticks.length)
+        end = np.where(ticks.forgets, form.max_ticks, ticks.silent)
+        return cls(number, ticks.times, fine, none, ticks.pulse_count, kind, none, end, ticks.length)
 
     def rows(self) -> Iterator[tuple[int, ...]]:
         """Yield what `Recursion.tick` takes, tick by tick."""
@@ -192,6 +193,8 @@ class Model:
             before = np.maximum.accumulate(np.append(latest, np.where(counted, number, latest)))
             latest = int(before[-1])
             interval = np.minimum(number - before[:-1], most)
+            if spec.encoder.sampled is not None:
+                interval, standstill = ticks.elapsed[piece], standstill * ~ticks.forgets[piece]
             delay = np.minimum(delay >> spec.form.time_bits, (1 << SMOOTH_DELAY_BITS) - 1)
             fine = fine << unused >> unused
             values = (velocity, interval, ~counted, acceleration, velocity_std, fine, standstill, smooth, delay)

@@ -107,6 +107,34 @@ def test_a_position_is_that_of_the_last_good_read_of_a_tick(reverse: str) -> Non
     assert np.flatnonzero(valid).tolist() == [*range(13)]  # ten ticks without a read end it
 
 
+@pytest.mark.parametrize("reverse", ["no", "yes"])
+def test_a_jump_is_refused_until_a_second_read_agrees(reverse: str) -> None:
+    """One LSB a tick is the greatest speed: 4 LSB more may be off, a fifth is not taken; two that agree begin anew."""
+    spec = of_texts("m", BASE | {"bits": "9", "sample-age": "0", "max-speed": "14726rad/s", "reverse": reverse})
+    sign = -1 if reverse == "yes" else 1
+    places = [100, 105, 111, 107, 300, 320, 110, 400, 404, 405]
+    run = both(spec, [(20 + 40 * at, sign * place % 512, 0, 1) for at, place in enumerate(places)], 420)
+    assert run.ticks.position[:10].tolist() == [100, 105, 105, 107, 107, 107, 110, 110, 404, 405]
+    assert run.ticks.pulse_count[:10].tolist() == [0, 1, 0, 1, 0, 0, 1, 0, 0, 1]  # saturated
+    assert run.errors.tolist() == [100, 180, 220, 300]
+
+
+def test_tracking_begins_anew_after_two_jumps_that_agree() -> None:
+    spec = of_texts("track", BASE | SLOW | {"bits": "12", "max-speed": "100rad/s", "multiplier": "block"})
+    places = [100, 101, 102, 103, 2000, 2001, 2002, 2003, 2004]
+    trace = trace_of(spec, [(800 + 900 * at, place, 0, 1) for at, place in enumerate(places)], 9000)
+    found = lockstep(spec, trace, Cxxrtl())
+    assert found.n_mismatches == 0, found.first
+    ticks, updates = found.actual.ticks, found.actual.updates
+    assert ticks.position.tolist()[:9] == [100, 101, 102, 103, 103, 2001, 2002, 2003, 2004]
+    assert ticks.position_valid.all()
+    assert not updates.standstill.any()
+    speed = updates.velocity[:9] * 2.0**-spec.velocity.frac_bits
+    assert speed[[2, 3, 4]] == pytest.approx(1, abs=0.01)
+    assert speed[[0, 5, 6]].tolist() == [0, 0, 0]
+    assert speed[[7, 8]] == pytest.approx(1, abs=0.01)
+
+
 def test_after_the_maximum_time_the_next_read_is_absolute() -> None:
     spec = of_texts("m", BASE | {"bits": "9"})
     run = both(spec, [(20, 500, 0, 1), (60, 5, 0, 1), (1020, 7, 0, 1), (1060, 8, 0, 1)], 1200)
@@ -121,6 +149,9 @@ def test_after_the_maximum_time_the_next_read_is_absolute() -> None:
         ("known = self.position_valid & self.open_number", "known = self.open_number"),
         ("forward, backward = off[-1] & ~off[width - 1]", "forward, backward = off[-1] & off[width - 1]"),
         ("age <= self._most_age", "age < self._most_age"),
+        ('held & is_far("way", self.open_sample)', 'is_far("way", self.open_sample)'),
+        ("before.eq(read)", "before.eq(self.open_sample)"),
+        ("value.eq(reach.first)", "value.eq(0)"),
         ("self.silent.eq(Mux(self.open_number, 0, waited))", "self.silent.eq(Mux(self.open_number, 1, waited))"),
     ],
 )
@@ -132,7 +163,8 @@ def test_a_wrong_reader_is_seen(monkeypatch: pytest.MonkeyPatch, old: str, new: 
     exec(compile(text.replace(old, new), "wrong", "exec"), wrong)
     reader = sampled_position.SampledPosition
     monkeypatch.setattr(reader, "elaborate", lambda self, platform: _elaborate(wrong["SampledPosition"], self))
-    monkeypatch.setattr(reader, "_close", lambda self, m: wrong["SampledPosition"]._close(self, m))
+    for name in ("_close", "_find_jumps"):
+        monkeypatch.setattr(reader, name, getattr(wrong["SampledPosition"], name))
     found = lockstep(spec, stress_reads(spec, 1, 30).completed(spec), PySim())
     assert found.n_mismatches > 0
 
