@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 from motions import REAL, values_of
-from pages import MEASURED, markdown, measure
+from pages import MEASURED, Rows, measure
 
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
@@ -66,12 +66,12 @@ def rows(encoder: str, method: str, leads: tuple[str, ...], seeds: int) -> Itera
         yield [encoder, method, motion, *cells]
 
 
-def table(seeds: int) -> str:
-    """Return errors of all encoders, and of other methods on the first, as Markdown."""
+def table(seeds: int) -> Rows:
+    """Return errors of all encoders, and of other methods on the first."""
     every = [row for encoder in ENCODERS for row in rows(encoder, "track", LEADS, seeds)]
     every += [row for method in ("mt",) for row in rows("P 7 of 4000", method, LEADS, seeds)]
-    return markdown(["encoder", "method", "motion", *LEADS], every, left=(0, 1, 2))
+    return [["encoder", "method", "motion", *LEADS], *every]
 
 
 if __name__ == "__main__":
-    measure(PAGE, {"errors": table}, seeds=1)
+    measure(PAGE, {"angle": table}, seeds=1)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import situations
-from pages import MEASURED, count, data, markdown, read_table, stamp, write_block, write_table
+from pages import MEASURED, count, data, read_table, stamp, write_block, write_table
 
 from tachometry.cli.main import main as tachometry
 
@@ -77,13 +77,8 @@ def errors_of(name: str) -> dict[str, list[float]]:
 
 def blocks() -> dict[str, str]:
     """Return the blocks of docs/measured/compare.md from the tables."""
-    table = errors_of("one-setting")
-    heads = [*read_table(TABLES / "one-setting.csv")[0]][1:]
-    shown = [at for at, head in enumerate(heads) if head in _DATA["shown"] or head.split(":")[0] in _DATA["shown"]]
-    body = [[name, *(f"{row[at]:.2g}" for at in shown)] for name, row in table.items()]
     return {
         "verdict": situations.verdict(errors_of("compare")),
-        "one-setting": markdown(["situation", *(f"`{heads[at]}`" for at in shown)], body),
         "models": situations.model_table(),
         "costs": code(COSTS),
         "situations": "".join(f"### {one.title}\n\n{one.text}\n{code(one.command)}" for one in SITUATIONS),

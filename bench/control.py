@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from loops import IDEAL, KINDS, REAL, TASK, TICKS, check, setting, usable, variants
 from matplotlib.figure import Figure
-from pages import MEASURED, ROOT, Rows, markdown, measure, stamp
+from pages import MEASURED, ROOT, Rows, measure, stamp
 
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.engines.loop import Observer
@@ -54,7 +54,7 @@ def cell(outcome: Outcome) -> str:
     return ", ".join(f"{value:.3g}" for value in (outcome.rms, outcome.largest, outcome.dip, outcome.sound))
 
 
-def usable_gains(seeds: int, jobs: int | None) -> tuple[str, list[Best]]:
+def usable_gains(seeds: int, jobs: int | None) -> tuple[Rows, list[Best]]:
     """Return a row per disc and method: at each tick the usable gain and its outcome; and all of them."""
     rows, found = [], []
     for (disc, encoder), kind in product(DISCS.items(), KINDS):
@@ -68,11 +68,10 @@ def usable_gains(seeds: int, jobs: int | None) -> tuple[str, list[Best]]:
             row.append(f"{best[0]:g}: {cell(best[1])}" if best else "-")
             found += [Best(disc, kind.name, seconds, *best)] if best else []
         rows.append(row)
-    heads = ["disc", "method", *(head for *_, head in TICKS.values())]
-    return markdown(heads, rows, left=range(len(heads))), found
+    return [["disc", "method", *(head for *_, head in TICKS.values())], *rows], found
 
 
-def gains(seeds: int, jobs: int | None) -> str:
+def gains(seeds: int, jobs: int | None) -> Rows:
     """Return the table of usable gains, and draw it."""
     table, found = usable_gains(seeds, jobs)
     save_figure(PICTURE, lambda: drawn(found))
@@ -185,7 +184,7 @@ def accelerations(seeds: int, jobs: int | None) -> Rows:
 
 
 BLOCKS = {
-    "gains": gains,
+    "loop-gains": gains,
     "loop-weights": weights,
     "loop-assumptions": assumptions,
     "loop-solutions": solutions,

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from motions import REAL, values_of
 from numpy.typing import NDArray
-from pages import MEASURED, data, markdown, measure, write
+from pages import MEASURED, Rows, data, markdown, measure, write
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
@@ -70,7 +70,7 @@ def row(example: str) -> list[str]:
     sampled = (run.ticks.clock[-1] - spec.latency.tick - spec.latency.pin_to_count) / spec.timing.clock_hz
     true = int(encoding.true_position(sampled, decoding))
     return [
-        f"`{example}`" if faults else example,
+        example,
         f"{run.ticks.position[-1] - true} of {true}",
         str(len(run.errors)),
         str(int(run.ticks.get("filtered_edges")[-1])),
@@ -80,11 +80,11 @@ def row(example: str) -> list[str]:
     ]
 
 
-def table() -> str:
+def table() -> Rows:
     """Return the table of imperfections."""
-    heads = ["encoder and core", "position off (counts)", "`decode_error`", "`filtered_edges`"]
+    heads = ["encoder and core", "position off (counts)", "decode_error", "filtered_edges"]
     heads += [f"{what} at {FAST} counts per tick" for what in ("m_e", "velocity error, RMS (mean),")]
-    return markdown([*heads, f"and at {SLOW}"], list(map(row, EXAMPLES)))
+    return [[*heads, f"and at {SLOW}"], *map(row, EXAMPLES)]
 
 
 def pulses(motion: str, disc: Mapping[str, str], fine: bool) -> str:
@@ -163,7 +163,7 @@ def picture() -> str:
     return svg + "".join(draw(*one, TOP + number * ROW) for number, one in enumerate(shown)) + "</svg>\n"
 
 
-def imperfections() -> str:
+def imperfections() -> Rows:
     """Return the table of imperfections, and draw them."""
     write(PICTURE, picture())
     return table()

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from motions import REAL, faults_of, values_of
 from numpy.typing import NDArray
-from pages import MEASURED, data, markdown, measure
+from pages import MEASURED, data, measure
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.imperfections import LineFault
@@ -122,15 +122,15 @@ def faulty(example: Example, seeds: int = SEEDS) -> list[str]:
     worst = max(told(example, seed) for seed in range(seeds))
     if worst > example.within_s:
         raise ValueError(f"{example.option} must be told within {example.within_s} s, not {worst} s")
-    core = " ".join(f"`--{word.replace('=', ' ')}`" for word in example.core.split())
+    core = " ".join(f"--{word.replace('=', ' ')}" for word in example.core.split())
     stated = f"{example.words}: {1e3 * example.within_s:.3f} ms"
-    return [f"`--{example.option}`", core, str(int(Fault[example.code])), f"{1e3 * worst:.3f} ms", stated]
+    return [f"--{example.option}", core, str(int(Fault[example.code])), f"{1e3 * worst:.3f} ms", stated]
 
 
-HEADS = ["fault", "core", "`health`", f"reported after, worst of {SEEDS}", "stated"]
+HEADS = ["fault", "core", "health", f"reported after, worst of {SEEDS}", "stated"]
 BLOCKS = {
-    "clean": lambda: markdown(["disc", "clocks", "edges", "indices", "faults"], list(map(clean, DISCS))),
-    "faults": lambda: markdown(HEADS, list(map(faulty, EXAMPLES)), left=(0, 1, 4)),
+    "health-clean": lambda: [["disc", "clocks", "edges", "indices", "faults"], *map(clean, DISCS)],
+    "health-faults": lambda: [HEADS, *map(faulty, EXAMPLES)],
 }
 
 if __name__ == "__main__":

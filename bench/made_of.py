@@ -91,21 +91,24 @@ MADE_OF: dict[str, Callable[[str], object]] = {
     "docs/guides/wheel.png": lambda _: estimates(),
     "docs/guides/wheel_methods.png": lambda _: estimates(),
     "docs/measured/tables/boards.csv": lambda _: [measured_core("demo"), measured_core("track")],
-    "docs/measured/angle.md": lambda _: [
+    "docs/measured/tables/angle.csv": lambda _: [
         f"{angle.errors(angle.core(one), next(iter(angle.MOTIONS)), SEED)[0]:.6f}" for one in angle.ENCODERS
     ],
     "docs/measured/compare.png": lambda _: estimates(),
-    "docs/measured/control.md": lambda _: tracking(),  # tests/cli/commands/test_loop_docs.py has the loops about S
-    "docs/measured/control.png": lambda _: block(MEASURED / "control.md", "gains"),
+    "docs/measured/control.png": lambda _: read_table(MEASURED / "tables" / "loop-gains.csv"),
     **{
         f"docs/measured/figures/{file.name}": lambda _, name=file.stem: [
             row for row in read_table(PAPERS) if row["figure"] == name
         ]  # type: ignore[misc]
         for file in MEASURED.glob("figures/*.png")
     },
-    "docs/measured/health.md": lambda _: [f"{told(one, SEED):.7f}" for one in EXAMPLES],
+    **{
+        f"docs/measured/tables/health-{name}.csv": lambda _: [f"{told(one, SEED):.7f}" for one in EXAMPLES]
+        for name in ("clean", "faults")
+    },
     "docs/measured/tables/size.csv": measured_core,
     "docs/measured/tables/toggles.csv": lambda _: [measured_core(name) for name in ("reference", "table")],
     **{f"docs/measured/tables/{name}.csv": lambda _: estimates() for name in ("compare", "one-setting", "settings")},
+    # tests/cli/commands/test_loop_docs.py has the loops about S
     **{f"docs/measured/tables/{name}.csv": lambda _: tracking() for name in ("alarms", "tracking", *LOOPS)},
 }

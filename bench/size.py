@@ -31,7 +31,7 @@ METHOD_CELLS = {
     **{name: f"{name}-max-speed" for name in ("m", "t", "mt", "rairan")},
     **{name: name for name in ("track", "track-block")},
 }
-COSTS = (("ECP5", "COMB"), ("ECP5", "FF"), ("HX8K", "LC"), ("ECP5", "latency"))
+COSTS = (("ECP5", "COMB"), ("HX8K", "LC"), ("ECP5", "latency"))
 SHOWN = (
     *(("ECP5", figure) for figure in ("COMB", "FF", "DP16KD", "MULT", "Fmax")),
     *((target, figure) for target in ("HX8K", "UP5K") for figure in ("LC", "Fmax")),
