@@ -9,15 +9,14 @@ from amaranth.lib import wiring
 from pages import data
 
 from tachometry.boards.fpga import ecp5_memory
-from tachometry.hdl import core_of
-from tachometry.hdl.core.bus_tachometer import BusTachometer
 from tachometry.hdl.core.demo import Demo
 from tachometry.hdl.export import export
+from tachometry.hdl.export.files import top_of
 from tachometry.hdl.export.verilog import verilog_of
 from tachometry.sim.studies.size import CORE, TARGETS
 from tachometry.spec import Port, TachometerSpec, of_options
 from tachometry.spec.control import AnySpec
-from tachometry.spec.registers.buses import bus_of, ports_on, registers_on
+from tachometry.spec.registers.buses import bus_of, ports_on
 from tachometry.spec.registers.demo import DemoMap, demo_manifest, demo_ports
 
 _DATA = data("cores")
@@ -47,11 +46,9 @@ class Configuration:
     def component(self) -> wiring.Component:
         """The core, with its registers on its bus if it has one."""
         bus = bus_of(self.bus)
-        if bus is None:
-            return core_of(self.spec)
-        if self.demo and isinstance(self.spec, TachometerSpec):
+        if self.demo and bus is not None and isinstance(self.spec, TachometerSpec):
             return Demo(DemoMap(self.spec), bus)
-        return BusTachometer(registers_on(self.spec, bus), bus)
+        return top_of(self.spec, bus)
 
     @property
     def hardware(self) -> tuple[str, tuple[Port, ...]]:

@@ -2,12 +2,12 @@
 
 import re
 import subprocess
-from functools import cache
 from pathlib import Path
 
 import pytest
 from support.compiled import YOSYS, lint, read_exported
 from support.nightly import nightly, only
+from support.script import load
 
 from tachometry.hdl.export.files import both_texts
 from tachometry.sim.encoder.stress import stress_of
@@ -17,40 +17,12 @@ from tachometry.sim.studies.pairs import AXES, WHEELS, configurations, core_of
 from tachometry.sim.testbench.proof import differences
 from tachometry.spec import METHODS, of_options
 from tachometry.spec.control import AnySpec, LoopSpec
+from tachometry.spec.core.disc import Disc
 from tachometry.spec.registers.buses import bus_of
 
 LINT = "".join(f"/* verilator lint_off {one} */\n" for one in ("DECLFILENAME", "PROCASSINIT", "UNUSEDSIGNAL"))
-# Kinds of core: options of `generate`, and the bus.
-KINDS = {
-    "s": ("method=s ppr=500", "none"),
-    "s with a table": ("method=s ppr=500 reciprocal=table", "none"),
-    "m": ("method=m ppr=500", "none"),
-    "m averaged": ("method=m ppr=500 average=16", "none"),
-    "t": ("method=t ppr=500", "none"),
-    "mt": ("method=mt cpr=16 clock=48MHz tick=10us max-time=50ms max-speed=6000rpm unit=rpm timer=tick", "none"),
-    "rairan": ("method=rairan ppr=500", "none"),
-    "track serial": ("method=track ppr=500 multiplier=serial", "none"),
-    "track block": ("method=track ppr=500 multiplier=block", "none"),
-    "axes": ("method=s ppr=500 axes=4", "none"),
-    "axes of track": ("method=track ppr=500 axes=3", "none"),
-    "loop": ("method=s ppr=500 loop=yes", "none"),
-    "wishbone": ("method=s ppr=500 index=yes health=yes", "wishbone"),
-    "axi-lite": ("method=mt ppr=500 index=yes position-compare=0:16:8:10us probe=2", "axi-lite"),
-    "uart": ("method=t ppr=500", "uart"),
-    "stream": ("method=s ppr=500 stream=axi lowpass=100Hz bounds=yes age=yes", "none"),
-    "step-dir": ("method=m sensor=step-dir ppr=200 clock=1MHz tick=37clk max-time=740clk", "none"),
-    "up-down": ("method=m sensor=up-down ppr=200", "none"),
-    "hall": ("method=s sensor=hall pole-pairs=4", "none"),
-}
-
-
-@cache
-def texts(kind: str) -> tuple[str, str, dict[str, str]]:
-    """Return the text of Yosys, the exported one, and its names."""
-    options, bus = KINDS[kind]
-    spec = of_options(dict(option.split("=", 1) for option in options.split()))
-    gold, written = both_texts(spec, "core", bus_of(bus, irq=bus == "wishbone"))
-    return gold, written.text, dict(written.names)
+BENCH = load("verilog")
+KINDS = BENCH.DATA["kinds"]  # options of `generate`, and the bus
 
 
 def wrong(spec: AnySpec) -> list[str]:
@@ -60,7 +32,7 @@ def wrong(spec: AnySpec) -> list[str]:
 
 @pytest.mark.parametrize("kind", only(["s", "mt", "hall", "wishbone"], KINDS))
 def test_the_exported_text_is_the_circuit(kind: str, tmp_path: Path) -> None:
-    gold, text, names = texts(kind)
+    _, _, (gold, text), names = BENCH.core(kind)
     (tmp_path / "core.v").write_text(LINT + text)
     lint(["core.v"], "core", tmp_path)
     icarus = ["iverilog", "-g2001", "-Wall", "-o", "core.vvp", "core.v"]
@@ -90,6 +62,14 @@ def test_every_pair_of_options(kind: str) -> None:
     assert {words: found for words in cores if (found := wrong(core_of(words)))} == {}
 
 
+@nightly
+@pytest.mark.parametrize("options", BENCH.DATA["alone"])
+def test_options_that_no_pair_has(options: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("far.json").write_text(Disc(100, (0.25, -0.125) * 50, 4, 2, 0.01, 0.05, (60.0, 150.0), 40.0, False).text)
+    assert wrong(of_options(dict(option.split("=", 1) for option in options.split()))) == []
+
+
 @pytest.mark.parametrize(
     ("right", "mutant", "message"),
     [
@@ -106,7 +86,7 @@ def test_every_pair_of_options(kind: str) -> None:
     ids=["compared", "added", "initial", "chosen", "reset", "loaded", "edge", "contents", "address"],
 )
 def test_a_mutant_is_refused(right: str, mutant: str, message: str) -> None:
-    gold, text, names = texts("s with a table" if "table" in right else "s")
+    _, _, (gold, text), names = BENCH.core("s with a table" if "table" in right else "s")
     changed = re.sub(right, mutant, text, count=1)
     assert changed != text
     found = differences(gold, changed, "core", names, YOSYS)
