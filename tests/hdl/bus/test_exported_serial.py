@@ -1,4 +1,4 @@
-"""Registers over SPI and UART, of the exported core in Icarus and Verilator, while the encoder turns."""
+"""Registers over SPI and UART, of the exported core in Icarus, Verilator and CXXRTL, while the encoder turns."""
 
 import subprocess
 from collections.abc import Callable
@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support.compiled import lint
+from support.compiled import clock_by_clock, lint, read_exported
 from support.nightly import nightly
 from support.serial import Host, SpiHost, UartHost
 
 from tachometry.hdl.export import export
+from tachometry.hdl.export.files import top_of
 from tachometry.sim import build
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
@@ -20,6 +21,7 @@ from tachometry.sim.golden.registers import GoldenBank
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import Encoder, STachometer, Timing
 from tachometry.spec.core.index import Index
+from tachometry.spec.registers.buses import bus_of
 from tachometry.spec.registers.map import RegisterMap
 
 SPEC = STachometer(encoder=Encoder(100), timing=Timing(1_000_000, 64, 20), filter_clocks=1, index=Index(), age=True)
@@ -135,8 +137,9 @@ def motion(n_clocks: int, seed: int) -> PinTrace:
     return PinTrace(trace.clock, trace.a, trace.b, n_clocks, trace.z)
 
 
-def check(simulate: Simulate, host: Host, bus: str, output: str, folder: Path, baud: int | None = None) -> None:
+def check(simulate: Simulate | None, host: Host, bus: str, output: str, folder: Path, baud: int | None = None) -> None:
     """Let a host play on the exported core while the encoder turns; what comes back must be the golden registers."""
+    assert {access.address for access in host.accesses if access.data is None} >= set(range(N_WORDS))
     n_clocks = int(host.time) + 100
     trace = motion(n_clocks, seed=len(host.accesses))
     captures = np.flatnonzero(host.rng.random(n_clocks) < 0.0005)
@@ -149,8 +152,14 @@ def check(simulate: Simulate, host: Host, bus: str, output: str, folder: Path, b
     levels = np.zeros(n_clocks, np.uint8)
     for bit, level in enumerate(lines.values()):
         levels |= level << np.uint8(bit)
-    text = export(SPEC, "core", bus, baud)["core.v"]
-    seen = simulate(text, list(lines), output, levels, folder)
+    if simulate is None:
+        inputs = [dict(zip(lines, at, strict=True)) for at in np.stack([*lines.values()], axis=1).tolist()]
+        with pytest.MonkeyPatch.context() as patch:
+            read_exported(patch)
+            played = clock_by_clock(top_of(SPEC, bus_of(bus, baud)), inputs, [output])
+        seen = np.array([row[output] for row in played], np.uint8)
+    else:
+        seen = simulate(export(SPEC, "core", bus, baud)["core.v"], list(lines), output, levels, folder)
     answers = GoldenBank(RegisterMap(SPEC), trace).answers(host.accesses, captures.tolist())
     assert not any(data is None for data, _ in answers)
     host.check(seen, answers)
@@ -163,39 +172,24 @@ CONTROL, VELOCITY = (REGISTERS[name].offset // 4 for name in ("CONTROL", "VELOCI
 ALL = (CONTROL, VELOCITY, N_WORDS, N_WORDS - VELOCITY)
 BIT_CYCLES = 8
 BAUD = SPEC.timing.clock_hz // BIT_CYCLES
-SIMULATORS = [pytest.param(in_verilator, 10_000, marks=nightly), (in_icarus, 250)]
-
-
-def all_registers_are_read(host: Host) -> None:
-    """A register that the random accesses leave out fails the test."""
-    assert {access.address for access in host.accesses if access.data is None} >= set(range(N_WORDS))
-
-
-def over_spi(simulate: Simulate, n_accesses: int, folder: Path) -> None:
-    host = SpiHost(np.random.default_rng(n_accesses), START, WORDS)
-    while len(host.accesses) < n_accesses:
-        host.random_frame(*ALL)
-    all_registers_are_read(host)
-    check(simulate, host, "spi", "spi_miso", folder)
-
-
-def over_uart(simulate: Simulate, n_accesses: int, folder: Path) -> None:
-    host = UartHost(np.random.default_rng(n_accesses), START, WORDS, BIT_CYCLES)
-    while len(host.accesses) < n_accesses:
-        host.random_exchange(*ALL)
-        if host.rng.random() < 0.3:
-            host.random_damage(*ALL)
-    all_registers_are_read(host)
-    check(simulate, host, "uart", "uart_tx", folder, BAUD)
+SIMULATORS = [*(pytest.param(*one, marks=nightly) for one in ((in_verilator, 10_000), (None, 1000))), (in_icarus, 250)]
 
 
 @pytest.mark.parametrize(("simulate", "n_accesses"), SIMULATORS)
-def test_over_spi(simulate: Simulate, n_accesses: int, tmp_path: Path) -> None:
-    over_spi(simulate, n_accesses, tmp_path)
+def test_over_spi(simulate: Simulate | None, n_accesses: int, tmp_path: Path) -> None:
+    host = SpiHost(np.random.default_rng(n_accesses), START, WORDS)
+    while len(host.accesses) < n_accesses:
+        host.random_frame(*ALL)
+    check(simulate, host, "spi", "spi_miso", tmp_path)
 
 
 # The exported core is the same as over SPI, and tests/hdl/bus/test_uart.py has the line.
 @nightly
 @pytest.mark.parametrize(("simulate", "n_accesses"), SIMULATORS)
-def test_over_uart(simulate: Simulate, n_accesses: int, tmp_path: Path) -> None:
-    over_uart(simulate, n_accesses, tmp_path)
+def test_over_uart(simulate: Simulate | None, n_accesses: int, tmp_path: Path) -> None:
+    host = UartHost(np.random.default_rng(n_accesses), START, WORDS, BIT_CYCLES)
+    while len(host.accesses) < n_accesses:
+        host.random_exchange(*ALL)
+        if host.rng.random() < 0.3:
+            host.random_damage(*ALL)
+    check(simulate, host, "uart", "uart_tx", tmp_path, BAUD)
