@@ -11,6 +11,7 @@ from pathlib import Path
 
 import angle
 import readme
+import verilog
 from amaranth.hdl import Fragment
 from amaranth.hdl._ir import PortDirection, build_netlist
 from amaranth.lib import wiring
@@ -33,7 +34,6 @@ from tachometry.spec.registers.demo import DemoMap
 
 SEED = 1  # no page has it
 LOOPS = [file.stem for file in MEASURED.glob("tables/loop-*.csv")]
-PAPERS = MEASURED / "tables" / "papers.csv"
 
 
 def netlist(top: wiring.Component) -> list[str]:
@@ -98,7 +98,7 @@ MADE_OF: dict[str, Callable[[str], object]] = {
     "docs/measured/control.png": lambda _: read_table(MEASURED / "tables" / "loop-gains.csv"),
     **{
         f"docs/measured/figures/{file.name}": lambda _, name=file.stem: [
-            row for row in read_table(PAPERS) if row["figure"] == name
+            row for row in read_table(MEASURED / "tables" / "papers.csv") if row["figure"] == name
         ]  # type: ignore[misc]
         for file in MEASURED.glob("figures/*.png")
     },
@@ -107,6 +107,9 @@ MADE_OF: dict[str, Callable[[str], object]] = {
         for name in ("clean", "faults")
     },
     "docs/measured/tables/size.csv": measured_core,
+    "docs/measured/tables/verilog.csv": lambda _: [
+        re.sub("//.*", "", verilog.core(kind)[2][1]) for kind in ("s", "mt")
+    ],
     "docs/measured/tables/toggles.csv": lambda _: [measured_core(name) for name in ("reference", "table")],
     **{f"docs/measured/tables/{name}.csv": lambda _: estimates() for name in ("compare", "one-setting", "settings")},
     # tests/cli/commands/test_loop_docs.py has the loops about S

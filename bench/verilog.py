@@ -5,13 +5,13 @@ import random
 import re
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
-from functools import cache, partial
+from collections.abc import Iterator, Mapping
+from functools import cache
 from itertools import product
 from subprocess import check_output
 from timeit import repeat
 
-from pages import MEASURED, ROOT, data, markdown, measure, write_table
+from pages import MEASURED, ROOT, data, measure
 
 from tachometry.hdl.export.files import both_texts, top_of
 from tachometry.hdl.export.modules import write
@@ -91,12 +91,6 @@ def clocks() -> Iterator[list[str]]:
         yield [kind, text, *(f"{mhz:.1f}" for mhz in (found.figures["Fmax"], *(found.spread or ())))]
 
 
-def block(table: Callable[[], Iterator[list[str]]]) -> str:
-    """Measure a table, and write it beside the page; return it."""
-    heads, *rows = table()
-    write_table(MEASURED / "tables" / f"verilog-{table.__name__}.csv", [heads, *rows])
-    return markdown(heads, rows)
-
-
 if __name__ == "__main__":
-    measure(MEASURED / "verilog.md", {table.__name__: partial(block, table) for table in (written, cells, clocks)})
+    tables = {"verilog": written, "verilog-cells": cells, "verilog-clocks": clocks}
+    measure(MEASURED / "verilog.md", {name: lambda table=table: [*table()] for name, table in tables.items()})

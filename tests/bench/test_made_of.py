@@ -25,10 +25,11 @@ LIKE_OTHERS = re.compile(
 PAGES = ("compare", "encoder", "evidence", "figures", "size", "sweep")
 RECOMPUTED = {f"tables/{name}.csv" for name in ("imperfections", "papers", "single")} | {f"{name}.md" for name in PAGES}
 # Speeds, routings, proofs and samples of wrong cores.
-TABLES = ("engines", "estimate", "golden", "mutation", "proofs", "upsets", "verify", "verify-every-clock", "whole")
-RUNS = {"angle.md", "control.md", "estimate.md", "health.md", *(f"tables/{name}.csv" for name in TABLES)}
+TABLES = "engines estimate golden mutation proofs upsets verify verify-every-clock verilog-cells verilog-clocks whole"
+RUNS = {f"{page}.md" for page in ("angle", "control", "estimate", "health", "verilog")}
+RUNS |= {f"tables/{name}.csv" for name in TABLES.split()}
 OTHERS = {f"docs/measured/{name}" for name in RECOMPUTED | RUNS}
-OTHERS |= {"docs/demo.png", "docs/guides/disc.png"}  # tests/test_readme.py and test_calibrate.py draw them
+OTHERS |= {"docs/demo.png", "docs/guides/disc.png"}  # drawn by tests/test_readme.py and test_calibrate.py
 OTHERS |= {"docs/measured/encoder.svg", "docs/overview.svg", "docs/guides/wiring.svg"}  # drawn by a test, by hand
 
 

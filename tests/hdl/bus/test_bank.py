@@ -98,8 +98,7 @@ def test_registers_of_the_exported_text_are_right_in_cxxrtl(bus: str, monkeypatc
     apart = [replace(one, clock=8 * place + 8) for place, one in enumerate(accesses[: short.n_clocks // 8 - 2])]
     assert len(apart) > 100
     compiled.read_exported(monkeypatch)
-    golden = GoldenBank(registers, short)
-    assert differing(top_of(spec, bus_of(bus)), short, (apart, captures), golden, bus) == []
+    assert differing(top_of(spec, bus_of(bus)), short, (apart, captures), GoldenBank(registers, short), bus) == []
 
 
 def test_it_counts_and_saturates() -> None:
