@@ -1,6 +1,6 @@
 """A core whose encoder is read, in place of one whose edges are counted."""
 
-from amaranth import Module, Value
+from amaranth import Module, Mux, Signal, Value
 from amaranth.lib import wiring
 
 from tachometry.hdl.core.tachometer import Tachometer
@@ -10,6 +10,7 @@ from tachometry.hdl.front_end.serial_encoder import SerialEncoder
 from tachometry.hdl.output.update import update_layout
 from tachometry.hdl.wires.ports import by_name, drive, follow, hand_through
 from tachometry.spec import TachometerSpec
+from tachometry.spec.core.reads import JUMP, NO_ANSWER, READ_FAULT_BITS, WARNING, WRONG_CHECK
 
 
 class SampledTachometer(Tachometer):
@@ -20,6 +21,7 @@ class SampledTachometer(Tachometer):
     def _make_front(self, spec: TachometerSpec) -> None:
         self.reader = SampledPosition(spec)
         self.master = None if spec.reads is None else SerialEncoder(spec.reads)
+        self.read_fault = Signal(READ_FAULT_BITS)
         self.controls, self.modulo_counter, self.index_capture = {}, None, None
 
     @property
@@ -33,7 +35,14 @@ class SampledTachometer(Tachometer):
         reader, sampled = self.reader, self._spec.encoder.sampled
         assert sampled is not None
         inputs = [port.name for port in sampled.ports(self._spec.tick.longest)]
-        follow(m, reader, self if self.master is None else self._read(m, self.master), inputs)
+        source = self if self.master is None else self._read(m, self.master)
+        follow(m, reader, source, inputs)
+        wrong, warning = WRONG_CHECK, 0
+        if self.master is not None:
+            wrong, warning = self.master.reason, self.master.sample_warning
+        fault = Mux(reader.jump, JUMP, Mux(reader.decode_error, NO_ANSWER, 0))
+        fault = Mux(reader.sample_ok, Mux(warning, WARNING, fault), wrong)
+        m.d.comb += self.read_fault.eq(Mux(reader.sample_valid, fault, 0))
         drive(m, reader, {"last": self.sampling_clock.last})
         shown = ("tick", "pulse_count", "overflow", "position", "position_valid", "decode_error")
         follow(m, self, reader, shown)
@@ -51,7 +60,7 @@ class SampledTachometer(Tachometer):
     def _taps(self, m: Module) -> dict[str, Value]:
         updates = self.datapath.updates
         shown = {f"native_{name}": updates.p[name] for name in update_layout(self._spec).members}
-        return {"native_valid": updates.valid, **shown}
+        return {"read_fault": self.read_fault, "native_valid": updates.valid, **shown}
 
 
 def tachometer_of(spec: TachometerSpec) -> Tachometer:

@@ -3,9 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Self
 
-from amaranth import Cat, Module, Mux, Signal, Value, signed
+from amaranth import C, Cat, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Member, Out
 
@@ -13,7 +12,42 @@ from tachometry.hdl.arithmetic.idle import Idle, idle_of
 from tachometry.hdl.front_end.open_circuit import OpenCircuit
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.extras.health import FAULT_WIDTH, FAULTS_WIDTH, OPEN, Fault, Health
+from tachometry.spec.core.extras.health import (
+    FAULT_WIDTH,
+    FAULTS_WIDTH,
+    OPEN,
+    READ_FAULT_WIDTH,
+    READ_FAULTS,
+    Fault,
+    Health,
+)
+from tachometry.spec.core.reads import READ_FAULT_BITS
+
+
+def _keep(m: Module, box: "Gates | ReadGates", code: Value) -> None:
+    """Keep the first fault, and count them all, until a program clears them."""
+    m.d.comb += box.fault.eq(box.health.any())
+    with m.If(box.seen):
+        with m.If(box.health == 0):
+            m.d.sync += box.health.eq(code)
+        with m.If(~box.faults.all()):
+            m.d.sync += box.faults.eq(box.faults + 1)
+    with m.If(box.clear):
+        m.d.sync += [box.health.eq(0), box.faults.eq(0)]
+
+
+class ReadGates(wiring.Component):
+    """Faults of an encoder that is read: `read_fault` has one in each clock in which it is not 0, see `Gates`."""
+
+    def __init__(self) -> None:
+        outputs = {"seen": Out(1), "health": Out(READ_FAULT_WIDTH), "faults": Out(FAULTS_WIDTH), "fault": Out(1)}
+        super().__init__({"read_fault": In(READ_FAULT_BITS), "clear": In(1), **outputs})
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        m.d.comb += self.seen.eq(self.read_fault.any())
+        _keep(m, self, self.read_fault + READ_FAULTS)
+        return m
 
 
 @dataclass(frozen=True)
@@ -71,8 +105,10 @@ class Gates(wiring.Component):
         )
 
     @classmethod
-    def of(cls, extra: Health, spec: TachometerSpec) -> Self:
+    def of(cls, extra: Health, spec: TachometerSpec) -> "Gates | ReadGates":
         """Return the gates of this core."""
+        if spec.encoder.sampled is not None:
+            return ReadGates()
         front, turn = spec.front_end, None
         if front.index_watched:
             presets = spec.preset is not None
@@ -101,15 +137,9 @@ class Gates(wiring.Component):
             seen[Fault.INDEX_MISSED] = self.index_missed
         code: Value = Value.cast(0)
         for fault in sorted(seen, reverse=True):
-            code = Mux(seen[fault], fault, code)
-        m.d.comb += [self.seen.eq(Cat(seen.values()).any()), self.fault.eq(self.health.any())]
-        with m.If(self.seen):
-            with m.If(self.health == 0):
-                m.d.sync += self.health.eq(code)
-            with m.If(~self.faults.all()):
-                m.d.sync += self.faults.eq(self.faults + 1)
-        with m.If(self.clear):
-            m.d.sync += [self.health.eq(0), self.faults.eq(0)]
+            code = Mux(seen[fault], C(fault, FAULT_WIDTH), code)
+        m.d.comb += self.seen.eq(Cat(seen.values()).any())
+        _keep(m, self, code)
         return m
 
     def _standing(self, m: Module) -> tuple[Value, Value]:

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.golden.encoder_read import Line, records
+from tachometry.sim.golden.encoder_read import Line, Records, records
 from tachometry.sim.golden.sampling import windows
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
+from tachometry.spec.core.reads import JUMP, NO_ANSWER, WARNING, WRONG_CHECK
 from tachometry.spec.core.sampled import Reach
 
 
@@ -23,7 +24,9 @@ class Reads:
     age: NDArray[np.int64]
     errors: NDArray[np.int64]
     anew: NDArray[np.bool_]  # after each of them tracking begins anew: it is far from those before
-    jumps: NDArray[np.int64]  # clocks of the errors that are too far from the read before
+    # shape (m,): clocks of all that is wrong with reads, and what, see `spec.core.reads`
+    fault_clock: NDArray[np.int64]
+    fault: NDArray[np.int64]
 
     @classmethod
     def of(cls, spec: TachometerSpec, trace: PinTrace) -> "Reads":
@@ -35,34 +38,31 @@ class Reads:
             level = trace.lines["encoder_data"]
             changed = np.append(True, level[1:] != level[:-1])
             found = records(spec.reads, begin, Line(trace.clock[changed], level[changed]))
-            return cls.those(spec, found.clock, found.sample, found.age, found.reason == 0)
+            return cls.those(spec, found)
         clock = trace.high("sample_valid")
         sample, right = (trace.line_at(name, clock) for name in ("sample", "sample_ok"))
         age = trace.line_at("sample_age", clock) if sampled.age is None else np.full(len(clock), sampled.age)
-        return cls.those(spec, clock, sample, age, right != 0)
+        return cls.those(spec, Records(clock, sample, age, WRONG_CHECK * (right == 0), right < 0))
 
     @classmethod
-    def those(
-        cls,
-        spec: TachometerSpec,
-        clock: NDArray[np.int64],
-        sample: NDArray[np.int64],
-        age: NDArray[np.int64],
-        right: NDArray[np.bool_],
-    ) -> "Reads":
-        """Return reads of these places and ages: right ones that are not too old are taken."""
+    def those(cls, spec: TachometerSpec, records: Records) -> "Reads":
+        """Return the reads of records: right ones that are neither too old nor jumps are taken."""
+        clock, sample, age, reason, warning = records.columns
         sampled = spec.encoder.sampled
         assert sampled is not None
-        taken = right & (age <= sampled.most_age(spec.tick.longest))
+        taken = (reason == 0) & (age <= sampled.most_age(spec.tick.longest))
         if spec.encoder.reverse:
             sample = -sample & (1 << sampled.width) - 1
         good = np.flatnonzero(taken)
-        anew, jumps = np.zeros(len(clock), dtype=bool), good[:0]
+        anew, jumps = np.zeros(len(clock), dtype=bool), np.zeros(len(clock), dtype=bool)
         if spec.reach is not None:
             refused, again = _jumps(spec.reach, clock[good], sample[good])
-            anew[good], jumps = again, clock[good][refused]
-            taken[good] = ~refused
-        return cls(clock[taken], sample[taken], age[taken], clock[~taken], anew[taken], jumps)
+            anew[good], jumps[good] = again, refused
+            taken &= ~jumps
+        fault = np.where(jumps, JUMP, np.where(taken, 0, NO_ANSWER))
+        fault = np.where(reason == 0, np.where(warning, WARNING, fault), reason)
+        seen = fault > 0
+        return cls(clock[taken], sample[taken], age[taken], clock[~taken], anew[taken], clock[seen], fault[seen])
 
 
 def _jumps(

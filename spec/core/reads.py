@@ -8,6 +8,8 @@ from operator import xor
 
 # Why a read yields no position.
 NO_ANSWER, WRONG_CHECK, ERROR_BIT = 1, 2, 3
+WARNING, JUMP = 4, 5  # what else can be wrong with one
+READ_FAULT_BITS = 3
 SYNCHRONISER = 2  # clocks from a pin to its level in the core
 BISS_CRC = 0b1000011  # x^6 + x + 1
 

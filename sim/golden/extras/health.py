@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from tachometry.sim.golden.extras import View
 from tachometry.sim.golden.front_end import Steps
+from tachometry.sim.golden.sampled import Reads
 from tachometry.sim.golden.sorted_lookup import places
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.extras.health import FAULTS_WIDTH, OPEN, Fault, Health
+from tachometry.spec.core.extras.health import FAULTS_WIDTH, OPEN, READ_FAULTS, Fault, Health
 from tachometry.spec.language.port import INDEX
 
 Ints = NDArray[np.int64]
@@ -72,6 +73,9 @@ def _open(spec: TachometerSpec, health: Health, trace: PinTrace, clears: Ints) -
 def tables(extra: Health, view: View) -> dict[str, Table]:
     """Return the clocks in which faults are seen, each with its code, and with the error of a wrong turn."""
     spec, steps = view.spec, view.steps
+    if spec.encoder.sampled is not None:
+        reads = Reads.of(spec, view.trace)
+        return {"fault": Table(reads.fault_clock, {"code": reads.fault + READ_FAULTS, "error": 0 * reads.fault})}
     standing, codes = _standing(spec, extra, steps)
     illegal = _illegal(spec, extra, steps.errors)
     wrong, off = _index(spec, steps, view.tables[INDEX]) if spec.front_end.index_watched else (_NONE, _NONE)

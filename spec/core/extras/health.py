@@ -9,6 +9,7 @@ from typing import Any
 from tachometry.spec.core.extras.extra import Event, Extra
 from tachometry.spec.core.front_end import Pin
 from tachometry.spec.core.numbers import Numbers
+from tachometry.spec.core.reads import NO_ANSWER
 from tachometry.spec.core.timing import parse_filter
 from tachometry.spec.language.option import ParameterError, check_options, option, parse_flag
 from tachometry.spec.language.port import TICK, Port, held, pin
@@ -26,9 +27,16 @@ class Fault(IntEnum):
     B_OPEN = 6
     Z_OPEN = 7
     INDEX_MISSED = 8
+    # Of an encoder that is read.
+    NO_ANSWER = 16
+    WRONG_CHECK = 17
+    ERROR_BIT = 18
+    WARNING = 19
+    JUMP = 20
 
 
-FAULT_WIDTH = 4  # bits of a code
+FAULT_WIDTH, READ_FAULT_WIDTH = 4, 5  # bits of a code, of edges and of reads
+READ_FAULTS = Fault.NO_ANSWER - NO_ANSWER  # codes of reads are more by this than what is wrong with them
 FAULTS_WIDTH = 8  # bits of the number of faults, which stays at its end
 FAULT_TEXTS = {
     Fault.A_STANDS: "line a stands while b has edges: broken or shorted",
@@ -39,6 +47,11 @@ FAULT_TEXTS = {
     Fault.B_OPEN: "line b equals its complement b_n: an open circuit",
     Fault.Z_OPEN: "line z equals its complement z_n: an open circuit",
     Fault.INDEX_MISSED: "z comes and goes without the state of --index-at",
+    Fault.NO_ANSWER: "a read had no answer, or one that was too old",
+    Fault.WRONG_CHECK: "a frame was wrong, by its CRC or sample_ok",
+    Fault.ERROR_BIT: "the encoder's error bit: the position was not taken",
+    Fault.WARNING: "the encoder's warning bit; the position was taken",
+    Fault.JUMP: "a position was further away than --max-speed allows, and not taken",
 }
 COMPLEMENTS = (2, 1 << 20)  # the least and the most clocks
 OPEN = {"a": Fault.A_OPEN, "b": Fault.B_OPEN, "z": Fault.Z_OPEN}  # of lines that have a complement
@@ -99,12 +112,17 @@ class Health(Extra):
     def missing(self) -> Mapping[str, str]:
         return {
             "axes": "must be left out with --axes: what watches the lines is for one axis",
-            "sampled": "must be left out with --sensor sampled: it needs edges",
         }
 
     def check(self, spec: Numbers) -> None:
         if not self.on:
             raise ParameterError("health", "must not be no among extras: leave it out")
+        if spec.encoder.sampled:
+            if (self.edges, self.errors, self.differential) != (256, 10, None):
+                raise ParameterError(
+                    "health", "must be alone for an encoder that is read: its other options are for edges"
+                )
+            return
         if spec.encoder.sensor != "quadrature":
             rest = f"must be left out for {spec.encoder.sensor}: it watches two lines in quadrature"
             raise ParameterError("health", rest)
@@ -121,16 +139,22 @@ class Health(Extra):
 
     def faults(self, spec: Numbers) -> tuple[Fault, ...]:
         """Return the faults that can be seen."""
+        if spec.encoder.sampled:
+            reads = spec.reads
+            biss = reads is not None and reads.biss
+            seen = {Fault.NO_ANSWER: True, Fault.WRONG_CHECK: reads is None or biss or reads.repeat}
+            seen |= {Fault.ERROR_BIT: biss, Fault.WARNING: biss, Fault.JUMP: spec.reach is not None}
+            return tuple(fault for fault, can_be in seen.items() if can_be)
         lines = spec.front_end.complemented
         absent = {fault for line, fault in OPEN.items() if line not in lines}
         absent |= {Fault.INDEX_MISSED} if spec.front_end.index_state is None else set()
-        return tuple(fault for fault in Fault if fault not in absent)
+        return tuple(fault for fault in Fault if fault < Fault.NO_ANSWER and fault not in absent)
 
     def ports(self, spec: Numbers) -> Iterable[Port]:
         codes = "; ".join(f"{code}: {FAULT_TEXTS[code]}" for code in self.faults(spec))
         now = "It changes between the ticks as well, and a capture takes what it is then."
         help = f"The first fault of the encoder since it was cleared; {codes}. {now}"
-        yield held(TICK, "health", FAULT_WIDTH, help=help)
+        yield held(TICK, "health", READ_FAULT_WIDTH if spec.encoder.sampled else FAULT_WIDTH, help=help)
         yield held(TICK, "faults", FAULTS_WIDTH, help="Faults of the encoder since they were cleared; it stays at 255.")
         yield held(TICK, "fault", help="There has been a fault of the encoder: health is not 0.")
         if spec.front_end.index_watched:

@@ -7,6 +7,7 @@ import pytest
 from support.nightly import only
 from support.verilog import smoke
 
+from tachometry.hdl.extras import health
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.sampled import encoder_of
@@ -15,12 +16,13 @@ from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import ParameterError, TachometerSpec, of_options, of_texts
+from tachometry.spec.core.extras.health import READ_FAULTS
 
 BASE = {"sensor": "biss", "bits": "17", "clock": "50MHz", "tick": "100us", "max-time": "2ms"}
 SSI = {"sensor": "ssi", "bits": "3+12", "encoder-clock": "2MHz"}
 CASES = {
-    "m": SSI | {"gray": "yes", "repeat": "yes", "line-delay": "300ns", "reverse": "yes"},
-    "m outside": {"bits": "8+12", "external-tick": "yes", "tick": "50us", "crc": "0x190d9"},
+    "m": SSI | {"gray": "yes", "repeat": "yes", "line-delay": "300ns", "reverse": "yes", "health": "yes"},
+    "m outside": {"bits": "8+12", "external-tick": "yes", "tick": "50us", "crc": "0x190d9", "health": "yes"},
     "m short": SSI | {"tick": "40us", "average": "3"},
     "track": {},
 }
@@ -38,6 +40,12 @@ def test_gates_and_golden_model_agree_on_every_read(case: str) -> None:
     assert len(found.actual.errors) > 10
     assert {0, 1} == {*found.actual.ticks.position_valid.tolist()}
     assert len({*found.actual.ticks.position.tolist()}) > 40
+
+
+def test_a_wrong_code_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    spec = core("m outside")
+    monkeypatch.setattr(health, "READ_FAULTS", READ_FAULTS + 1)
+    assert lockstep(spec, stress(spec, 1, 30), Cxxrtl()).n_mismatches > 0
 
 
 @pytest.mark.parametrize("case", only(["m"], [*CASES]))

@@ -22,6 +22,7 @@ from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.sim.studies.plan import Plans
 from tachometry.spec import ParameterError, TachometerSpec, TrackTachometer, of_options, of_texts
+from tachometry.spec.core.extras.health import Fault
 from tachometry.spec.formats.tracking import PLACE_BITS
 
 BASE = {"sensor": "sampled", "bits": "17", "clock": "48MHz", "tick": "40clk", "max-time": "400clk"}
@@ -35,6 +36,7 @@ CASES = {
         "position-width": "8",
         "max-speed": "2e5rad/s",
         "reverse": "yes",
+        "health": "yes",
     },
     "m fixed": {"bits": "12", "sample-age": "7", "position-width": "48", "lowpass": "20kHz", "age": "yes"},
     "track": SLOW,
@@ -117,6 +119,17 @@ def test_a_jump_is_refused_until_a_second_read_agrees(reverse: str) -> None:
     assert run.ticks.position[:10].tolist() == [100, 105, 105, 107, 107, 107, 110, 110, 404, 405]
     assert run.ticks.pulse_count[:10].tolist() == [0, 1, 0, 1, 0, 0, 1, 0, 0, 1]  # saturated
     assert run.errors.tolist() == [100, 180, 220, 300]
+
+
+@pytest.mark.parametrize(
+    ("read", "code"), [((100, 0, 0), Fault.WRONG_CHECK), ((100, 81, 1), Fault.NO_ANSWER), ((111, 0, 1), Fault.JUMP)]
+)
+def test_health_names_the_first_fault(read: tuple[int, int, int], code: Fault) -> None:
+    spec = of_texts("m", BASE | {"bits": "9", "max-speed": "1rad/s", "health": "yes"})
+    run = both(spec, [(20, 100, 0, 1), (60, *read), (100, 100, 0, 1), (140, 200, 0, 0), (180, 100, 0, 1)], 240)
+    assert run.ticks.health[:5].tolist() == [0, code, code, code, code]
+    assert run.ticks.faults[:5].tolist() == [0, 1, 1, 2, 2]
+    assert run.errors.tolist() == [60, 140]
 
 
 def test_tracking_begins_anew_after_two_jumps_that_agree() -> None:
@@ -242,7 +255,7 @@ def test_a_core_is_made_again_from_its_options() -> None:
         ("m", {"blanking": "3"}, "blanking_clocks must be left out with --sensor sampled: it is for edges"),
         ("m", {"filter": "3"}, "filter_clocks must be left out with --sensor sampled: it is for edges"),
         ("m", {"sample-age": "81"}, "sample_age must be from 0 to 80 clocks, two ticks, not 81"),
-        ("m", {"health": "yes"}, "health must be left out with --sensor sampled: it needs edges"),
+        ("m", {"health": "yes", "health-edges": "3"}, "health must be alone for an encoder that is read"),
         ("m", {"sensor": "hall"}, "bits must be given with --sensor sampled or ssi or biss, not hall"),
         ("m", {"decoding": "4"}, "decoding must be 1 for sampled, not 4"),
         ("m", {"period": "64"}, "period must not be given with method m"),
