@@ -13,7 +13,8 @@ from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import by_name
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.electrical import REFUSED, REFUSED_BITS, ElectricalAngle
-from tachometry.spec.formats.angles import LEAD_BITS, PLACE_BITS, SHOWN_BITS, SLOPE_BITS, Angles
+from tachometry.spec.formats.angles import LEAD_BITS, SHOWN_BITS, SLOPE_BITS, Angles
+from tachometry.spec.formats.settling import PLACE_BITS
 from tachometry.spec.formats.sine import AHEAD_BITS
 
 
@@ -49,7 +50,6 @@ class Gates(wiring.Component):
         """Return the gates of this core."""
         taken = [one for one in spec.method_ports if spec.carrying and one.name in ("acceleration", "position_fine")]
         inputs = {"native_velocity": spec.velocity.native, **{f"native_{one.name}": one.width for one in taken}}
-        inputs |= {"native_forced": 1} if spec.carrying else {}
         if extra.angles(spec).cycle:
             inputs |= dict.fromkeys(("ready", "level_a", "level_b", "level_c"), 1)
         else:
@@ -171,7 +171,7 @@ class Gates(wiring.Component):
         now = Signal(signed(bits))
         bent = curve << factor_bits - SLOPE_BITS
         products = (
-            (fine.term(self._settled(m, between)), fine.number, at, target),  # before the next tick
+            (fine.term(between), fine.number, at, target),  # before the next tick
             (bend, acceleration.number, C(0), curve),
             (velocity.term(self.native_velocity), velocity.number, C(0), slope),
             (bent, s + (half - angles.late), slope, now),
@@ -191,36 +191,6 @@ class Gates(wiring.Component):
         with m.If(done):
             m.d.sync += grows.eq(now)
         return begun, (phase + debt)[:bits], grows
-
-    def _settled(self, m: Module, between: Signal) -> Signal:
-        """Return a place between counts; one that waits for a count goes to the middle as the velocity falls.
-
-        A place that is 3/8 count away begins to wait when the velocity has fallen to half of that at the last count.
-        Half a count is its limit then; the limit halves each time the velocity halves again.
-        """
-        half = 1 << self._angles.position_fine_bits - 1
-        velocity = self.native_velocity >> self._angles.speed_shift
-        back = between[-1]
-        waits = Signal()
-        limit = Signal(range(half + 1), init=half)
-        mark = Signal(len(velocity) - 1)
-        size = Signal.like(mark)
-        slow = Signal()
-        ahead = Signal(len(between) - 1)
-        m.d.comb += [
-            size.eq(velocity ^ velocity[-1].replicate(len(velocity))),
-            slow.eq(size <= mark),
-            ahead.eq(between ^ back.replicate(len(between))),
-        ]
-        with m.If(self.native_valid & self.native_forced):
-            m.d.sync += waits.eq(waits | ((ahead >= half - (half >> 2)) & (slow | (limit < half))))
-            with m.If(slow):
-                m.d.sync += [limit.eq(limit >> 1), mark.eq(mark >> 1)]
-        with m.Elif(self.native_valid):
-            m.d.sync += [waits.eq(0), limit.eq(half), mark.eq(size >> 1)]
-        settled = Signal.like(between)
-        m.d.comb += settled.eq(Mux(waits & (ahead > limit), limit ^ back.replicate(len(between)), between))
-        return settled
 
     def _counted(self, m: Module, step: Value, counted: Value, moves: Value, known: Value) -> tuple[Value, Signal]:
         """Return a phase and its slope: it is at an edge after a count, and grows to the next edge at most.

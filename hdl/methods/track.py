@@ -9,6 +9,7 @@ from amaranth.lib.wiring import In
 from tachometry.hdl.arithmetic.idle import Idle, IdleBox, idle_of
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.methods.datapath import datapath_members
+from tachometry.hdl.methods.settling import SettlingPlace
 from tachometry.hdl.methods.tick_counts import TickCounts
 from tachometry.hdl.methods.track_machine import TrackMachine
 from tachometry.hdl.wires.ports import drive, follow, only_if
@@ -86,7 +87,6 @@ class TrackMethod(wiring.Component):
         m.d.comb += machine.begin.eq(self.tick)
         elapsed = self._take_counts(m)
         new = self.updates.p
-        shift = spec.form.moved_shift - spec.position_fine_bits
         m.d.sync += self.updates.valid.eq(ready)
         if spec.smooth:
             delay = delay_of(machine.smooth_delay, spec.form.time_bits)
@@ -97,16 +97,28 @@ class TrackMethod(wiring.Component):
                 new.velocity.eq(machine.velocity),
                 new.acceleration.eq(machine.acceleration),
                 new.velocity_std.eq(machine.velocity_std),
-                new.position_fine.eq(
-                    (position << spec.position_fine_bits)
-                    + (machine.position_fine >> shift)
-                    + machine.position_fine[shift - 1]
-                ),
+                new.position_fine.eq(self._fine(m, position, ready)),
                 new.interval.eq(elapsed),
                 new.forced.eq(~machine.number.any()),
                 new.standstill.eq(machine.standstill & ~(self.number if self._reads else machine.number.any())),
             ]
         return m
+
+    def _fine(self, m: Module, position: Value, taken: Value) -> Value:
+        """Return the position between counts."""
+        machine, spec = self.machine, self._spec
+        shift = spec.form.moved_shift - spec.position_fine_bits
+        if spec.settling is None:
+            whole = (position << spec.position_fine_bits) + (machine.position_fine >> shift)
+            return whole + machine.position_fine[shift - 1]
+        m.submodules.settling = box = SettlingPlace(spec.settling, len(machine.velocity))
+        m.d.comb += [
+            box.between.eq((machine.position_fine >> shift) + machine.position_fine[shift - 1]),
+            box.velocity.eq(machine.velocity),
+            box.forced.eq(~machine.number.any()),
+            box.taken.eq(taken),
+        ]
+        return (position << spec.position_fine_bits) + box.settled
 
     def _take_counts(self, m: Module) -> Value:
         """Give the machine the counts of a tick, or its read; return the ticks since the one before."""

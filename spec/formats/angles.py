@@ -7,9 +7,7 @@ from typing import Any
 
 SHOWN_BITS = 16  # of the angle: 2^16 is an electrical turn
 SLOPE_BITS = 16  # bits of an acceleration below those of an angle
-PLACE_BITS = 8  # bits of the counts between the fine position and the position
 LEAD_BITS = 16  # of a lead, in clocks
-_SPEED_BITS = 12  # of a fraction of a count per tick, where two velocities are compared
 _FACTOR_BITS = 18  # of a factor, with its sign, or more where times need them
 
 
@@ -83,11 +81,6 @@ class Angles:
     def clocks(self) -> int:
         """Clocks from an update to the first one of its phase."""
         return (6 if self.tracks else 2) * (self.factor_bits + 3) + 1
-
-    @property
-    def speed_shift(self) -> int:
-        """Bits of a velocity that do not matter where it is compared with an earlier one."""
-        return max(0, self.velocity_bits - _SPEED_BITS)
 
     @property
     def span(self) -> int:

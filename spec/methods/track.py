@@ -15,6 +15,7 @@ from tachometry.spec.core.timing import Timing, parse_clocks
 from tachometry.spec.core.velocity import Velocity
 from tachometry.spec.core.words import Words
 from tachometry.spec.formats.carrying import Carrying
+from tachometry.spec.formats.settling import Settling
 from tachometry.spec.formats.tracking import MOST_MEMORY, RESULT_BITS, WIDTH, Tracking
 from tachometry.spec.formats.tracking_code import SMOOTH, SMOOTH_DELAY_BITS, Program
 from tachometry.spec.formats.tracking_sampled import SampledTracking
@@ -233,6 +234,13 @@ class TrackTachometer(TachometerSpec):
         late = latency.pin_to_count + latency.tick + latency.datapath + per_clock.serial_latency + 3
         slope = Fraction(1, 2) ** self.acceleration.frac_bits / self.acceleration.per_count / cycles**2
         return Carrying(per_clock, shift, self.position_fine_bits, bits - self.position_fine_bits, late, slope)
+
+    @cached_property
+    def settling(self) -> Settling | None:
+        """How `position_fine` goes to the middle of a count in a silence; None: it stays at the edge."""
+        if not any(extra.settles for extra in self.extras):
+            return None
+        return Settling(self.position_fine_bits, self.velocity.native_frac_bits)
 
     @property
     def remembered(self) -> None:

@@ -15,12 +15,13 @@ from support.nightly import nightly
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.extras import electrical
+from tachometry.hdl.methods.settling import SettlingPlace
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.sim.engines.pysim import PySim
-from tachometry.sim.golden.extras import electrical as golden_angle
+from tachometry.sim.golden.methods.settling import Settled
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.extras import expected_rows
 from tachometry.sim.studies.lockstep import lockstep
@@ -92,7 +93,6 @@ FAULTS = (
     ("ahead.eq(far)", "ahead.eq(0)", 2),  # the lead
     ("at.eq(counted)", "at.eq(at)", 0),
     ("shift.eq(difference + offset)", "shift.eq(difference)", 0),
-    ("waits & (ahead > limit)", "C(0)", 0),  # in a silence, to the middle of the count
     ("(slope >> self", "(0 >> self", 2),  # the lead of sine and cosine
     ("ready & level.matches(*states)", "ready", 9),  # halls that are all equal
     ("Mux(known, phase - coming, 0)", "(phase - coming)", 9),  # the first state owes nothing
@@ -113,8 +113,14 @@ def test_a_wrong_limit_of_a_silence_is_seen() -> None:
     spec, disc = of_texts("track", texts), VirtualEncoder(100, jitter=0.05, seed=3)
     trace = PinTrace.of(disc.record(parse_motion("sine:20rad/s:5Hz:400ms")).recording, spec)
     assert lockstep(spec, trace, Cxxrtl()).n_mismatches == 0
-    with mutant(electrical.Gates, "half - (half >> 2)", "half - (half >> 1)"):
-        assert lockstep(spec, trace, Cxxrtl()).n_mismatches
+    for right, wrong in (
+        ("half - (half >> 2)", "half - (half >> 1)"),
+        ("stays & (ahead > now)", "stays & ~stays"),
+        ("waits | (", "("),
+        ("mark >> slow", "mark"),
+    ):
+        with mutant(SettlingPlace, right, wrong):
+            assert lockstep(spec, trace, Cxxrtl()).n_mismatches, right
 
 
 def turning(words: str, sets: Any, home: int = 0) -> tuple[Any, PinTrace]:
@@ -240,20 +246,27 @@ def test_plans_have_the_error_at_the_lead(method: str, more: dict[str, str], lea
         assert expected_rows(of_texts(method, {**texts, **others}), 600.0) == []
 
 
-def test_a_stop_leaves_the_angle_in_the_middle_of_a_count(monkeypatch: pytest.MonkeyPatch) -> None:
-    """60 ms after it, the angle is within 0.4 degrees, of a count of 0.63; a place that stays at its edge is not."""
+def test_a_stop_leaves_the_place_in_the_middle_of_a_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    """60 ms after it, the angle is within 0.4 degrees, of a count of 0.63; a place that stays at its edge is not.
+
+    `position_fine` is the position then, and without the angle it is at its edge, half a count away.
+    """
+    disc = VirtualEncoder(1000, phase_error_deg=10, nonuniformity=0.1, jitter=0.05, seed=20)
+    stops = [f"constant:20rad/s:{stop}ms+stop:200ms" for stop in (100, 100.4, 100.7)]
 
     def worst() -> float:
-        found = []
-        for stop in (100, 100.4, 100.7):
-            disc = VirtualEncoder(1000, phase_error_deg=10, nonuniformity=0.1, jitter=0.05, seed=20)
-            words = {"lines": "1000", "position-fine-bits": "8"}
-            error = errors("track", f"constant:20rad/s:{stop}ms+stop:200ms", words, 400, disc)
-            found.append(abs((error - np.median(error[:500]) + 180) % 360 - 180)[1100])
-        return max(found)
+        found = [errors("track", stop, {"lines": "1000", "position-fine-bits": "8"}, 400, disc) for stop in stops]
+        return float(max(abs((error - np.median(error[:500]) + 180) % 360 - 180)[1100] for error in found))
 
-    assert worst() < 0.4
-    monkeypatch.setattr(golden_angle, "_settled", lambda angles, updates, between: between)
+    def beyond(**more: str) -> float:
+        spec: Any = of_texts("track", {"lines": "1000", "clock": "48MHz", "tick": "100us", **more})
+        traces = [disc.record(parse_motion(stop)).recording.place(48_000_000).completed(spec) for stop in stops]
+        runs = [golden.run(spec, trace) for trace in traces]
+        places = [one.updates.position_fine[1500] / 2**spec.position_fine_bits for one in runs]
+        return float(max(abs(place - one.ticks.position[1500]) for place, one in zip(places, runs, strict=True)))
+
+    assert (worst() < 0.4, beyond(electrical="7") < 0.1, beyond() > 0.3) == (True, True, True)
+    monkeypatch.setattr(Settled, "places", lambda of, velocities, counted, places: places)
     assert worst() > 0.5
 
 

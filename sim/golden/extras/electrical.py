@@ -11,7 +11,8 @@ from tachometry.sim.golden.sorted_lookup import Ints
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.electrical import REFUSED, REFUSED_BITS, ElectricalAngle
-from tachometry.spec.formats.angles import PLACE_BITS, SHOWN_BITS, SLOPE_BITS, Angles, Factor, wrapped
+from tachometry.spec.formats.angles import SHOWN_BITS, SLOPE_BITS, Angles, Factor, wrapped
+from tachometry.spec.formats.settling import PLACE_BITS
 from tachometry.spec.formats.sine import AHEAD_BITS, GUARD_BITS, START, STEPS, TURNS, WIDTH
 
 _TURN = 1 << SHOWN_BITS
@@ -127,7 +128,7 @@ def _tracked(extra: ElectricalAngle, view: View, counts: Table) -> Table:
     between = [
         wrapped(of, angles.position_fine_bits + PLACE_BITS) for of in (updates["position_fine"] - place).tolist()
     ]
-    of_ticks = counts.at("angle", updates["cause"]), _settled(angles, updates, between), lead
+    of_ticks = counts.at("angle", updates["cause"]), between, lead
     columns = np.column_stack((updates.clock, *of_ticks, updates["velocity"], updates["acceleration"])).tolist()
     rows = list[list[int]]()
     for clock, at, between, ahead, velocity, acceleration in columns:
@@ -137,23 +138,6 @@ def _tracked(extra: ElectricalAngle, view: View, counts: Table) -> Table:
         start = at + of_fine.times(between) + mean * s
         rows.append([clock + angles.clocks, wrapped(start, angles.bits), wrapped(now, angles.bits), 0, 0])
     return _owing(angles, rows)
-
-
-def _settled(angles: Angles, updates: Table, between: list[int]) -> list[int]:
-    """Return places between counts; those that wait for a count go to the middle as the velocity falls."""
-    half = 1 << angles.position_fine_bits - 1
-    waits, limit, mark, settled = False, half, 0, list[int]()
-    velocities = (updates["velocity"].astype(np.int64) >> angles.speed_shift).tolist()
-    for velocity, silent, place in zip(velocities, updates["forced"].tolist(), between, strict=True):
-        size = max(velocity, ~velocity)
-        if silent:
-            slow = size <= mark
-            waits |= max(place, ~place) >= half - (half >> 2) and (slow or limit < half)
-            limit, mark = limit >> slow, mark >> slow
-        else:
-            waits, limit, mark = False, half, size >> 1
-        settled.append(max(~limit, min(place, limit)) if waits else place)
-    return settled
 
 
 def _counted(extra: ElectricalAngle, view: View, counts: Table) -> Table:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim import build
 from tachometry.sim.golden.front_end import Steps
+from tachometry.sim.golden.methods.settling import Settled
 from tachometry.sim.golden.methods.track_recursion import Recursion
 from tachometry.sim.golden.methods.track_sampled import SampledRecursion
 from tachometry.sim.signals.run import Table
@@ -172,6 +173,7 @@ class Model:
         fine_bits = spec.position_fine_bits
         unused, shift = 64 - spec.position_width - fine_bits, spec.form.moved_shift - fine_bits
         n, most = len(ticks), spec.timing.max_ticks
+        settled = None if spec.settling is None else Settled(spec.settling)
         names = ["velocity", "interval", "forced", "acceleration", "velocity_std", "position_fine", "standstill"]
         names += SMOOTH if spec.smooth else ()
         flags = ("forced", "standstill")
@@ -187,8 +189,10 @@ class Model:
                 windows = Windows.of_reads(ticks.rows(piece), spec.form)
             begin, reached = int(last[-1]), reached + int(windows.moved.sum())
             velocity, place, velocity_std, acceleration, standstill, smooth, delay = shown(windows).T
-            fine = (ticks.position[piece] << spec.position_fine_bits) + ((place + (1 << shift - 1)) >> shift)
-            counted = windows.number > 0
+            place, counted = (place + (1 << shift - 1)) >> shift, windows.number > 0
+            if settled is not None:
+                place = np.array(settled.places(velocity.tolist(), counted.tolist(), place.tolist()), dtype=np.int64)
+            fine = (ticks.position[piece] << fine_bits) + place
             number = np.arange(first, first + len(last))
             before = np.maximum.accumulate(np.append(latest, np.where(counted, number, latest)))
             latest = int(before[-1])

@@ -46,7 +46,7 @@ class ElectricalAngle(Extra):
     """Output `angle` is that of a motor with so many pole pairs, `lead` clocks after the clock in which it is shown."""
 
     name = "electrical"
-    compared = True
+    compared = settles = True
 
     pole_pairs: int = option(
         REQUIRED, _POLE_PAIRS, name=name, metavar="P", parse=parse_whole, limits=(1, 512), tests=("", "7"), tacit=True

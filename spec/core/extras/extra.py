@@ -31,6 +31,7 @@ class Extra:
     name: ClassVar[str]  # of the files, and of the box in the gates
     place: ClassVar[int] = 0  # its ports are behind (1) or before (-1) those of others, as drivers know them
     compared: ClassVar[bool] = False  # whether comparisons of methods show it
+    settles: ClassVar[bool] = False  # whether a place that waits for a count goes to the middle of it
     texts: ClassVar[Mapping[str, Mapping[Any, str]]] = {}  # what values of its ports mean, by the names of the ports
 
     @classmethod
