@@ -29,13 +29,14 @@ ENCODERS: Mapping[str, Mapping[str, str]] = {
 }
 # By what they are: the motion, and the seconds that are left out.
 MOTIONS: Mapping[str, tuple[str, float]] = {
-    "constant 217 rad/s": ("constant:217rad/s:100ms", 0.04),
-    "constant 1.3 rad/s": ("constant:1.3rad/s:400ms", 0.2),
-    "ramp to 300 rad/s in 75 ms": ("ramp:0:300rad/s:75ms+constant:300rad/s:25ms", 0.03),
-    "sine 300 rad/s, 20 Hz": ("sine:300rad/s:20Hz:100ms", 0.02),
-    "sine 50 rad/s, 5 Hz": ("sine:50rad/s:5Hz:300ms", 0.1),
-    "stop at once from 20 rad/s": ("constant:20rad/s:100ms+stop:100ms", 0.05),
-    "200 rad/s and to rest": ("ramp:0:200rad/s:50ms+constant:200rad/s:30ms+ramp:200rad/s:0:50ms+stop:50ms", 0.02),
+    "constant 217 rad/s": ("constant:217rad/s:400ms", 0.15),
+    "constant 1.3 rad/s": ("constant:1.3rad/s:600ms", 0.3),
+    "constant 0.05 rad/s": ("constant:0.05rad/s:1200ms", 0.6),
+    "ramp to 300 rad/s in 75 ms": ("ramp:0:300rad/s:75ms+constant:300rad/s:75ms", 0.03),
+    "sine 300 rad/s, 20 Hz": ("sine:300rad/s:20Hz:150ms", 0.02),
+    "sine 50 rad/s, 5 Hz": ("sine:50rad/s:5Hz:500ms", 0.1),
+    "stop at once from 20 rad/s": ("constant:20rad/s:200ms+stop:200ms", 0.1),
+    "200 rad/s and to rest": ("ramp:0:200rad/s:50ms+constant:200rad/s:50ms+ramp:200rad/s:0:50ms+stop:50ms", 0.01),
 }
 
 

@@ -4,28 +4,59 @@ from collections.abc import Sequence
 
 from amaranth import Array, C, Cat, Module, Mux, Signal, Value, signed
 
+from tachometry.spec.formats.angles import clocks_of_product
+
 Product = tuple[Value, Value | int, Value, Signal]  # a term, a factor, a base, and what takes the result
 
 
 def take_products(
-    m: Module, begin: Value, products: Sequence[Product], bits: int, result_bits: int
+    m: Module, begin: Value, products: Sequence[Product], bits: int, result_bits: int, *, block: bool = False
 ) -> tuple[Value, Value]:
-    """Take products from `begin` on, in bits + 3 clocks each; return when the last one is there, and that.
+    """Take products from `begin` on, in so many clocks each; return when the last one is there, and that.
 
     A product is term·factor / 2^bits, rounded, and its base added; the last one is term·factor + base. A factor has so
-    many bits, with its sign. Term and factor are read in the first clock.
+    many bits, with its sign. Term and factor are read in the first clock. With `block` it is a multiplier of the FPGA.
     """
-    width = max(result_bits + 1, *(len(term) for term, *_ in products))
     number = Signal(range(len(products)))
     clock = Signal(range(bits + 4))
     done = Signal()
     ends = Signal()
-    m.d.comb += [done.eq(clock == bits + 3), ends.eq(number == len(products) - 1)]
+    last = clocks_of_product(bits, block=block)
+    m.d.comb += [done.eq(clock == last), ends.eq(number == len(products) - 1)]
     m.d.sync += clock.eq(Mux(begin | (done & ~ends), 1, Mux(clock.any() & ~done, clock + 1, 0)))
     with m.If(begin | done):
         m.d.sync += number.eq(Mux(begin, 0, number + 1))
     term, factor, base = (Array([product[part] for product in products])[number] for part in range(3))
-    # The sum moves down as the factor does, whose last bit is its sign. Then the base is added, if it was not at first.
+    width = max(len(term) for term, *_ in products)
+    if block:
+        found = result = _multiply(m, (term, factor, base), ends, (width, bits, result_bits))
+    else:
+        sum_ = _add_bits(m, clock, (term, factor, base), ends, (max(result_bits + 1, width), bits))
+        found, result = sum_ >> bits, sum_
+    for place, (*_, target) in enumerate(products[:-1]):
+        with m.If(done & (number == place)):
+            m.d.sync += target.eq(found)
+    return done & ends, result[:result_bits]
+
+
+def _multiply(m: Module, product: tuple[Value, Value, Value], ends: Value, widths: tuple[int, int, int]) -> Value:
+    """Return a product with its base, after three clocks."""
+    (term, factor, base), (width, bits, result_bits) = product, widths
+    held = Signal(signed(width))
+    left = Signal(signed(bits))
+    whole = Signal(signed(width + bits))
+    sum_ = Signal(signed(max(width, result_bits)))
+    rounds = ~ends & whole[bits - 1]
+    m.d.sync += [held.eq(term), left.eq(factor), whole.eq(held * left)]
+    m.d.sync += sum_.eq(Mux(ends, whole, whole >> bits) + base + rounds)
+    return sum_
+
+
+def _add_bits(
+    m: Module, clock: Value, product: tuple[Value, Value, Value], ends: Value, widths: tuple[int, int]
+) -> Value:
+    """Return a product: a sum moves down as the factor does, whose last bit is its sign. Then the base is added."""
+    (term, factor, base), (width, bits) = product, widths
     held = Signal(signed(width))
     left = Signal(signed(bits))
     signs = Signal()
@@ -42,7 +73,4 @@ def take_products(
     with m.If(clock == 1):
         begun = Mux(ends, base, 1 << bits - 1)
         m.d.sync += [held.eq(term), left.eq(factor), sum_.eq(Cat(C(0, bits), begun))]
-    for place, (*_, target) in enumerate(products[:-1]):
-        with m.If(done & (number == place)):
-            m.d.sync += target.eq(sum_ >> bits)
-    return done & ends, sum_[:result_bits]
+    return sum_

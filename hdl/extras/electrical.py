@@ -13,7 +13,7 @@ from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import by_name
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.electrical import REFUSED, REFUSED_BITS, ElectricalAngle
-from tachometry.spec.formats.angles import LEAD_BITS, SHOWN_BITS, SLOPE_BITS, Angles
+from tachometry.spec.formats.angles import LEAD_BITS, SHOWN_BITS, SLOPE_BITS, Angles, Factor
 from tachometry.spec.formats.settling import PLACE_BITS
 from tachometry.spec.formats.sine import AHEAD_BITS
 
@@ -163,7 +163,7 @@ class Gates(wiring.Component):
             m.d.sync += [at.eq(counted), place.eq(self.position)]
         m.d.comb += between.eq(self.native_position_fine - (place << fine_bits))
         velocity, fine, acceleration = angles.factors
-        bend = acceleration.term(self.native_acceleration)
+        bend = _term(acceleration, self.native_acceleration)
         curve = Signal(signed(max(len(bend), 2)))
         s = Signal(factor_bits)
         target = Signal(bits)
@@ -171,14 +171,14 @@ class Gates(wiring.Component):
         now = Signal(signed(bits))
         bent = curve << factor_bits - SLOPE_BITS
         products = (
-            (fine.term(between), fine.number, at, target),  # before the next tick
+            (_term(fine, between), fine.number, at, target),  # before the next tick
             (bend, acceleration.number, C(0), curve),
-            (velocity.term(self.native_velocity), velocity.number, C(0), slope),
+            (_term(velocity, self.native_velocity), velocity.number, C(0), slope),
             (bent, s + (half - angles.late), slope, now),
             (bent, (s >> 1) - angles.late, slope, slope),
             (slope, s, target, target),
         )
-        done, start = take_products(m, self.native_valid, products, factor_bits, bits)
+        done, start = take_products(m, self.native_valid, products, factor_bits, bits, block=angles.block)
         phase = Signal(bits)
         run = Signal(bits)
         grows = Signal(signed(bits))
@@ -201,7 +201,7 @@ class Gates(wiring.Component):
         velocity, *_ = angles.factors
         s = Signal(angles.factor_bits)
         slope = Signal(signed(bits))
-        products = ((velocity.term(self.native_velocity), velocity.number, C(0), slope), (slope, s, C(0), slope))
+        products = ((_term(velocity, self.native_velocity), velocity.number, C(0), slope), (slope, s, C(0), slope))
         done, far = take_products(m, self.native_valid, products, angles.factor_bits, bits)
         most, _ = saturate(m, slope, half)
         grows = Signal.like(most)
@@ -223,6 +223,11 @@ class Gates(wiring.Component):
         m.d.sync += [phase.eq(coming), moved.eq(done | step[0] | moves)]
         debt = _owed(m, angles, moved, Mux(known, phase - coming, 0)[:bits])
         return (phase + debt)[:bits], grows
+
+
+def _term(factor: Factor, value: Value) -> Value:
+    """Return the term of a factor, with no more bits than it has."""
+    return value.shift_left(factor.shift) if factor.shift >= 0 else value.shift_right(-factor.shift)
 
 
 def _owed(m: Module, angles: Angles, jumps: Value, gap: Value) -> Signal:

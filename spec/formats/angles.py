@@ -34,6 +34,11 @@ class Factor:
         return self.term(value) * self.number + (1 << self.bits - 1) >> self.bits
 
 
+def clocks_of_product(bits: int, *, block: bool) -> int:
+    """Return the clocks that a product by a factor of so many bits takes."""
+    return 4 if block else bits + 3
+
+
 def wrapped(angle: int, bits: int) -> int:
     """Return an angle as a signed number."""
     half = 1 << bits - 1
@@ -55,6 +60,7 @@ class Angles:
     position_fine_bits: int
     slope: Fraction  # in counts per clock²
     cycle: tuple[int, ...] = ()  # levels of halls, in the order of the counts
+    block: bool = False  # whether a multiplier of the FPGA computes products
 
     @property
     def bits(self) -> int:
@@ -80,7 +86,12 @@ class Angles:
     @property
     def clocks(self) -> int:
         """Clocks from an update to the first one of its phase."""
-        return (6 if self.tracks else 2) * (self.factor_bits + 3) + 1
+        return (6 if self.tracks else 2) * self.product + 1
+
+    @property
+    def product(self) -> int:
+        """Clocks of a product."""
+        return clocks_of_product(self.factor_bits, block=self.block)
 
     @property
     def span(self) -> int:

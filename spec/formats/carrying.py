@@ -27,6 +27,7 @@ class Carrying:
     # clocks from the end of a tick at the pins to the velocity per clock of its update, and three to use the place
     late: int
     slope: Fraction  # LSB of the acceleration, in counts per clock²
+    block: bool = False  # whether the method has a multiplier of the FPGA
 
     @property
     def adds(self) -> int:

@@ -233,7 +233,8 @@ class TrackTachometer(TachometerSpec):
         latency = self.latency
         late = latency.pin_to_count + latency.tick + latency.datapath + per_clock.serial_latency + 3
         slope = Fraction(1, 2) ** self.acceleration.frac_bits / self.acceleration.per_count / cycles**2
-        return Carrying(per_clock, shift, self.position_fine_bits, bits - self.position_fine_bits, late, slope)
+        block = self.program.times is BLOCK
+        return Carrying(per_clock, shift, self.position_fine_bits, bits - self.position_fine_bits, late, slope, block)
 
     @cached_property
     def settling(self) -> Settling | None:

@@ -74,7 +74,8 @@ class ElectricalAngle(Extra):
         of_track = (tracks, carrying.position_fine_bits, carrying.slope) if carrying else (0, 0, Fraction(0))
         states = spec.encoder.kind.cycle[:: -1 if spec.encoder.reverse else 1] if spec.encoder.sensor == "hall" else ()
         halls = tuple(map(packed_levels, states))
-        return Angles(counts, self.pole_pairs, tick, spec.tick.longest, bits, late + of_track[0], *of_track, halls)
+        block, late = carrying is not None and carrying.block, late + of_track[0]
+        return Angles(counts, self.pole_pairs, tick, spec.tick.longest, bits, late, *of_track, halls, block)
 
     def least_fine_bits(self, spec: Numbers) -> int:
         return ((self.pole_pairs << SHOWN_BITS) // spec.encoder.counts_per_rev).bit_length()
@@ -96,7 +97,7 @@ class ElectricalAngle(Extra):
             raise ParameterError(self.name, f"must be at most {most} with so few counts per revolution")
         angles = self.angles(spec)
         # All products are there before the next update, the first one before a tick.
-        clocks = max(angles.clocks, angles.tracks + angles.factor_bits + 4)
+        clocks = max(angles.clocks, angles.tracks + angles.product + 1)
         if (spec.times.shortest_tick if angles.tracks else angles.tick) < clocks:
             raise ParameterError(self.name, f"needs a tick of {clocks} clocks: take a longer --tick")
 
