@@ -194,8 +194,9 @@ def _whole(
     if periods.denominator == 1:
         return int(periods)
     possible = sorted({max(int(periods) + more, least) for more in (0, 1)})
+    slow = f", or a clock of {parse_frequency.written(math.ceil(1 / seconds))}" * (name == "clock" and periods < 1)
     typed = (f"{instead}{n}{CLOCKS}" if name == "clock" else plural(n, name) for n in possible)
     nearest = " and ".join(f"{text} ({format_time(n * period)})" for text, n in zip(typed, possible, strict=True))
     raise ParameterError(
-        what, f"must be a whole number of {name}s, not {given} ({float(periods):.9g}); nearest: {nearest}"
+        what, f"must be a whole number of {name}s, not {given} ({float(periods):.9g}); nearest: {nearest}{slow}"
     )

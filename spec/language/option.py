@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from fractions import Fraction
@@ -51,12 +52,11 @@ def parse_flag(what: str, text: str) -> bool:
 
 def parse_whole(what: str, text: str) -> int:
     """Return a whole number."""
-    try:
-        if len(text) <= _MOST_DIGITS:
-            return int(text)
-    except ValueError:
-        pass
-    raise ParameterError(what, f"must be a whole number, not {text!r}")
+    if len(text) <= _MOST_DIGITS and re.fullmatch(r"\s*[-+]?\d+(_\d+)*\s*", text, re.ASCII):
+        return int(text)
+    plain = re.sub(r"(?<=\d),(?=\d{3}\b)|(?<=\d)\s*[a-zA-Z]+$", "", text)
+    typed = f": type {plain}" if re.fullmatch(r"\d{1,30}", plain, re.ASCII) else ""
+    raise ParameterError(what, f"must be a whole number{typed}, not {text!r}")
 
 
 @dataclass(frozen=True)
