@@ -158,7 +158,8 @@ def _of_method(method: str, texts: Mapping[str, str]) -> TachometerSpec:
             raise ParameterError(parameter, f"must not be given with method {method}: {why}")
         if not known[name].fits_in(spec):
             other = next(about.name for about in known.values() if about.field == known[name].field)
-            instead = "" if other == name else f", but {other}"
+            able = " and ".join(one for one in METHODS if known[name].fits_in(METHODS[one]))
+            instead = f": it is for {able}" if other == name else f", but {other}"
             raise ParameterError(parameter, f"must not be given with method {method}{instead}")
     encoder = Encoder(**read_options(Encoder, texts))
     timing = Timing(**read_options(Timing, texts, usual=spec.facts.usual))

@@ -139,6 +139,8 @@ def _setting(
     from tachometry.sim.engines import loop as engine
     from tachometry.sim.studies.loops.control import Setting, in_gates
 
+    if spec.encoder.sampled is not None:
+        raise ParameterError("sensor", f"must not be {spec.encoder.sensor} for a loop, which is for edges")
     spec, task = shown_in_unit_of(motion, spec), _task(spec, motion, loop)
     begin, duration = float(parse_time("from", loop.start)), task.motion.duration
     if not 0.01 <= duration <= MOST_SECONDS:
