@@ -13,7 +13,7 @@ from tachometry.cli.reports.check import print_checked
 from tachometry.cli.reports.terminal import activity
 from tachometry.hdl.export.ci import ci_files
 from tachometry.hdl.export.files import both_texts, core_files, digest, file_names
-from tachometry.sim.testbench.check import Checked, Make, manifests
+from tachometry.sim.testbench.check import Checked, Make, lone, manifests
 from tachometry.sim.testbench.check import check as check_core
 from tachometry.spec.control import AnySpec
 from tachometry.spec.registers.buses import Bus
@@ -89,6 +89,7 @@ def check(
                     raise
                 result = Checked(path, unchecked=str(error))  # the others are checked all the same
             results.append(result)
+    results += [Checked(path, unchecked="it is missing, but its Verilog is there") for path in lone(places, found)]
     return print_checked(results)
 
 

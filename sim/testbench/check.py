@@ -76,6 +76,13 @@ def manifests(places: Sequence[Path]) -> list[Path]:
     return list(dict.fromkeys(found))
 
 
+def lone(places: Sequence[Path], found: Sequence[Path]) -> list[Path]:
+    """Return manifests that are missing in folders and below them, though Verilog names them."""
+    missing = {file.with_suffix(".json"): _text(file) for place in places for file in sorted(place.rglob("*.v"))}
+    names = {path.name for path in found}
+    return [path for path, text in missing.items() if path.name not in names and f"latencies: {path.name}\n" in text]
+
+
 def _is_manifest(path: Path) -> bool:
     try:
         return path.is_file() and {"module", "options"} <= set(json.loads(read_text(path, MOST_JSON)))

@@ -212,11 +212,12 @@ def test_files_of_an_earlier_core_are_found_and_other_cores_are_checked(
     for file in left:
         (folder / file).unlink()
     (folder / "above").mkdir()
+    (folder / "lone.v").write_text("// Ports, widths, units and latencies: lone.json\n")
     (folder / "above" / "core.json").write_text('{"module": "core", "options": {"method": "x"}}')
     assert run("check", folder, "--no-simulation") == 1
     said = capsys.readouterr().out
-    assert "core.json was not checked: method must be one of" in said
-    assert said.splitlines()[-1] == "FAIL: 1 of 2 cores not as the manifest says"
+    assert re.search("(?s)core.json was not checked: method must be.*lone.json was not checked: it is missing", said)
+    assert said.splitlines()[-1] == "FAIL: 2 of 3 cores not as the manifest says"
 
 
 def test_the_jobs_run_as_a_shell_would_run_them(generated: Generated, tmp_path: Path) -> None:
