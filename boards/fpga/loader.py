@@ -45,7 +45,9 @@ def bitstream(board: Board, place: Path) -> Path:
     It raises ValueError if it is that of another board, or there is none or several.
     """
     if not place.exists():
-        raise ValueError(f"FILE must be a bitstream that exists, not {str(place)!r}")
+        raise ValueError(
+            f"FILE must be a bitstream that exists, not {str(place)!r}: type tachometry build {board.name}"
+        )
     if not place.is_dir():
         if place.suffix != board.suffix:
             raise ValueError(f"a bitstream for {board.name} must end in {board.suffix}, not {place.name!r}")

@@ -56,7 +56,7 @@ class _Commands(click.Group):
         self, context: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
-            near = get_close_matches(args[0], COMMANDS, n=2)
+            near = ["--version"] if args[0] == "version" else get_close_matches(args[0], COMMANDS, n=2)
             guess = f" Did you mean {' or '.join(near)}?" if near else ""
             context.fail(f"No such command {args[0]!r}.{guess}")
         return super().resolve_command(context, args)

@@ -189,6 +189,15 @@ class GroupedCommand(click.Command):
                 if re.fullmatch(r"[\d.]+", number) and unit in _UNITS:
                     text = f"A number and its unit are one word: type {number}{unit}."
                     raise click.UsageError(text, error.ctx or ctx) from None
+            valued = [name for one in self.get_params(ctx) if not getattr(one, "is_flag", True) for name in one.opts]
+            for before, name, word in zip(["", *words], words, words[1:], strict=False):
+                if name in valued and word in valued:
+                    raise click.UsageError(f"Option {name!r} requires an argument, not {word}.", ctx) from None
+                if error.message.endswith(f"argument ({word})") and (before == "--methods" or name.startswith("--")):
+                    text = (
+                        f"it takes no value: leave {word} out" if before != "--methods" else f"a list is {name},{word}"
+                    )
+                    raise click.UsageError(f"{error.message}: {text}.", error.ctx or ctx) from None
             error.ctx = error.ctx or ctx  # the parser does not say of which command an option has no argument
             raise
 

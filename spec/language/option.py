@@ -55,7 +55,7 @@ def parse_whole(what: str, text: str) -> int:
     if len(text) <= _MOST_DIGITS and re.fullmatch(r"\s*[-+]?\d+(_\d+)*\s*", text, re.ASCII):
         return int(text)
     plain = re.sub(r"(?<=\d),(?=\d{3}\b)|(?<=\d)\s*[a-zA-Z]+$", "", text)
-    typed = f": type {plain}" if re.fullmatch(r"\d{1,30}", plain, re.ASCII) else ""
+    typed = f": type {plain}" if plain != text and re.fullmatch(r"\d{1,30}", plain, re.ASCII) else ""
     raise ParameterError(what, f"must be a whole number{typed}, not {text!r}")
 
 

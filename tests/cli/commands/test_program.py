@@ -76,7 +76,7 @@ def test_a_bitstream_of_another_board_is_not_loaded(fake: FakeTools, capsys: pyt
     built("rig", "ulx3s-85f", "y.bit")
     assert refused(capsys, "ulx3s-85f", "rig") == message.format("ulx3s-85f", "x.bit, y.bit")
     assert refused(capsys, "icebreaker", "rig/x.bit") == "a bitstream for icebreaker must end in .bin, not 'x.bit'"
-    assert refused(capsys, "icebreaker") == "FILE must be a bitstream that exists, not 'build/icebreaker'"
+    assert refused(capsys, "icebreaker").endswith("not 'build/icebreaker': type tachometry build icebreaker")
     Path("rig/alone.bit").write_text("bits")
     assert run("program", "ulx3s-85f", "rig/alone.bit") == 0
     assert len(fake.calls) == 1
