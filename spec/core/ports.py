@@ -69,8 +69,8 @@ def _more_ports(spec: Core) -> Iterator[Port]:
     yield from _of_extras(spec, -1)
     yield from _of_extras(spec, 0)
     if spec.filter_clocks:
-        text = "Edges that the glitch filter has kept out, two for each glitch; it stays at 65534. Between the ticks "
-        text += "it counts on, and a capture takes what it is then."
+        text = "Edges that the glitch filter has kept out, two for each glitch; it stays at 65534. "
+        text += "It also changes between ticks; a capture shows the present value."
         yield held(TICK, "filtered_edges", 16, unit="edges", help=text)
     yield from _of_extras(spec, 1)
 

@@ -152,7 +152,7 @@ class Health(Extra):
 
     def ports(self, spec: Numbers) -> Iterable[Port]:
         codes = "; ".join(f"{code}: {FAULT_TEXTS[code]}" for code in self.faults(spec))
-        now = "It changes between the ticks as well, and a capture takes what it is then."
+        now = "It also changes between ticks; a capture shows the present value."
         help = f"The first fault of the encoder since it was cleared; {codes}. {now}"
         yield held(TICK, "health", READ_FAULT_WIDTH if spec.encoder.sampled else FAULT_WIDTH, help=help)
         yield held(TICK, "faults", FAULTS_WIDTH, help="Faults of the encoder since they were cleared; it stays at 255.")

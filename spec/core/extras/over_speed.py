@@ -35,7 +35,7 @@ class OverSpeed(Extra):
         return math.floor(counts * spec.scale.per_count * 2**spec.velocity.frac_bits)
 
     def missing(self) -> Mapping[str, str]:
-        return {"axes": "must be left out with --axes: what trips is for one axis"}
+        return {"axes": "must be left out with --axes: it trips for one axis"}
 
     def check(self, spec: Numbers) -> None:
         if self.greatest(spec) < spec.velocity.full_scale:

@@ -109,8 +109,8 @@ class Stream(Extra):
         yield Port(f"{STREAM}_tdata", "output", 8 * size, help=help)
         yield Port(f"{STREAM}_tvalid", "output", help="There is a record; it stays until it is taken.")
         yield Port(f"{STREAM}_tlast", "output", help="The record is the last one of its packet.")
-        text = "Records that were dropped since one still waited; it stays at 65535. Between the ticks it counts on, "
-        text += "and a capture takes what it is then."
+        text = "Records that were dropped since one still waited; it stays at 65535. "
+        text += "It also changes between ticks; a capture shows the present value."
         yield held(TICK, "overruns", OVERRUNS_WIDTH, unit="records", help=text)
 
     def entry(self, spec: Numbers) -> dict[str, Any]:

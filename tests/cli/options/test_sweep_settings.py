@@ -147,7 +147,7 @@ def test_the_file_is_shown_as_it_is() -> None:
 
 def test_the_options_beside_it_mean_the_same() -> None:
     options = by_name(sweep) | point_options()
-    command = re.search(r"^    tachometry sweep (--ppr(?:.*\\\n)*.*)$", PAGE, re.MULTILINE)
+    command = re.search(r"^    tachometry sweep (--lines(?:.*\\\n)*.*)$", PAGE, re.MULTILINE)
     assert command is not None
     words = shlex.split(command[1].replace("\\\n", ""))
     raw, _, _ = sweep.make_parser(click.Context(sweep)).parse_args(words)

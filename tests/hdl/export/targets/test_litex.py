@@ -77,7 +77,7 @@ endmodule
 @cache
 def spec() -> TachometerSpec:
     """Return the core of the page."""
-    values = {"ppr", "clock", "tick", "max-time", "filter", "position-width"}
+    values = {"lines", "clock", "tick", "max-time", "filter", "position-width"}
     given = {word[2:]: after for word, after in pairwise([*WORDS, ""]) if word.startswith("--")}
     return of_texts(
         "s",
