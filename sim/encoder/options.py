@@ -109,7 +109,7 @@ class EncoderOptions:
         number_reader(FRACTION),
     )
     phase_error_deg: float = _fault(
-        "Phase error of B in electrical degrees, such as 5 or 5deg. B comes so many degrees later than 90 "
+        "Phase error of B in electrical degrees, such as 5deg. B comes so many degrees later than 90 "
         "after A; between -90 and 90.",
         "DEGREES",
         number_reader(DEGREES, "deg"),

@@ -32,6 +32,14 @@ _MULTIPLIERS = ("auto", "serial", "block")
 LEAST_PERIOD = 8  # LSB
 
 
+def _parse_period(what: str, text: str) -> int:
+    if text.lower().endswith(("s", "hz")):
+        raise ParameterError(
+            what, f"must be a number of LSB, not {text!r}: for the time between ticks type --tick {text}"
+        )
+    return parse_whole(what, text)
+
+
 @dataclass(frozen=True)
 class Acceleration:
     """Format of the acceleration that the tracking method shows."""
@@ -115,7 +123,7 @@ class TrackTachometer(TachometerSpec):
         "periods of 17 bits. The core learns that error, as four offsets a period.",
         shown="none is learned",
         metavar="N",
-        parse=parse_whole,
+        parse=_parse_period,
         tests=(),
         tacit=True,
     )
