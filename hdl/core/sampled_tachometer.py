@@ -40,8 +40,8 @@ class SampledTachometer(Tachometer):
         wrong, warning = WRONG_CHECK, 0
         if self.master is not None:
             wrong, warning = self.master.reason, self.master.sample_warning
-        fault = Mux(reader.jump, JUMP, Mux(reader.decode_error, NO_ANSWER, 0))
-        fault = Mux(reader.sample_ok, Mux(warning, WARNING, fault), wrong)
+        fault = Mux(reader.jump, JUMP, Mux(reader.decode_error, NO_ANSWER, Mux(warning, WARNING, 0)))
+        fault = Mux(reader.sample_ok, fault, wrong)
         m.d.comb += self.read_fault.eq(Mux(reader.sample_valid, fault, 0))
         drive(m, reader, {"last": self.sampling_clock.last})
         shown = ("tick", "pulse_count", "overflow", "position", "position_valid", "decode_error")

@@ -59,8 +59,8 @@ class Reads:
             refused, again = _jumps(spec.reach, clock[good], sample[good])
             anew[good], jumps[good] = again, refused
             taken &= ~jumps
-        fault = np.where(jumps, JUMP, np.where(taken, 0, NO_ANSWER))
-        fault = np.where(reason == 0, np.where(warning, WARNING, fault), reason)
+        fault = np.where(jumps, JUMP, np.where(taken, WARNING * warning, NO_ANSWER))
+        fault = np.where(reason == 0, fault, reason)
         seen = fault > 0
         return cls(clock[taken], sample[taken], age[taken], clock[~taken], anew[taken], clock[seen], fault[seen])
 

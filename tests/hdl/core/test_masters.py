@@ -13,16 +13,26 @@ from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.sampled import encoder_of
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.engines.cxxrtl import Cxxrtl
+from tachometry.sim.golden.encoder_read import Records
+from tachometry.sim.golden.sampled import Reads
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import ParameterError, TachometerSpec, of_options, of_texts
 from tachometry.spec.core.extras.health import READ_FAULTS
+from tachometry.spec.core.reads import JUMP, WARNING, WRONG_CHECK
 
 BASE = {"sensor": "biss", "bits": "17", "clock": "50MHz", "tick": "100us", "max-time": "2ms"}
 SSI = {"sensor": "ssi", "bits": "3+12", "encoder-clock": "2MHz"}
 CASES = {
     "m": SSI | {"gray": "yes", "repeat": "yes", "line-delay": "300ns", "reverse": "yes", "health": "yes"},
-    "m outside": {"bits": "8+12", "external-tick": "yes", "tick": "50us", "crc": "0x190d9", "health": "yes"},
+    "m outside": {
+        "bits": "8+12",
+        "external-tick": "yes",
+        "tick": "50us",
+        "crc": "0x190d9",
+        "health": "yes",
+        "max-speed": "6000rpm",
+    },
     "m short": SSI | {"tick": "40us", "average": "3"},
     "track": {},
 }
@@ -40,6 +50,15 @@ def test_gates_and_golden_model_agree_on_every_read(case: str) -> None:
     assert len(found.actual.errors) > 10
     assert {0, 1} == {*found.actual.ticks.position_valid.tolist()}
     assert len({*found.actual.ticks.position.tolist()}) > 40
+
+
+def test_a_jump_is_named_before_a_warning() -> None:
+    """The warning bit means that the position was taken."""
+    spec, sample = core("m outside"), np.array([5, 6, 900, 7, 901, 8])
+    clock, reason, warning = np.arange(6) * 2500, np.array([0, 0, 0, 0, 0, 2]), np.array([0, 1, 1, 0, 0, 1]) > 0
+    found = Reads.those(spec, Records(clock, sample, 0 * clock, reason, warning))
+    assert found.fault.tolist() == [WARNING, JUMP, JUMP, WRONG_CHECK]
+    assert found.fault_clock.tolist() == [2500, 5000, 10_000, 12_500]
 
 
 def test_a_wrong_code_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
