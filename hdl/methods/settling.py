@@ -11,13 +11,13 @@ class SettlingPlace(wiring.Component):
     """Gives the place of an update, which stays in its count as the velocity falls.
 
     A place that is 3/8 count away begins to wait when the velocity has fallen to half of that at the last count.
-    Half a count is its limit then; the limit halves each time the velocity halves again. `taken` is high in the clock
-    in which the update is taken. Latency: 0.
+    Half a count is its limit then; the limit halves each time the velocity halves again. Of a place that is far away
+    the low bits alone are compared. `taken` is high in the clock in which the update is taken. Latency: 0.
     """
 
-    def __init__(self, settling: Settling, velocity_width: int) -> None:
+    def __init__(self, settling: Settling, place_width: int, velocity_width: int) -> None:
         self._settling = settling
-        place = signed(settling.place_bits)
+        place = signed(place_width)
         ports = {"velocity": In(signed(velocity_width)), "forced": In(1), "taken": In(1)}
         super().__init__({**ports, "between": In(place), "settled": Out(place)})
 
@@ -25,22 +25,23 @@ class SettlingPlace(wiring.Component):
         m = Module()
         half = self._settling.half
         velocity = self.velocity >> self._settling.speed_shift
-        back = self.between[-1]
+        near = self.between[: self._settling.place_bits]
+        back = near[-1]
         waits = Signal()
         limit = Signal(range(half + 1), init=half)
         mark = Signal(len(velocity) - 1)
         size = Signal.like(mark)
         slow = Signal()
         stays = Signal()
-        ahead = Signal(len(self.between) - 1)
+        ahead = Signal(len(near) - 1)
         now = Signal.like(limit)
         m.d.comb += [
             size.eq(velocity ^ velocity[-1].replicate(len(velocity))),
             slow.eq(size <= mark),
-            ahead.eq(self.between ^ back.replicate(len(self.between))),
+            ahead.eq(near ^ back.replicate(len(near))),
             stays.eq(self.forced & (waits | ((ahead >= half - (half >> 2)) & (slow | (limit < half))))),
             now.eq(Mux(self.forced, limit >> slow, half)),
-            self.settled.eq(Mux(stays & (ahead > now), now ^ back.replicate(len(self.between)), self.between)),
+            self.settled.eq(Mux(stays & (ahead > now), (now ^ back.replicate(len(near))).as_signed(), self.between)),
         ]
         with m.If(self.taken):
             m.d.sync += [waits.eq(stays), limit.eq(now), mark.eq(Mux(self.forced, mark >> slow, size >> 1))]

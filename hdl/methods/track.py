@@ -111,9 +111,10 @@ class TrackMethod(wiring.Component):
         if spec.settling is None:
             whole = (position << spec.position_fine_bits) + (machine.position_fine >> shift)
             return whole + machine.position_fine[shift - 1]
-        m.submodules.settling = box = SettlingPlace(spec.settling, len(machine.velocity))
+        between = (machine.position_fine >> shift) + machine.position_fine[shift - 1]
+        m.submodules.settling = box = SettlingPlace(spec.settling, len(between), len(machine.velocity))
         m.d.comb += [
-            box.between.eq((machine.position_fine >> shift) + machine.position_fine[shift - 1]),
+            box.between.eq(between),
             box.velocity.eq(machine.velocity),
             box.forced.eq(~machine.number.any()),
             box.taken.eq(taken),

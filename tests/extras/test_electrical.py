@@ -28,6 +28,7 @@ from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import of_options, of_texts
 from tachometry.spec.core.extras.electrical import ElectricalAngle
 from tachometry.spec.formats.angles import Angles
+from tachometry.spec.formats.settling import Settling
 
 TRACK = "tick=2000clk max-time=8000clk"
 SLOW = "tick=200clk max-time=1000clk"
@@ -121,6 +122,22 @@ def test_a_wrong_limit_of_a_silence_is_seen() -> None:
     ):
         with mutant(SettlingPlace, right, wrong):
             assert lockstep(spec, trace, Cxxrtl()).n_mismatches, right
+
+
+def test_a_place_settles_however_far_it_is() -> None:
+    """The low bits alone are compared, but none is lost."""
+    rng, settling, n = np.random.default_rng(1), Settling(6, 14), 1000
+    counted, far = rng.random(n) < 0.05, rng.random(n) < 0.2
+    places = np.where(far, rng.integers(-(1 << 24), 1 << 24, n), rng.integers(-64, 64, n)).tolist()
+    velocities = (rng.integers(-(1 << 16), 1 << 16, n) >> rng.integers(0, 16, n)).tolist()
+    rows = [
+        {"between": place, "velocity": velocity, "forced": int(not count), "taken": 1}
+        for place, velocity, count in zip(places, velocities, counted, strict=True)
+    ]
+    seen = clock_by_clock(SettlingPlace(settling, 30, 20), rows, ["settled"])
+    settled = Settled(settling).places(velocities, counted.tolist(), places)
+    assert [row["settled"] for row in seen] == settled
+    assert settled != places
 
 
 def turning(words: str, sets: Any, home: int = 0) -> tuple[Any, PinTrace]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 
+from tachometry.spec.formats.angles import wrapped
 from tachometry.spec.formats.settling import Settling
 
 
@@ -14,15 +15,17 @@ class Settled:
 
     def places(self, velocities: Iterable[int], counted: Iterable[bool], places: Iterable[int]) -> list[int]:
         """Return the places of the next updates, relative to their positions."""
-        half, found = self._settling.half, list[int]()
+        half, found, bits = self._settling.half, list[int](), self._settling.place_bits
         for velocity, has_count, place in zip(velocities, counted, places, strict=True):
             speed = velocity >> self._settling.speed_shift
-            size = max(speed, ~speed)
+            size, near = max(speed, ~speed), wrapped(place, bits)
+            ahead = max(near, ~near)
             if has_count:
                 self._waits, self._limit, self._mark = False, half, size >> 1
             else:
                 slow = size <= self._mark
-                self._waits |= max(place, ~place) >= half - (half >> 2) and (slow or self._limit < half)
+                self._waits |= ahead >= half - (half >> 2) and (slow or self._limit < half)
                 self._limit, self._mark = self._limit >> slow, self._mark >> slow
-            found.append(max(~self._limit, min(place, self._limit)) if self._waits else place)
+            limited = self._limit if near >= 0 else ~self._limit
+            found.append(limited if self._waits and ahead > self._limit else place)
         return found
