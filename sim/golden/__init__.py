@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tachometry.sim.golden import extras
 from tachometry.sim.golden.axes import run_axes
@@ -11,7 +10,7 @@ from tachometry.sim.golden.front_end import Steps, count, decoded
 from tachometry.sim.golden.low_pass import filtered
 from tachometry.sim.golden.methods import MODELS
 from tachometry.sim.golden.output import in_unit, with_age
-from tachometry.sim.golden.sampled import Reads, ticks_of
+from tachometry.sim.golden.sampled import ticks_of
 from tachometry.sim.golden.sampling import windows
 from tachometry.sim.golden.standstill import with_standstill
 from tachometry.sim.signals.axes import AxesTrace, Trace
@@ -35,12 +34,6 @@ def run(spec: CoreSpec, trace: Trace) -> Run:
     return Run.of_ports(spec, trace.n_clocks, tables(spec.tachometer, trace))
 
 
-def _read(spec: TachometerSpec, trace: PinTrace, last: NDArray[np.int64]) -> tuple[Table, Table]:
-    """Return ticks of a core whose encoder is read, and no index."""
-    none = np.empty(0, dtype=np.int64)
-    return ticks_of(spec, Reads.of(spec, trace), last), Table(none, {"index_position": none})
-
-
 def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) -> dict[str, Table]:
     """Return the same by strobes, and with each update the clock of its cause, as the column `cause`; of other steps
     than those of the trace if they are given.
@@ -54,7 +47,11 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
     else:
         last, tick_errors = windows(spec, trace)
         beyond, nominal = None, np.broadcast_to(np.int64(1), last.shape)
-    ticks, index = count(spec, steps, last, beyond) if spec.encoder.sampled is None else _read(spec, trace, last)
+    if steps.reads is None:
+        ticks, index = count(spec, steps, last, beyond)
+    else:
+        none = np.empty(0, dtype=np.int64)
+        ticks, index = ticks_of(spec, steps.reads, last), Table(none, {"index_position": none})
     del last  # as long as all ticks
     if spec.facts.rests_with == TICK:
         ticks = with_standstill(spec, ticks, nominal)

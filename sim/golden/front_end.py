@@ -140,6 +140,7 @@ class Steps:
     values: NDArray[np.int64] = field(default_factory=_none)
     arms: NDArray[np.int64] = field(default_factory=_none)  # clocks in which the next index is let through
     wheel: Teeth | None = None  # of a wheel with missing teeth, the teeth
+    reads: Reads | None = None  # of an encoder that is read
     # clocks from which levels of the lines of the sensor are seen, and these; only the last of a clock lasts
     levels: tuple[NDArray[np.int64], ...] = ()
     # shape (n,): displacement of the edge of each step that an extra gives; empty if none does
@@ -194,8 +195,8 @@ def _indices(
 def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     """Return conditioned and decoded lines; of an encoder that is read, the clocks of wrong reads."""
     if spec.encoder.sampled is not None:
-        none = _none()
-        return Steps(none, none, Reads.of(spec, trace).errors, none, none)
+        none, reads = _none(), Reads.of(spec, trace)
+        return Steps(none, none, reads.errors, none, none, reads=reads)
     returned = [np.empty(0, dtype=np.int64)]
     encoder = spec.encoder
 

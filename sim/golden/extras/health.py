@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from tachometry.sim.golden.extras import View
 from tachometry.sim.golden.front_end import Steps
-from tachometry.sim.golden.sampled import Reads
 from tachometry.sim.golden.sorted_lookup import places
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
@@ -73,8 +72,7 @@ def _open(spec: TachometerSpec, health: Health, trace: PinTrace, clears: Ints) -
 def tables(extra: Health, view: View) -> dict[str, Table]:
     """Return the clocks in which faults are seen, each with its code, and with the error of a wrong turn."""
     spec, steps = view.spec, view.steps
-    if spec.encoder.sampled is not None:
-        reads = Reads.of(spec, view.trace)
+    if (reads := steps.reads) is not None:
         return {"fault": Table(reads.fault_clock, {"code": reads.fault + READ_FAULTS, "error": 0 * reads.fault})}
     standing, codes = _standing(spec, extra, steps)
     illegal = _illegal(spec, extra, steps.errors)
