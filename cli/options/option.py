@@ -7,7 +7,6 @@ import re
 import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -17,12 +16,12 @@ from click.core import ParameterSource
 from click.shell_completion import CompletionItem
 
 from tachometry.cli.options.help import line, needed
-from tachometry.cli.options.option_aliases import meant
+from tachometry.cli.options.option_aliases import meant, misplaced
 from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.spec import METHODS, ParameterError, common_options, own_options
 from tachometry.spec.language import option as declaration
 from tachometry.spec.language.option import options_of, read_options
-from tachometry.spec.language.units import ANGLE, FREQUENCY, QUANTITY, SPEED, TIME
+from tachometry.spec.language.units import QUANTITY
 
 # What a message says that a quantity is.
 _NUMBER = re.compile(r", not (-?[\d.]+(?:e[+-]?\d+)?)( (?:rad/s|rev/s|rpm|Hz|Nm|s))?(?=$|[:;,])")
@@ -135,7 +134,6 @@ def later(name: str, make: Callable[[], Sequence[click.Option]]) -> Callable[[Co
     return click.option(f"--{name}", cls=Later, make=make, hidden=True)
 
 
-_UNITS = {name for units in (TIME, FREQUENCY, SPEED, ANGLE) for name in units}
 RESEARCH = "Research"  # the group of options for those who study methods
 LONG = "tachometry.long"  # of a context: its help has all sentences
 _MOST_LINES = 100  # of --help
@@ -185,19 +183,9 @@ class GroupedCommand(click.Command):
             message = f"No such option {error.option_name!r}." + (f" Did you mean {' or '.join(near)}?" if near else "")
             raise click.UsageError(message, error.ctx or ctx) from None
         except click.UsageError as error:
-            for number, unit in pairwise(words):
-                if re.fullmatch(r"[\d.]+", number) and unit in _UNITS:
-                    text = f"A number and its unit are one word: type {number}{unit}."
-                    raise click.UsageError(text, error.ctx or ctx) from None
             valued = [name for one in self.get_params(ctx) if not getattr(one, "is_flag", True) for name in one.opts]
-            for before, name, word in zip(["", *words], words, words[1:], strict=False):
-                if name in valued and word in valued:
-                    raise click.UsageError(f"Option {name!r} requires an argument, not {word}.", ctx) from None
-                if error.message.endswith(f"argument ({word})") and (before == "--methods" or name.startswith("--")):
-                    text = (
-                        f"it takes no value: leave {word} out" if before != "--methods" else f"a list is {name},{word}"
-                    )
-                    raise click.UsageError(f"{error.message}: {text}.", error.ctx or ctx) from None
+            if text := misplaced(error.message, words, valued):
+                raise click.UsageError(text, error.ctx or ctx) from None
             error.ctx = error.ctx or ctx  # the parser does not say of which command an option has no argument
             raise
 

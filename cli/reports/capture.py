@@ -69,11 +69,8 @@ def _still(source: Source | None) -> list[str]:
         return []
     names = [source.lines[line] for line in source.still]
     options = " and ".join(f"--{line.replace('_', '-')}" for line in source.still)
-    do = (
-        f"; {' and '.join(source.moving)} {'does' if len(source.moving) == 1 else 'do'}: see {options}"
-        if source.moving
-        else ""
-    )
+    moving = source.moving
+    do = f"; {' and '.join(moving)} {'does' if len(moving) == 1 else 'do'}: see {options}" if moving else ""
     return [f"{' and '.join(names)} never {'changes' if len(names) == 1 else 'change'}{do}"]
 
 
