@@ -11,7 +11,7 @@ Write = Callable[[int, int], None]
 
 
 class WrongBoard(ValueError):
-    """Another core answers than that of the manifest."""
+    """The board has another core than the manifest."""
 
 
 class Client:
@@ -77,9 +77,9 @@ class Client:
     def write_disc(self, displacement: Sequence[float]) -> bool:
         """Write a map of the disc, and return whether the core has it then; it forgets its place in the turn.
 
-        `displacement` is where each edge lies, in counts, as in the file of `tachometry calibrate`. What captures are
-        held does not show the map: False. It raises KeyError if the core has no table that is written; ValueError if
-        the map has another number of edges, or one that does not fit; then nothing is written.
+        `displacement` is where each edge lies, in counts, as in the file of `tachometry calibrate`. While captures are
+        held the map cannot be read back: False. It raises KeyError if the core has no table that is written; ValueError
+        if the map has another number of edges, or one that does not fit; then nothing is written.
         """
         about = self.registers.disc
         if about is None or not about["writable"]:

@@ -9,7 +9,7 @@ from tachometry.boards.host.snapshot import Snapshot
 class HostRegisters:
     """Holds the registers by their names.
 
-    It raises ValueError if the manifest is that of a core without registers.
+    It raises ValueError if the manifest has no registers.
     """
 
     def __init__(self, manifest: Mapping[str, Any]) -> None:

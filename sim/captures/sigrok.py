@@ -54,9 +54,9 @@ def read_sr(
     number of samples / samplerate. Change times are rounded down to float64 and the duration up, hence
     `Recording.place` on a clock that is a multiple of the samplerate finds sample k at clock k * multiple, exactly.
 
-    A channel is a name or a number: N is sigrok's D<N>, bit N of a sample. The other arguments are as
-    of `read_capture`. It raises CaptureError if the file is none, for an
-    unknown channel, or for a samplerate that is missing or is not the one in the file.
+    A channel is a name or a number: N is sigrok's D<N>, bit N of a sample. The other arguments are as of
+    `read_capture`. It raises CaptureError if the file is none, for an unknown channel, or for a samplerate that is
+    missing or is not the one in the file.
     """
     path = Path(path)
     if samplerate_hz is not None and not 0 < samplerate_hz < float("inf"):

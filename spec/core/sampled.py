@@ -8,7 +8,7 @@ from fractions import Fraction
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import Port, pin
 
-JUMP = 4  # LSB that a read may differ by at once
+_AT_ONCE = 4  # LSB by which a read may differ in no time
 _COUNT_BITS = 13  # of a turn in the counts of the tracking recursion: a finer LSB is a fraction of such a count
 _LEAST_BITS, _MOST_BITS, _MOST_WIDTH = 4, 24, 40
 
@@ -41,7 +41,7 @@ class Reach:
         """Return it for this greatest speed; ages of reads differ by at most `age_spread` clocks."""
         bits = max(0, 10 - math.floor(math.log2(counts_per_clock)))
         step = math.ceil(counts_per_clock * (1 << bits))
-        return cls(width, min((JUMP << bits) + step * (age_spread + 1), (1 << width - 1 + bits) - 1), step, bits)
+        return cls(width, min((_AT_ONCE << bits) + step * (age_spread + 1), (1 << width - 1 + bits) - 1), step, bits)
 
     @property
     def most(self) -> int:

@@ -34,9 +34,7 @@ LEAST_PERIOD = 8  # LSB
 
 def _parse_period(what: str, text: str) -> int:
     if text.lower().endswith(("s", "hz")):
-        raise ParameterError(
-            what, f"must be a number of LSB, not {text!r}: for the time between ticks type --tick {text}"
-        )
+        raise ParameterError(what, f"must be in LSB, not {text!r}: for the time between ticks type --tick {text}")
     return parse_whole(what, text)
 
 

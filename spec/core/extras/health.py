@@ -110,18 +110,14 @@ class Health(Extra):
         check_options(self)
 
     def missing(self) -> Mapping[str, str]:
-        return {
-            "axes": "must be left out with --axes: what watches the lines is for one axis",
-        }
+        return {"axes": "must be left out with --axes: what watches the lines is for one axis"}
 
     def check(self, spec: Numbers) -> None:
         if not self.on:
             raise ParameterError("health", "must not be no among extras: leave it out")
         if spec.encoder.sampled:
-            if (self.edges, self.errors, self.differential) != (256, 10, None):
-                raise ParameterError(
-                    "health", "must be alone for an encoder that is read: its other options are for edges"
-                )
+            if self != Health():
+                raise ParameterError("health", "must be alone for an encoder that is read: others are for edges")
             return
         if spec.encoder.sensor != "quadrature":
             rest = f"must be left out for {spec.encoder.sensor}: it watches two lines in quadrature"
