@@ -1,4 +1,4 @@
-"""Exported Verilog of every kind of core beside that of Yosys: writes docs/measured/verilog.md."""
+"""Compares the exported Verilog of every kind of core with the text by Yosys; writes docs/measured/verilog.md."""
 
 import json
 import random
@@ -43,7 +43,7 @@ def counted(text: str) -> list[int]:
 
 
 def written() -> Iterator[list[str]]:
-    """Yield what is in both texts, the least processor time of three, and whether two hash seeds give equal bytes."""
+    """Yield counts of both texts, the least processor time of three, and whether two hash seeds give equal bytes."""
     runs = {check_output(TEXTS, cwd=ROOT / "bench", env={"PYTHONHASHSEED": seed}) for seed in "17"}
     yield ["core", "lines", "names", "aliases", "comments", "seconds", "bytes"]
     for kind in DATA["kinds"]:

@@ -112,7 +112,7 @@ def check_front(
         assert [
             (row["clock"] - spare, row["position_compare_position"]) for row in rows if row["position_compare_valid"]
         ] == wanted
-        assert wanted or settings.method in ("t", "mt", "track")  # whose motions do not come there
+        assert wanted or settings.method in ("mt", "track")  # whose motions do not come there
         for row in seen:
             before = [at + spare for at, _ in wanted if at + spare <= row["clock"]]
             assert row["position_compare_count"] == len(before)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.nightly import only
+from support.nightly import nightly, only
 from support.verilog import smoke
 
 from tachometry.hdl.extras import health
@@ -25,14 +25,8 @@ BASE = {"sensor": "biss", "bits": "17", "clock": "50MHz", "tick": "100us", "max-
 SSI = {"sensor": "ssi", "bits": "3+12", "encoder-clock": "2MHz"}
 CASES = {
     "m": SSI | {"gray": "yes", "repeat": "yes", "line-delay": "300ns", "reverse": "yes", "health": "yes"},
-    "m outside": {
-        "bits": "8+12",
-        "external-tick": "yes",
-        "tick": "50us",
-        "crc": "0x190d9",
-        "health": "yes",
-        "max-speed": "6000rpm",
-    },
+    "m outside": {"bits": "8+12", "external-tick": "yes", "tick": "50us", "crc": "0x190d9"}
+    | {"health": "yes", "max-speed": "6000rpm"},
     "m short": SSI | {"tick": "40us", "average": "3"},
     "track": {},
 }
@@ -61,6 +55,7 @@ def test_a_jump_is_named_before_a_warning() -> None:
     assert found.fault_clock.tolist() == [2500, 5000, 10_000, 12_500]
 
 
+@nightly
 def test_a_wrong_code_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     spec = core("m outside")
     monkeypatch.setattr(health, "READ_FAULTS", READ_FAULTS + 1)

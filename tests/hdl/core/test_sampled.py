@@ -207,6 +207,7 @@ def test_the_virtual_encoder_reads_what_the_core_tracks(reverse: str) -> None:
     assert 20 < len(run.errors) < 100
 
 
+@nightly
 @pytest.mark.parametrize(
     ("name", "gate"),
     [
