@@ -148,7 +148,7 @@ def _stress_answers(spec: TachometerSpec, reads: Reads, rng: np.random.Generator
     sent = Answers(_restless(spec, rng, n_ticks) & (1 << reads.width) - 1, reads.delay, rng.integers(0, 3, n_ticks))
     gone = (rng.random(n_ticks) < 0.02) | (np.abs(np.arange(n_ticks) - n_ticks // 2) < spec.timing.max_ticks)
     wrong = np.where(rng.random(n_ticks) < 0.02, rng.integers(0, frames(reads, sent).shape[1], n_ticks), -1)
-    sent = replace(sent, flip=wrong, error=rng.random(n_ticks) < 0.02, warning=rng.random(n_ticks) < 0.02, silent=gone)
+    sent = replace(sent, flip=wrong, error=rng.random(n_ticks) < 0.02, warning=rng.random(n_ticks) < 0.3, silent=gone)
     at, level = answer(reads, np.array(spec.read_starts(n_clocks)), sent)
     none = np.zeros(len(at), dtype=np.uint8)
     return PinTrace.of_lines(at, n_clocks, {"a": none, "b": none, "encoder_data": level})

@@ -76,6 +76,12 @@ test_refusals = refused(
 )
 
 
+@pytest.mark.parametrize(("multiplier", "clocks"), [("serial", 127), ("block", 25)])
+def test_the_phase_is_there_so_many_clocks_after_an_update(multiplier: str, clocks: int) -> None:
+    spec = Case("track", f"electrical=7 multiplier={multiplier} {TRACK}").spec
+    assert ElectricalAngle.of(spec.extras).angles(spec).clocks == clocks  # type: ignore[union-attr]
+
+
 def test_pole_pairs_beside_the_lines_are_those_of_the_motor() -> None:
     """With halls they are those of the halls."""
     texts = {"clock": "48MHz", "tick": "100us", "pole-pairs": "7", "lead": "1tick"}

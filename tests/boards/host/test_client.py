@@ -136,15 +136,12 @@ def test_a_map_of_the_disc_is_written_and_read_back() -> None:
     trace = PinTrace.of(VirtualEncoder(2, index=True).record(parse_motion("stop:9ms")).recording, spec).completed(spec)
     board, described = GoldenBoard(RegisterMap(spec), trace, 9), manifest(spec, "spindle")
     bench = client.Client(board.read, board.write, described | {"registers": RegisterMap(spec).described()})
-    entries = [(7 * edge) % 41 - 20 for edge in range(8)]
-    displacement = [entry * described["disc"]["counts_per_lsb"] for entry in entries]
+    displacement = [((7 * edge) % 41 - 20) * described["disc"]["counts_per_lsb"] for edge in range(8)]
     assert bench.write_disc(displacement)
     bench.hold(True)
     assert not bench.write_disc(displacement)
-    for wrong, message in (
-        (displacement[:7], "must have 8 edges, not 7"),
-        ([7.0] * 8, "from -6.4 to 6.35 counts"),
-    ):
+    few, far = displacement[:7], [7.0] * 8
+    for wrong, message in ((few, "must have 8 edges, not 7"), (far, "from -6.4 to 6.35 counts")):
         with pytest.raises(ValueError, match=message):
             bench.write_disc(wrong)
     spec, trace, described = case("s", 4)

@@ -73,8 +73,7 @@ def check_errors() -> None:
     registers, name, changes, cleared, words, counted, period = seen()["illegal edges"]
     assert counted[0] == 3
     for wrong in (2, 4):
-        other = (wrong, counted[1])
-        assert not selftest._compared(registers, name, changes, cleared, words, other, period).passed
+        assert not selftest._compared(registers, name, changes, cleared, words, (wrong, counted[1]), period).passed
 
 
 def check_changes() -> None:

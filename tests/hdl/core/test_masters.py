@@ -39,7 +39,7 @@ def core(case: str) -> TachometerSpec:
 @pytest.mark.parametrize("case", only(["m", "m outside"], CASES))
 def test_gates_and_golden_model_agree_on_every_read(case: str) -> None:
     spec = core(case)
-    found = lockstep(spec, stress(spec, 1, 30), Cxxrtl())
+    found = lockstep(spec, stress(spec, 26, 30), Cxxrtl())  # where the first fault is a jump with a warning
     assert found.n_mismatches == 0, found.first
     assert len(found.actual.errors) > 10
     assert {0, 1} == {*found.actual.ticks.position_valid.tolist()}
