@@ -24,7 +24,7 @@ def lay_out() -> None:
         if page == PAGES / "index.md" and PAGE.exists():
             text = re.sub(
                 r"(?m)^# .*\n",
-                r"\g<0>\n[Configure a core in the browser](explore/index.html){ .md-button }\n",
+                r"\g<0>\n[Configure a core in the browser](explore/index.html){ .md-button .md-button--primary }\n",
                 text,
                 count=1,
             )

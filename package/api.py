@@ -138,7 +138,7 @@ class Run(Shown):
 
     @property
     def true_velocity(self) -> NDArray[np.float64] | None:
-        """True velocity of the shaft at these times, in rad/s, shape (n,); None: a capture does not tell it."""
+        """True velocity of the shaft at these times, in rad/s, shape (n,); None: a capture does not have it."""
         truth = self._axis.truth
         return None if truth is None else truth.true_speed(self.time)
 

@@ -159,7 +159,7 @@ def _flagged(axis: Axis) -> str:
 def _errors(axis: Axis) -> list[tuple[str, str]]:
     name, error, unit = "velocity error", axis.error, axis.spec.scale.shown_unit
     if axis.truth is None:
-        return [(name, "unknown: a capture does not tell the true speed")]
+        return [(name, "unknown: a capture does not have the true speed")]
     if error is None:
         return [(name, "unknown: there was no update")]
     return [

@@ -75,7 +75,7 @@ def read_capture(
     - `others`: Channels of `z`, the index line, of `tick_in`, the external tick, of `c`, a third line, and of `a_n`,
       the complement of A, and so on, likewise; what is not given, the recording has not.
 
-    It raises CaptureError if the suffix is another one, or as the reader of that kind says.
+    It raises CaptureError if the suffix is another one, or what the reader of that kind raises.
     """
     path = Path(path)
     reader = _reader(path, text)

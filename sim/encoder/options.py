@@ -176,7 +176,7 @@ class EncoderOptions:
         parse=_interpolation,
     )
     frame_errors: float = _fault(
-        "Probability that a read of a sampled position is wrong. The frame says so.",
+        "Probability that a read of a sampled position is wrong. Its frame shows that.",
         "P",
         number_reader(FRACTION),
         name="frame-errors",

@@ -47,7 +47,7 @@ Make = Callable[[str, Mapping[str, str]], TachometerSpec]
 
 @dataclass(frozen=True)
 class Source:
-    """Holds the edges that all methods see; a capture does not tell the true speed."""
+    """Holds the edges that all methods see; a capture does not have the true speed."""
 
     name: str
     recording: Recording

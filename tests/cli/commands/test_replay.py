@@ -52,7 +52,7 @@ def test_what_is_unknown_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "counts in unknown" in rows
     assert "counts out 62" in rows
     assert "errors flagged 0" in rows
-    assert "velocity error unknown: a capture does not tell the true speed" in rows
+    assert "velocity error unknown: a capture does not have the true speed" in rows
 
 
 @pytest.mark.parametrize(
