@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.cli.files import Outputs
+from tachometry.cli.options.motion import shown_in_unit_of
 from tachometry.cli.options.option_aliases import meant
 from tachometry.hdl.export import export
 from tachometry.sim.captures.count_log import read_angle_log, read_count_log
@@ -150,11 +151,13 @@ class Run(Shown):
     def plot(self, path: str | os.PathLike[str] | None = None) -> Figure | None:
         """Draw velocity, error, pulse numbers and measurement times into a .png or .pdf; else return the figure."""
         from tachometry.sim.plots.run import draw, save_plot  # Matplotlib is slow to import
+        from tachometry.sim.plots.style import styled
 
         truth = self._axis.truth
         what = self._axis.spec, self._axis.run, None if truth is None else truth.true_speed
         if path is None:
-            return draw(*what)
+            with styled():
+                return draw(*what)
         save_plot(Path(path), *what)
         return None
 
@@ -179,7 +182,7 @@ class Run(Shown):
 def plan(spec: AnySpec, speeds: Sequence[float] | None = None) -> Plan:
     """Return what a core measures at constant speeds of an ideal encoder, as `tachometry plan` prints it.
 
-    Speeds are in rad/s; None: eight over the range of the core.
+    Speeds are in rad/s; None: eight over the range of the core, which are printed in its own unit.
 
     Examples
     --------
@@ -188,7 +191,9 @@ def plan(spec: AnySpec, speeds: Sequence[float] | None = None) -> Plan:
     True
     """
     core = spec.tachometer
-    return plan_at(core, np.geomspace(*default_range(core), 8) if speeds is None else speeds)
+    if speeds is None:
+        return replace(plan_at(core, np.geomspace(*default_range(core), 8)), unit=core.scale.shown_unit.name)
+    return plan_at(core, speeds)
 
 
 def simulate(
@@ -211,7 +216,8 @@ def simulate(
     if len(motions) != (spec.axes or 1):
         raise ValueError(f"motion must be one for each of {spec.axes or 1} axes, not {len(motions)}")
     truths = [_recorded(spec, one, axis, encoder) for axis, one in enumerate(motions)]
-    return _run(spec, "motion", [truth.recording for truth in truths], truths, engine)
+    recordings = [truth.recording for truth in truths]
+    return _run(shown_in_unit_of(" ".join(motions), spec), "motion", recordings, truths, engine)
 
 
 def replay(
@@ -258,7 +264,9 @@ def compare(specs: Sequence[TachometerSpec], motion: str, **encoder: Unpack[Enco
         raise ValueError("specs must be of different methods, at least one")
     truth = _recorded(specs[0], motion, 0, encoder)
     source = Source("motion", truth.recording, truth.true_speed, truth.true_angle)
-    return comparison(specs[0], dict(named), lambda method, texts: named[method], source, Judging())
+    return comparison(
+        shown_in_unit_of(motion, specs[0]), dict(named), lambda method, texts: named[method], source, Judging()
+    )
 
 
 def generate(

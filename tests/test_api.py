@@ -97,7 +97,7 @@ def test_a_picture_is_drawn(tmp_path: Path) -> None:
     assert (tmp_path / "p.png").read_bytes() == run._repr_png_()
     figure = run.plot()
     assert figure is not None
-    assert figure.axes[0].get_lines()
+    assert figure._repr_png_() == run._repr_png_()  # type: ignore[attr-defined]
 
 
 def test_results_print_in_ten_lines() -> None:
@@ -113,6 +113,9 @@ def test_results_print_in_ten_lines() -> None:
     for result in results:
         assert repr(result).count("\n") < 10
     assert repr(results[1]).splitlines()[1].split("  ")[0] == "speed (rad/s)"
+    rpm = tachometry.plan(tachometry.Tachometer(**CORE, method="s", unit="rpm"))
+    assert "resolution (rpm)" in repr(rpm)
+    assert "RMS error (rpm)" in repr(results[3])
     assert "mismatches  0\n" in repr(results[2])
     assert [line.split()[0] for line in repr(results[3]).splitlines()[2:]] == ["s", "m", "t", "mt", "rairan"]
     assert results[3]._repr_html_().count("<tr>") == 6

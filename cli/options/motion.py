@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 from tachometry.cli.options.option import Group, declared, option, refuse_without, take_values
 from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.sim.signals.files import file_of
-from tachometry.spec import CoreSpec, TachometerSpec
+from tachometry.spec import TachometerSpec
+from tachometry.spec.control import AnySpec
 from tachometry.spec.language.option import ParameterError, options_of
 from tachometry.spec.language.units import SPEED, parse_time
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
 
 _MOTION = "Motion"
-Core = TypeVar("Core", bound=CoreSpec)
+Core = TypeVar("Core", bound=AnySpec)
 
 FORMS = """\b
 Motions, joined by + into one:

@@ -1,6 +1,7 @@
 """All figures look alike, and equal figures give equal files."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -50,6 +51,22 @@ _WIDTH, _LEFT, _RIGHT, _TOP, _BOTTOM, _GAP = 10.0, 0.8, 0.6, 0.6, 0.5, 0.3
 COLUMNS = 1500  # about one for each pixel across
 
 
+class _Picture(Figure):
+    """A figure that a notebook draws, without the state of pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        return picture(lambda: self, ".png")
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Draw in the style of this project."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_STYLE)
+        yield
+
+
 def save_figure(path: Path, draw: Callable[[], Figure]) -> None:
     """Write what `draw` returns, in the style of this project; equal figures give equal files."""
     path.write_bytes(picture(draw, path.suffix.lower()))
@@ -57,10 +74,8 @@ def save_figure(path: Path, draw: Callable[[], Figure]) -> None:
 
 def picture(draw: Callable[[], Figure], suffix: str) -> bytes:
     """Return what `draw` returns as the bytes of a file."""
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()
-        matplotlib.rcParams.update(_STYLE)
-        drawn = BytesIO()  # on a full disk Matplotlib would say something else
+    drawn = BytesIO()  # on a full disk Matplotlib would say something else
+    with styled():
         draw().savefig(drawn, format=suffix[1:], dpi=160, metadata=_METADATA[suffix])
     return drawn.getvalue()
 
@@ -90,7 +105,7 @@ def place_panels(
     """
     names = list(heights)
     height = _TOP + _BOTTOM + sum(heights.values()) + _GAP * (len(names) - 1)
-    figure = Figure(figsize=(_WIDTH, height))
+    figure = _Picture(figsize=(_WIDTH, height))
     FigureCanvasAgg(figure)
     panels: dict[str, Axes] = {}
     upper = height - _TOP

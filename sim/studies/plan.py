@@ -47,11 +47,13 @@ class Plan(Shown):
     forced: NDArray[np.bool_]  # shape (n,): the maximum time ends the measurement
     # shape (n,), rad/s: what a real disc adds to the error, see `sim.theory.performance.disc_error`
     disc: NDArray[np.float64]
+    unit: str = "rad/s"  # in which it is printed
 
     def shown(self) -> tuple[str, list[list[str]]]:
         """Return the resolution over the speed."""
-        heads = ["speed (rad/s)", "measurement time (s)", "resolution (rad/s)"]
-        columns = zip(self.speed, self.measurement_time, self.resolution, strict=True)
+        unit = SpeedUnit(self.unit)
+        heads = [f"speed ({unit.name})", "measurement time (s)", f"resolution ({unit.name})"]
+        columns = zip(unit.of(self.speed), self.measurement_time, unit.of(self.resolution), strict=True)
         return "plan at constant speeds", [heads, *([f"{value:.4g}" for value in row] for row in columns)]
 
     @property
