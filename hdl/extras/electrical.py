@@ -6,16 +6,17 @@ from amaranth import Array, C, Cat, Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.arithmetic.products import take_products
+from tachometry.hdl.arithmetic.products import Product, take_products
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.arithmetic.sine_cosine import SineCosine
 from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import by_name
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.extras.electrical import REFUSED, REFUSED_BITS, ElectricalAngle
+from tachometry.spec.core.extras.electrical import LEADS, REFUSED, REFUSED_BITS, ElectricalAngle
 from tachometry.spec.formats.angles import LEAD_BITS, SHOWN_BITS, SLOPE_BITS, Angles, Factor
 from tachometry.spec.formats.settling import PLACE_BITS
 from tachometry.spec.formats.sine import AHEAD_BITS
+from tachometry.spec.formats.velocity_output import VelocityOutput
 
 
 class Gates(wiring.Component):
@@ -28,6 +29,7 @@ class Gates(wiring.Component):
     def __init__(
         self, extra: ElectricalAngle, angles: Angles, latency: int, inputs: dict[str, int], *, corrects: bool
     ) -> None:
+        led = (angles.led.width, inputs["native_position_fine"]) if angles.led else ()
         self._angles, self._latency, self._corrects, self._offset = angles, latency, corrects, extra.offset
         super().__init__(
             {
@@ -37,10 +39,11 @@ class Gates(wiring.Component):
                 "position": In(PLACE_BITS),
                 "angle_value": In(SHOWN_BITS),
                 "angle_offset": In(SHOWN_BITS, init=extra.offset),
-                "angle_lead": In(LEAD_BITS, init=extra.lead),
+                "angle_lead": In(LEAD_BITS, init=extra.ahead),
                 "angle": Out(SHOWN_BITS),
                 "angle_valid": Out(1),
                 **({REFUSED: Out(REFUSED_BITS)} if corrects else {}),
+                **{name: Out(signed(width)) for name, width in zip(LEADS, led, strict=False)},
                 **(dict.fromkeys(("angle_sin", "angle_cos"), Out(signed(SHOWN_BITS))) if extra.sincos else {}),
             }
         )
@@ -170,12 +173,14 @@ class Gates(wiring.Component):
         slope = Signal(signed(bits))
         now = Signal(signed(bits))
         bent = curve << factor_bits - SLOPE_BITS
+        led = Signal()
         products = (
             (_term(fine, between), fine.number, at, target),  # before the next tick
             (bend, acceleration.number, C(0), curve),
             (_term(velocity, self.native_velocity), velocity.number, C(0), slope),
             (bent, s + (half - angles.late), slope, now),
             (bent, (s >> 1) - angles.late, slope, slope),
+            *(self._lead(m, s, angles.led, led) if angles.led else ()),
             (slope, s, target, target),
         )
         done, start = take_products(m, self.native_valid, products, factor_bits, bits, block=angles.block)
@@ -190,7 +195,33 @@ class Gates(wiring.Component):
             m.d.sync += s.eq(self.angle_lead + angles.span)
         with m.If(done):
             m.d.sync += grows.eq(now)
+        if angles.led:
+            m.d.sync += led.eq(done)
         return begun, (phase + debt)[:bits], grows
+
+    def _lead(self, m: Module, s: Value, led: VelocityOutput, ready: Value) -> tuple[Product, ...]:
+        """Return products of velocity and position at a time, which are shown when they are ready."""
+        angles, velocity, fine = self._angles, self.native_velocity, self.native_position_fine
+        bits, (of_curve, of_way, of_shown) = angles.factor_bits, angles.lead_factors
+        bend = _term(of_curve, self.native_acceleration)
+        curve = Signal(signed(len(bend)))
+        bent = curve << bits - SLOPE_BITS
+        mean = Signal(signed(max(len(bent), len(velocity)) + 1))
+        end = Signal.like(mean)
+        way = Signal(signed(len(_term(of_way, mean))))
+        place = Signal.like(fine)
+        shown = Signal(signed(len(_term(of_shown, end))))
+        most, _ = saturate(m, shown, led.limit)
+        with m.If(ready):
+            m.d.sync += [self.velocity_lead.eq(most), self.position_lead.eq(place)]
+        return (
+            (bend, of_curve.number, C(0), curve),
+            (bent, (s >> 1) - angles.late, velocity, mean),
+            (bent, s - angles.late, velocity, end),
+            (_term(of_way, mean), of_way.number, C(0), way),
+            (way << bits - SLOPE_BITS, s, fine, place),
+            (_term(of_shown, end), of_shown.number, C(0), shown),
+        )
 
     def _counted(self, m: Module, step: Value, counted: Value, moves: Value, known: Value) -> tuple[Value, Signal]:
         """Return a phase and its slope: it is at an edge after a count, and grows to the next edge at most.

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from tachometry.spec.formats.velocity_output import VelocityOutput
+
 SHOWN_BITS = 16  # of the angle: 2^16 is an electrical turn
 SLOPE_BITS = 16  # bits of an acceleration below those of an angle
 LEAD_BITS = 16  # of a lead, in clocks
@@ -61,6 +63,7 @@ class Angles:
     slope: Fraction  # in counts per clock²
     cycle: tuple[int, ...] = ()  # levels of halls, in the order of the counts
     block: bool = False  # whether a multiplier of the FPGA computes products
+    led: VelocityOutput | None = None  # of `velocity_lead`; None: there is none
 
     @property
     def bits(self) -> int:
@@ -86,7 +89,7 @@ class Angles:
     @property
     def clocks(self) -> int:
         """Clocks from an update to the first one of its phase."""
-        return (6 if self.tracks else 2) * self.product + 1
+        return ((12 if self.led else 6) if self.tracks else 2) * self.product + 1
 
     @property
     def product(self) -> int:
@@ -104,6 +107,14 @@ class Angles:
         lsb = (Fraction(1, self.tick << self.velocity_bits), Fraction(1, 1 << self.position_fine_bits), self.slope)
         per_count = Fraction(self.pole_pairs << self.bits, self.counts)
         values = (lsb[0] * per_count, lsb[1] * per_count, (lsb[2] or 1) * per_count * (1 << SLOPE_BITS))
+        return tuple(Factor.of(value, self.factor_bits) for value in values)
+
+    @property
+    def lead_factors(self) -> tuple[Factor, ...]:
+        """LSBs: of an acceleration in those of a velocity, that in those of a fine position, per clock, and `led`."""
+        per_tick, fine = self.tick << self.velocity_bits, 1 << self.position_fine_bits
+        shown = self.led.ratio if self.led else self.slope
+        values = (self.slope * per_tick * (1 << SLOPE_BITS), Fraction(fine << SLOPE_BITS, per_tick), shown)
         return tuple(Factor.of(value, self.factor_bits) for value in values)
 
     @property

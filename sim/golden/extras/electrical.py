@@ -10,7 +10,7 @@ from tachometry.sim.golden.extras import View
 from tachometry.sim.golden.sorted_lookup import Ints
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.extras.electrical import REFUSED, REFUSED_BITS, ElectricalAngle
+from tachometry.spec.core.extras.electrical import LEADS, REFUSED, REFUSED_BITS, ElectricalAngle
 from tachometry.spec.formats.angles import SHOWN_BITS, SLOPE_BITS, Angles, Factor, wrapped
 from tachometry.spec.formats.settling import PLACE_BITS
 from tachometry.spec.formats.sine import AHEAD_BITS, GUARD_BITS, START, STEPS, TURNS, WIDTH
@@ -29,6 +29,8 @@ def tables(extra: ElectricalAngle, view: View) -> dict[str, Table]:
     offset = _latest([(0, extra.offset), *offsets], "offset")
     phases = (_tracked if view.spec.carrying else _counted)(extra, view, counts)
     found = {"angle_phase": phases, "angle_offset": offset, REFUSED: Table(np.array(refused, np.int64), {})}
+    if extra.angles(view.spec).led:
+        found["angle_leads"] = _led(extra, view)
     known = np.maximum(counts.clock[1:2] + 1, phases.clock[:1]) if states else None
     return found | _sets(view, known)
 
@@ -44,6 +46,7 @@ def shown(
     if extra.corrects(spec):
         refused = np.searchsorted(found[REFUSED].clock, clock, side="right")
         columns[REFUSED] = np.minimum(refused, (1 << REFUSED_BITS) - 1)
+    columns |= {name: found["angle_leads"].at(name, clock) for name in (LEADS if angles.led else ())}
     if extra.sincos:
         taken = (clock - 1) // STEPS * STEPS - STEPS
         phases = found["angle_phase"]
@@ -124,7 +127,7 @@ def _tracked(extra: ElectricalAngle, view: View, counts: Table) -> Table:
     updates, ticks, angles = view.tables["measured"], view.tables["tick"], extra.angles(view.spec)
     bits, late, (of_velocity, of_fine, of_acceleration) = angles.factor_bits, angles.late, angles.factors
     place = ticks["position"][np.searchsorted(ticks.clock, updates["cause"])] << angles.position_fine_bits
-    lead = view.trace.line_at("angle_lead", updates.clock, extra.lead)
+    lead = view.trace.line_at("angle_lead", updates.clock, extra.ahead)
     between = [
         wrapped(of, angles.position_fine_bits + PLACE_BITS) for of in (updates["position_fine"] - place).tolist()
     ]
@@ -140,6 +143,23 @@ def _tracked(extra: ElectricalAngle, view: View, counts: Table) -> Table:
     return _owing(angles, rows)
 
 
+def _led(extra: ElectricalAngle, view: View) -> Table:
+    """Return velocity and position of the instant at which each phase of method track begins, and the lead after it."""
+    updates, spec, angles = view.tables["measured"], view.spec, extra.angles(view.spec)
+    bits, (of_curve, of_way, of_shown) = angles.factor_bits, angles.lead_factors
+    ends = (view.trace.line_at("angle_lead", updates.clock, extra.ahead) + angles.span).tolist()
+    limit = angles.led.limit if angles.led else 0
+    names, found = ("velocity", "acceleration", "position_fine"), list[tuple[int, int]]()
+    for s, velocity, acceleration, fine in zip(ends, *(updates[name].tolist() for name in names), strict=True):
+        curve = of_curve.times(acceleration) << bits - SLOPE_BITS
+        mean, end = (velocity + Factor(t - angles.late, bits, 0).times(curve) for t in (s >> 1, s))
+        way = Factor(s, bits, 0).times(of_way.times(mean) << bits - SLOPE_BITS)
+        width = spec.position_width + angles.position_fine_bits
+        found.append((max(-limit, min(limit, of_shown.times(end))), wrapped(fine + way, width)))
+    columns = np.array(found, np.int64).reshape(-1, 2).T
+    return Table(updates.clock + angles.clocks + 1, dict(zip(LEADS, columns, strict=True)))
+
+
 def _counted(extra: ElectricalAngle, view: View, counts: Table) -> Table:
     """Return the phases of counts, updates and zeros; one is there a clock after what it follows from."""
     updates, angles = view.tables["measured"], extra.angles(view.spec)
@@ -148,7 +168,7 @@ def _counted(extra: ElectricalAngle, view: View, counts: Table) -> Table:
     updates = updates.rows(np.diff(updates.clock, append=_NEVER) >= angles.clocks - 1)
     velocity, *_ = angles.factors
     slopes = [velocity.times(one) for one in updates["velocity"].tolist()]
-    leads = (view.trace.line_at("angle_lead", updates.clock, extra.lead) + angles.span).tolist()
+    leads = (view.trace.line_at("angle_lead", updates.clock, extra.ahead) + angles.span).tolist()
     ahead = [0, *(wrapped(slope * lead, angles.bits) for slope, lead in zip(slopes, leads, strict=True))]
     slopes = [0, *(max(-half, min(half, wrapped(slope, angles.bits))) for slope in slopes)]
     ends = updates.clock + angles.clocks

@@ -28,17 +28,17 @@ def expected(extra: ElectricalAngle, spec: TachometerSpec, rad_per_s: float) -> 
     if spec.external_tick or spec.encoder.pulses_per_rev > MAX_UNEVEN_PULSES:
         return None
     tick_s, counts = spec.timing.tick_cycles / spec.timing.clock_hz, rad_per_s / spec.scale.unit_velocity
-    seen = min(max(_SEEN, math.ceil(_SEEN / counts)), _MOST) + extra.lead // spec.timing.tick_cycles
+    seen = min(max(_SEEN, math.ceil(_SEEN / counts)), _MOST) + extra.ahead // spec.timing.tick_cycles
     moved = parse_motion(f"constant:{rad_per_s!r}rad/s:{(_SETTLES + seen) * tick_s!r}s")
     encoder = VirtualEncoder.of_core(spec, **(REAL_DISC if spec.encoder.sensor == "quadrature" else {}))
     ticks = golden.run(spec, encoder.record(moved).recording.place(spec.timing.clock_hz).completed(spec)).ticks
-    begin, end = _SETTLES * spec.timing.tick_cycles, (_SETTLES + seen) * spec.timing.tick_cycles - extra.lead
+    begin, end = _SETTLES * spec.timing.tick_cycles, (_SETTLES + seen) * spec.timing.tick_cycles - extra.ahead
     ticks = ticks.rows((ticks.clock > begin) & (ticks.clock < end))
-    true = extra.pole_pairs * np.degrees(moved.angle((ticks.clock + extra.lead) / spec.timing.clock_hz))
+    true = extra.pole_pairs * np.degrees(moved.angle((ticks.clock + extra.ahead) / spec.timing.clock_hz))
     error = np.exp(1j * np.radians(ticks.angle * 360 / 2**SHOWN_BITS - true))
     away = np.degrees(np.angle(error / np.mean(error)))
     rms, worst = np.sqrt(np.mean(away**2)), np.abs(away).max()
-    lead = f"{extra.lead / spec.timing.tick_cycles:.4g} ticks ahead"
+    lead = f"{extra.ahead / spec.timing.tick_cycles:.4g} ticks ahead"
     return "angle error", f"{rms:.2g} degrees electrical RMS, at most {worst:.2g}, {lead} at a constant {{speed}}"
 
 
@@ -56,7 +56,7 @@ def judged(
     model has its latest count, interpolated as in ODrive, and is carried on with its velocity to the instant of use.
     """
     turns_per_count = extra.pole_pairs / float(steps.counts_per_rev)
-    lead_s = extra.lead / spec.timing.clock_hz
+    lead_s = extra.ahead / spec.timing.clock_hz
 
     def true(time: FloatArray) -> FloatArray:
         return extra.pole_pairs * true_angle(time) / math.tau

@@ -11,9 +11,10 @@ from tachometry.spec.core.numbers import Numbers
 from tachometry.spec.core.sensors import packed_levels
 from tachometry.spec.formats.angles import LEAD_BITS, SHOWN_BITS, Angles
 from tachometry.spec.formats.sine import ONE, STEPS
+from tachometry.spec.formats.velocity_output import VelocityOutput
 from tachometry.spec.language.field import Draft, Field
 from tachometry.spec.language.option import REQUIRED, ParameterError, option, parse_whole
-from tachometry.spec.language.port import TICK, Port, held, pin
+from tachometry.spec.language.port import FINE, TICK, Port, held, pin
 from tachometry.spec.language.units import DEGREES, TIME, Unit, read_quantity
 
 REFUSED = "angle_refused"
@@ -22,8 +23,10 @@ _UNIT = f"2^-{SHOWN_BITS} electrical turns"
 _POLE_PAIRS = """Electrical angle of a motor with P pole pairs, 1 to 512. Outputs angle, in 2^-16 electrical turns and \
 new in every clock, and angle_valid. It is 0 at the index, at the rise of A of halls, or what angle_set sets it to."""
 _OFFSET = "Electrical angle that is added, as 12.3deg. Or a number of 2^-16 turns. ANGLE_OFFSET begins with it."
-_LEAD = """Time from the angle at the port to its use, as 1.5tick. Or 75us, or 300clk; below 65536 clocks. The angle \
-is that of the motor so much later. Register ANGLE_LEAD begins with it."""
+_USE = """Time from the angle at the port to its use, as 1.5tick. Or 75us, or 300clk; below 65536 clocks. The angle \
+is that of the motor so much later. Register ANGLE_LEAD begins with it. With track it also outputs velocity_lead and \
+position_lead, of that instant."""
+LEADS = ("velocity_lead", "position_lead")
 _SINCOS = """Outputs angle_sin and angle_cos, from -32767 to 32767. CORDIC computes new ones every 16 clocks, for the \
 instant that --lead gives."""
 
@@ -54,11 +57,15 @@ class ElectricalAngle(Extra):
     offset: int = option(
         0, _OFFSET, name="electrical-offset", metavar="ANGLE", parse=parse_offset, tests=("", "30deg"), tacit=True
     )
-    lead: int = option(
-        0, _LEAD, metavar="TIME", parse_at=parse_lead, limits=(0, 65535), tests=("", "1.5tick"), tacit=True
+    lead: int | None = option(
+        None, _USE, shown="0", metavar="TIME", parse_at=parse_lead, limits=(0, 65535), tests=("", "1.5tick"), tacit=True
     )
-
     sincos: bool = option(False, _SINCOS, tests=("", "yes"), tacit=True)
+
+    @property
+    def ahead(self) -> int:
+        """The lead in clocks."""
+        return self.lead or 0
 
     @classmethod
     def respelled(cls, texts: Mapping[str, str]) -> Mapping[str, str]:
@@ -75,7 +82,10 @@ class ElectricalAngle(Extra):
         states = spec.encoder.kind.cycle[:: -1 if spec.encoder.reverse else 1] if spec.encoder.sensor == "hall" else ()
         halls = tuple(map(packed_levels, states))
         block, late = carrying is not None and carrying.block, late + of_track[0]
-        return Angles(counts, self.pole_pairs, tick, spec.tick.longest, bits, late, *of_track, halls, block)
+        speed, led = spec.velocity, None
+        if carrying and self.lead is not None:
+            led = speed.output or VelocityOutput(Fraction(1), speed.max << speed.native_frac_bits, speed.width)
+        return Angles(counts, self.pole_pairs, tick, spec.tick.longest, bits, late, *of_track, halls, block, led)
 
     def least_fine_bits(self, spec: Numbers) -> int:
         return ((self.pole_pairs << SHOWN_BITS) // spec.encoder.counts_per_rev).bit_length()
@@ -119,6 +129,12 @@ class ElectricalAngle(Extra):
         if self.corrects(spec):
             text = "Refused indices: the angle was off by more than 1/16 turn. It also changes between ticks, to 65535."
             yield held(TICK, REFUSED, REFUSED_BITS, unit="indices", help=text)
+        if led := self.angles(spec).led:
+            when = "ANGLE_LEAD clocks after the one in which it is new: once a tick, tick_to_lead clocks after that."
+            place = next(one for one in spec.method_ports if one.name == FINE)
+            unit = f"2^{-spec.velocity.frac_bits} {spec.unit}"
+            yield held(TICK, LEADS[0], led.width, signed=True, unit=unit, help=f"Velocity {when}")
+            yield held(TICK, LEADS[1], place.width, signed=True, unit=place.unit, help=f"Position {when}")
         for name, function in {"angle_sin": "Sine", "angle_cos": "Cosine"}.items() if self.sincos else ():
             text = f"{function} of the angle. It also changes between ticks, every {STEPS} clocks."
             yield held(TICK, name, SHOWN_BITS, signed=True, unit=f"1/{ONE}", help=text)
@@ -126,12 +142,16 @@ class ElectricalAngle(Extra):
     def registers(self, spec: Numbers) -> Iterable[Draft]:
         offset = Field("offset", SHOWN_BITS, unit=_UNIT, writable=True, reset=self.offset, port="angle_offset")
         yield "ANGLE_OFFSET", "Electrical angle that is added, from the next update on.", (offset,), {}
-        lead = Field("lead", LEAD_BITS, unit="clocks", writable=True, reset=self.lead, port="angle_lead")
+        lead = Field("lead", LEAD_BITS, unit="clocks", writable=True, reset=self.ahead, port="angle_lead")
         yield "ANGLE_LEAD", "Time from the angle at the port to its use, from the next update on.", (lead,), {}
         value = Field("value", SHOWN_BITS, help="The angle.", unit=_UNIT, writable=True, port="angle_value")
         text = "1: the angle is this now."
         sets = Field("set", 1, low=SHOWN_BITS, help=text, writable=True, single=True, port="angle_set")
         yield "ANGLE_SET", "Sets the angle, and makes it valid.", (value, sets), {}
+
+    def latency(self, spec: Numbers) -> Mapping[str, int]:
+        angles = self.angles(spec)
+        return {"tick_to_lead": angles.tracks + angles.clocks + 1} if angles.led else {}
 
     def row(self, spec: Numbers, run: Any) -> tuple[str, str]:
         return "angle", f"{[0, *run.ticks.angle][-1] * 360 / 2**SHOWN_BITS:.1f}° electrical at the end"
