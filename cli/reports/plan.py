@@ -26,7 +26,7 @@ def print_plan(core: CoreSpec, plans: Plans, unit: str, bus: Bus | None, size: E
     per_unit = SpeedUnit(unit).rad_per_s
     heads = (f"speed ({unit})", "counts/tick", "m_s (ticks)", "T_m", f"Q_V ({unit})", "error/V (%)", "update by")
     rows = []
-    columns = zip(*(column.tolist() for column in vars(expected).values()), strict=True)
+    columns = zip(*(column.tolist() for column in vars(expected).values() if not isinstance(column, str)), strict=True)
     for speed, counts, m_s, t_m, q_v, forced, _ in columns:
         cells = (
             f"{speed / per_unit:.6g}",
