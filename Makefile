@@ -125,6 +125,7 @@ studies: $(VENV)/.test ## control loops, tracking, encoders, changes of flip-flo
 	$(BIN)/python bench/evidence.py
 	$(BIN)/python bench/tracking.py
 	$(BIN)/python bench/control.py
+	$(BIN)/python bench/disc.py
 
 size: $(VENV)/.size ## cells, Fmax and latency on ECP5 and iCE40, written to docs/measured/size.md
 	$(BIN)/python bench/size.py

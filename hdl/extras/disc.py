@@ -8,11 +8,13 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.extras.sectors import SectorTable
 from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import only_if
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.disc import SLIPS_BITS, DiscMap
 from tachometry.spec.formats.displacement import DISPLACED, ENTRY_BITS, Displacement
+from tachometry.spec.formats.sectors import Sectors
 
 
 class Gates(wiring.Component):
@@ -22,16 +24,17 @@ class Gates(wiring.Component):
     that of the step before, a clock earlier. An index or a turn moves the place in a clock without a step; an index
     that comes with a step is left out.
 
-    - `entries`: The table after configuration, of each edge.
+    - `table`: The table after configuration: of the edges, or of sectors.
     - `looks`: Without a step, `displaced` is that of the next edge in the direction of the last step.
     - `place`: Where the index comes; None: there is none, and turns move the place.
     """
 
     def __init__(
-        self, entries: Sequence[int], place: int | None, form: Displacement, *, writable: bool, looks: bool
+        self, table: Sequence[int] | Sectors, place: int | None, form: Displacement, *, writable: bool, looks: bool
     ) -> None:
-        self._edges, self._entries, self._place, self._shift = len(entries), entries, place, form.shift
-        self._writable, self._looks, edge = writable, looks, range(len(entries))
+        edges = table.edges if isinstance(table, Sectors) else len(table)
+        self._edges, self._table, self._place, self._shift = edges, table, place, form.shift
+        self._writable, self._looks, edge = writable, looks, range(edges)
         indexed = place is not None
         super().__init__(
             {
@@ -49,7 +52,8 @@ class Gates(wiring.Component):
     @classmethod
     def of(cls, extra: DiscMap, spec: TachometerSpec) -> Self:
         """Return the gates of this core."""
-        table, place, form = extra.entries(spec), extra.index_place(spec), extra.displacement(spec)
+        table = extra.sectors(spec) or extra.entries(spec)
+        place, form = extra.index_place(spec), extra.displacement(spec)
         return cls(table, place, form, writable=extra.writable, looks=spec.facts.update_by == "tick")
 
     def elaborate(self, platform: object) -> Module:
@@ -58,8 +62,7 @@ class Gates(wiring.Component):
         writes = Signal()
         if self._writable:
             m.d.sync += writes.eq(self.disc_write)
-        edge = self._follow(m, step, self.disc_forget | writes)
-        entry = self._read(m, edge, writes)
+        entry = self._follow(m, step, self.disc_forget | writes, writes)
         (counted,) = delay(m, step[0])
         (shows,) = delay(m, counted)
         latest = Signal.like(self.displaced)
@@ -69,10 +72,10 @@ class Gates(wiring.Component):
         m.d.comb += self.displaced_before.eq(Mux(shows, self.displaced, latest))
         return m
 
-    def _read(self, m: Module, edge: Value, writes: Value) -> Value:
+    def _read(self, m: Module, edge: Value, writes: Value, entries: Sequence[int]) -> Value:
         """Return the entry of the edge of the clock before; what is read while it is written is not used."""
         shape, depth = signed(ENTRY_BITS), 1 << (self._edges - 1).bit_length()
-        memory = Memory(shape=shape, depth=depth, init=self._entries, attrs={"no_rw_check": 1})
+        memory = Memory(shape=shape, depth=depth, init=entries, attrs={"no_rw_check": 1})
         m.submodules.table = memory
         read = memory.read_port()
         m.d.comb += read.addr.eq(edge)
@@ -87,14 +90,15 @@ class Gates(wiring.Component):
             ]
         return read.data
 
-    def _follow(self, m: Module, step: Signal, forgets: Value) -> Value:
-        """Follow the place and the trust in it; return the edge that a step passes."""
+    def _follow(self, m: Module, step: Signal, forgets: Value, writes: Value) -> Value:
+        """Follow the place and the trust in it; return the entry of the edge that a step has passed a clock before."""
         edges = self._edges
         place = Signal(range(edges))
         trust = Signal(2)
         moved = Signal.like(place)  # by the step of this clock
         back = Signal()
         was = Signal()
+        seen = Signal()  # an index
         m.d.comb += back.eq(Mux(step[0], step[1], was))
         m.d.sync += was.eq(back)
         ends = place == Mux(back, 0, edges - 1)
@@ -106,7 +110,8 @@ class Gates(wiring.Component):
         if self._place is None:
             self._turn(m, step, place, trust)
         else:
-            known, agrees, seen = trust.any(), place == self._place, self.index_seen & ~step[0]
+            known, agrees = trust.any(), place == self._place
+            m.d.comb += seen.eq(self.index_seen & ~step[0])
             m.d.sync += self.disc_slip.eq(seen & known & ~agrees)
             m.d.sync += self.disc_slips.eq(self.disc_slips + (self.disc_slip & ~self.disc_slips.all()))
             with m.If(self.clear):
@@ -116,7 +121,13 @@ class Gates(wiring.Component):
                 m.d.sync += trust[1].eq(known & (agrees | unsure))
         with m.If(forgets):
             m.d.sync += trust.eq(0)
-        return Mux(back, place, moved)
+        if not isinstance(self._table, Sectors):
+            return self._read(m, Mux(back, place, moved), writes, self._table)
+        assert self._place is not None
+        m.submodules.table = table = SectorTable(self._table, self._place)
+        m.d.comb += [table.place.eq(place), table.back.eq(back), table.ends.eq(ends), table.counted.eq(step[0])]
+        m.d.comb += table.seen.eq(seen)
+        return table.entry
 
     def _turn(self, m: Module, step: Signal, place: Signal, trust: Signal) -> None:
         """Move the place by `disc_turn_by`, in the first clock without a step."""

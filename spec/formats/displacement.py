@@ -7,7 +7,7 @@ from fractions import Fraction
 # What gates give to a datapath: the displacement of the edge of a count, and that of the count before.
 DISPLACED = ("displaced", "displaced_before")
 ENTRY_BITS = 8  # of an entry of a table, signed
-FINEST = Fraction(1, 256)  # counts: no unit is smaller
+FINEST = Fraction(1, 256)  # counts: no unit of a table of edges is smaller
 
 
 @dataclass(frozen=True)
@@ -16,11 +16,13 @@ class Displacement:
 
     per_count: int  # LSBs of the distance or place that displacements are added to, in a count
     shift: int = 0
+    finest: Fraction = FINEST  # counts: the unit is at least this
+    entry_bits: int = ENTRY_BITS  # of an entry, signed
 
     @property
     def low(self) -> int:
-        """Bits of that distance or place below the unit, which is at least `FINEST`."""
-        return max(0, math.ceil(math.log2(self.per_count * FINEST)))
+        """Bits of that distance or place below the unit."""
+        return max(0, math.ceil(math.log2(self.per_count * self.finest)))
 
     @property
     def unit(self) -> Fraction:
@@ -30,7 +32,7 @@ class Displacement:
     @property
     def width(self) -> int:
         """Bits of a displacement in the unit, signed."""
-        return ENTRY_BITS + self.shift
+        return self.entry_bits + self.shift
 
     @property
     def most(self) -> int:

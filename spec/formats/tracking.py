@@ -124,7 +124,7 @@ class Tracking:
     def placed_bits(self) -> int:
         """Bits of the sum of twice the places, with displacements and as fine as these; signed."""
         off = self.displacement
-        return self.places_bits if off is None else self.places_bits + self.fine_bits + off.shift + 1
+        return self.places_bits if off is None else self.places_bits + max(self.fine_bits, off.width - 1) + 1
 
     @cached_property
     def moved_bits(self) -> int:

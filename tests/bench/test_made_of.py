@@ -25,7 +25,9 @@ LIKE_OTHERS = re.compile(
 PAGES = ("compare", "encoder", "evidence", "figures", "size", "sweep")
 RECOMPUTED = {f"tables/{name}.csv" for name in ("imperfections", "papers", "single")} | {f"{name}.md" for name in PAGES}
 # Speeds, routings, proofs and samples of wrong cores.
-TABLES = "engines estimate golden mutation proofs upsets verify verify-every-clock verilog-cells verilog-clocks whole"
+TABLES = (
+    "disc engines estimate golden mutation proofs upsets verify verify-every-clock verilog-cells verilog-clocks whole"
+)
 RUNS = {f"{page}.md" for page in ("angle", "control", "estimate", "health", "verilog")}
 RUNS |= {f"tables/{name}.csv" for name in TABLES.split()}
 OTHERS = {f"docs/measured/{name}" for name in RECOMPUTED | RUNS}

@@ -15,6 +15,7 @@ from proofs.formal.mutants import mutant
 from support.nightly import nightly
 
 from tachometry.hdl.extras import disc as gates
+from tachometry.hdl.extras import sectors
 from tachometry.hdl.methods import count_way, tick_counts, track
 from tachometry.sim import build, golden
 from tachometry.sim.encoder.motion import parse_motion
@@ -25,7 +26,9 @@ from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import ParameterError, of_texts
 from tachometry.spec.core.disc import Disc
+from tachometry.spec.core.extras import disc as of_disc
 from tachometry.spec.core.extras.disc import DiscMap
+from tachometry.spec.formats.sectors import Sectors, sectors_of
 from tachometry.spec.registers.manifest import manifest
 
 EDGES = 100
@@ -34,10 +37,12 @@ FAR = tuple(np.clip(np.random.default_rng(7).normal(0, 0.15, EDGES), -0.4, 0.4).
 
 @pytest.fixture(autouse=True)
 def _files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let far.json be a map whose index is at place 2, and other.json one without an index."""
+    """Let far.json be a map whose index is at place 2, other.json one without an index, and slow.json off centre."""
     monkeypatch.chdir(tmp_path)
     far = Disc(EDGES, FAR, 4, 2, 0.01, 0.05, (60.0, 150.0), 40.0, False)
-    for name, one in {"far": far, "other": replace(far, index_place=None)}.items():
+    slow = replace(far, displacement=tuple(np.cos(np.arange(EDGES) * 2 * np.pi / EDGES) + 0.2 * np.array(FAR)))
+    steep = replace(far, displacement=tuple(3 * np.sin(np.arange(EDGES) * 2 * np.pi / EDGES)))
+    for name, one in {"far": far, "other": replace(far, index_place=None), "slow": slow, "steep": steep}.items():
         Path(f"{name}.json").write_text(one.text)
 
 
@@ -63,10 +68,26 @@ CASES = (
     Mapped(
         "t", "disc=far.json index=yes index-reset=yes tick=300clk max-time=3000clk unit=rpm", edges=120, clocks=400_000
     ),
+    Mapped("mt", "disc=slow.json disc-table=sectors:9 index=yes", edges=100),
 )
 TRACKED = (
     Mapped("track", "disc=far.json index=yes tick=300clk multiplier=block max-time=3000clk", edges=70, clocks=200_000),
     Mapped("track", "disc=other.json disc-table=edges tick=1000clk smooth=yes max-time=5000clk", edges=60),
+    Mapped("track", "disc=slow.json disc-table=sectors index=yes tick=300clk max-time=3000clk", 60, 120_000),
+)
+# Beside what shows a place of the shaft.
+_FINE = "disc=far.json index=yes tick=300clk max-time=3000clk"
+BESIDE = (
+    Mapped("track", f"{_FINE} electrical=3 lead=1tick probe=2 stream=axi", edges=60, clocks=120_000),
+    Mapped("track", f"{_FINE} position-compare=1.5:0.25:200:1clk:fine smooth=yes", edges=60, clocks=120_000, late=True),
+    Mapped(
+        "mt",
+        "disc=far.json index=yes tick=99clk max-time=990clk electrical=3 probe=1",
+        edges=99,
+        clocks=90_000,
+        late=True,
+    ),
+    Mapped("t", "disc=slow.json disc-table=sectors index=yes position-compare=3:5:20:9clk", edges=100, late=True),
 )
 BUS = (
     Case("mt", "disc=far.json index=yes position-modulo=rev/4", swings=True),
@@ -81,7 +102,7 @@ def rule(case: Case) -> None:
     assert not any(used[[bypass[clock] == 1 for clock in case.run().ticks.clock]])
 
 
-test_cores = agreeing(CASES + TRACKED, rule)
+test_cores = agreeing(CASES + TRACKED + BESIDE, rule)
 test_first_bus, test_second_bus = map(on_a_bus, BUS)
 test_refusals = refused(
     {
@@ -100,6 +121,19 @@ test_refusals = refused(
         ("mt", "disc=other.json index=yes", "must have the index at 2, as --index-at, not None"),
         ("mt", "disc=far.json index=yes index-at=A=0,B=1", "must have the index at 3, as --index-at, not 2"),
         ("mt", "disc-table=edges ppr=4097", "disc_table must be of at most 16384 counts per turn, not 16388"),
+        ("mt", "disc-table=sectors:3", "disc_table must be of 4 to 256 sectors, not 3"),
+        ("mt", "disc-table=edge", "disc_table must be none, edges or sectors:N, as sectors:32, not edge"),
+        ("mt", "disc-table=sectors", "disc_table must be edges without --disc: no program writes sectors"),
+        (
+            "t",
+            "disc=other.json disc-table=sectors",
+            "disc_table must be edges without an index in a state of the lines",
+        ),
+        (
+            "mt",
+            "disc=steep.json disc-table=sectors:4 index=yes",
+            "must have more sectors than 4 of 32 edges, which would",
+        ),
         ("mt", "disc=far.json bounds=yes", "disc does not work with --bounds"),
         ("mt", "disc=far.json timer=tick", "timer must be clock with --disc"),
         ("t", "disc-table=edges teeth=60-2 sensor=pulses ppr=60 decoding=1", "does not work with --teeth"),
@@ -124,6 +158,45 @@ def turning(spec: Any, places: Any, apart: int = 23, **levels: Any) -> PinTrace:
         "z": (np.asarray(places) % EDGES == 2).astype(np.uint8),
     }
     return PinTrace.of_lines(clock, int(clock[-1]) + 200, lines | levels).completed(spec)
+
+
+@pytest.mark.parametrize(
+    ("text", "wrong"),
+    [
+        ("", ""),
+        ("[sector]", "[self.place >> table.bits]"),
+        *(pytest.param(*one, marks=nightly) for one in (
+            ("half + values[-1]", "half"),
+            ("half + values[self._index]", "half"),
+            ("ends & ~back", "0"),
+            ("Mux(back, value, moved)", "moved"),
+            ("self.place + ~self.back", "self.place"),
+        )),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("method", ["mt", pytest.param("track", marks=nightly)])
+def test_sectors_follow_a_shaft_both_ways(method: str, text: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Over edge 0 and the borders of sectors, on lines that do not close."""
+    slopes = np.random.default_rng(5).integers(-99, 99, 7)
+    lines = Sectors(EDGES, 4, 6, tuple(slopes.tolist()), (9, -7, 5, -8))
+    monkeypatch.setattr(of_disc, "sectors_of", lambda *_: lines)
+    words = "max-time=3000clk tick=300clk" if method == "track" else ""
+    spec = Case(method, f"disc=slow.json disc-table=sectors index=yes {words}").spec
+    ends = [0, 230, 90, 105, 94, 106, -130, 17, -20]
+    places = np.concatenate([np.arange(one, other, 1 if other > one else -1) for one, other in pairwise(ends)])
+    with mutant(sectors.SectorTable, text, wrong) if text else nullcontext():
+        assert bool(lockstep(spec, turning(spec, places), Cxxrtl()).n_mismatches) == bool(text)
+
+
+def test_sectors_are_the_nearest_line() -> None:
+    """Of a disc that is off centre nothing is left, of white errors most."""
+    angle, noise = np.arange(2000) * np.pi / 1000, np.random.default_rng(3).normal(0, 0.1, 2000)
+    for far, left in ((np.sin(angle), 0.003), (np.sin(angle) + np.tile((0.1, 0, 0.1, 0), 500), 0.003), (noise, 0.1)):
+        lines = sectors_of(tuple(far.tolist()), 32, 1 / 960, True)
+        wrong = np.array(lines.values[:-1]) / 960 / 2**lines.fine + np.tile(lines.quarters, 500) / 960 - far
+        assert (len(lines.slopes), lines.bits) == (32, 6)
+        assert np.std(wrong) < left
+        assert np.abs(np.fft.rfft(wrong)[1:7]).max() * 2 / 2000 < 0.003
 
 
 def test_every_arrow_of_trust() -> None:
@@ -155,8 +228,8 @@ FAULTS = (
     (gates.Gates, "Mux(rest < 0, total, rest)", "total", 1),
     (gates.Gates, "self.disc_forget | writes", "self.disc_forget", 1),
     (gates.Gates, "Mux(back, place, moved)", "moved", 0),
-    (tick_counts.TickCounts, "Mux(takes, self.displaced, 0)", "0", 4),
-    (track.TrackMethod, "counts.number > 1", "1", 4),
+    (tick_counts.TickCounts, "Mux(takes, self.displaced, 0)", "0", 5),
+    (track.TrackMethod, "counts.number > 1", "1", 5),
     (count_way.CountWay, "self.displaced_before << self._low", "self.displaced_before", 3),
 )
 

@@ -3,14 +3,15 @@
 import pytest
 from proofs.formal.mutants import mutant
 from proofs.upset import axes, loops, tracking
-from proofs.upset.campaign import OUTPUTS, UPSET, upsets
+from proofs.upset.campaign import MAPPED, OUTPUTS, UPSET, upsets
 from support.nightly import nightly
 
 from tachometry.hdl.control.control_clock import ControlClock
+from tachometry.hdl.extras import disc
 
 
 @nightly
-@pytest.mark.parametrize("name", [*UPSET, OUTPUTS])
+@pytest.mark.parametrize("name", [*UPSET, OUTPUTS, *MAPPED])
 def test_outputs_are_right_again_in_time(name: str) -> None:
     """Every bit once."""
     campaign = upsets(name, 1000)
@@ -18,6 +19,12 @@ def test_outputs_are_right_again_in_time(name: str) -> None:
     assert len(campaign.bits) < 1000
     assert (campaign.clocks == 0).any()
     assert campaign.clocks.max() > campaign.spec.timing.tick_cycles
+
+
+@nightly
+def test_a_place_in_the_turn_that_stays_wrong_is_noticed() -> None:
+    with mutant(disc.Gates, "place.eq(self._place), ", ""):
+        assert not upsets("mt, map", 350).fine
 
 
 @nightly

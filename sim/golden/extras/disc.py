@@ -15,6 +15,7 @@ from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.disc import DOUBTFUL, SEEN, SLIPS_BITS, SURE, UNKNOWN, DiscMap
 from tachometry.spec.formats.displacement import ENTRY_BITS
+from tachometry.spec.formats.sectors import Sectors
 
 
 def displaced(extra: DiscMap, view: View) -> Steps:
@@ -82,8 +83,9 @@ def _writes(extra: DiscMap, trace: PinTrace) -> Table:
 
 def _contents(extra: DiscMap, spec: TachometerSpec, writes: Table, edge: Ints, clock: Ints) -> Ints:
     """Return the entry of each edge in a clock, which has all writes before it."""
-    table, value, done = np.zeros(1 << 14, np.int64), np.zeros(len(edge), np.int64), 0
-    table[: spec.encoder.encoder_counts] = extra.entries(spec)
+    counts, value, done = spec.encoder.encoder_counts, np.zeros(len(edge), np.int64), 0
+    table = np.zeros(1 << (counts - 1).bit_length(), np.int64)
+    table[:counts] = extra.entries(spec) if (lines := extra.sectors(spec)) is None else _on_lines(lines)
     epoch = np.searchsorted(writes.clock, clock)
     for until in np.unique(epoch).tolist():
         for row in range(done, until):
@@ -91,6 +93,14 @@ def _contents(extra: DiscMap, spec: TachometerSpec, writes: Table, edge: Ints, c
         done, now = until, epoch == until
         value[now] = table[edge[now]]
     return value
+
+
+def _on_lines(lines: Sectors) -> Ints:
+    """Return the displacements of all edges from the slopes of the sectors."""
+    edge = np.arange(lines.edges)
+    value = np.cumsum(np.array(lines.slopes)[edge >> lines.bits])
+    rounded = np.append(0, value[:-1]) + (1 << lines.fine - 1) >> lines.fine
+    return rounded + np.array(lines.quarters or (0,))[edge % (len(lines.quarters) or 1)]
 
 
 def _turns(view: View, busy: Ints) -> list[tuple[int, int]]:

@@ -4,6 +4,7 @@ import hashlib
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from tachometry.spec.core.extras.extra import Event, Extra
 from tachometry.spec.core.front_end import FrontEnd, Pin
 from tachometry.spec.core.numbers import Numbers
 from tachometry.spec.formats.displacement import ENTRY_BITS, FINEST, Displacement
+from tachometry.spec.formats.sectors import Sectors, sectors_of
 from tachometry.spec.language.field import Draft, Field
 from tachometry.spec.language.files import read_text
 from tachometry.spec.language.option import ParameterError, option
@@ -20,13 +22,16 @@ from tachometry.spec.language.port import TICK, Port, held, pin, strobe
 from tachometry.spec.language.units import format_time
 
 MOST_EDGES = 1 << 14  # eight block RAMs of ECP5
-_TABLES = ("none", "edges")
+MOST_IN_SECTORS = 1 << 18
+_FINEST_OF_SECTORS = FINEST / 16
+_LEAST_SECTORS, _SECTORS, _MOST_SECTORS = 4, 32, 256
 SLIPS_BITS = 8  # of the number of slips, which stays at its end
 UNKNOWN, SEEN, DOUBTFUL, SURE = range(4)  # trust in the place; bit 0: the map is used
 _METHODS = ("t", "mt", "track")
 _DISC = """Map of the disc that tachometry calibrate has written. Each count is then placed where its edge lies. The \
 map is used from the first index on. Without --index, or with --index-at edge, DISC_TURN must say where it lies."""
-_TABLE = """Table of the map that a program may write. edges has 8 bits for each edge. It is empty without --disc."""
+_TABLE = """Table of the map. edges has 8 bits for each edge, which a program may write; it is empty without --disc. \
+sectors:N has a slope of 16 bits for each of up to N parts of a turn (32), and takes no block RAM."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,22 @@ def parse_disc(what: str, text: str) -> DiscFile:
         raise ParameterError(what, f"must be a file of tachometry calibrate: {text}: {error}") from error
 
 
+def _parse_table(what: str, text: str) -> str:
+    form, _, number = text.partition(":")
+    if form != "sectors" or (text != form and not (number.isascii() and number.isdigit() and len(number) < 4)):
+        if text in ("none", "edges"):
+            return text
+        raise ParameterError(what, f"must be none, edges or sectors:N, as sectors:{_SECTORS}, not {text}")
+    if not _LEAST_SECTORS <= int(number or _SECTORS) <= _MOST_SECTORS:
+        raise ParameterError(what, f"must be of {_LEAST_SECTORS} to {_MOST_SECTORS} sectors, not {number}")
+    return text
+
+
+def _format(spec: Numbers, finest: Fraction) -> Displacement:
+    per_count = spec.timing.tick_cycles if spec.facts.update_by == "count" else int(1 / finest)
+    return Displacement(per_count, finest=finest)
+
+
 def _fits(spec: Any) -> bool:
     return spec.method in _METHODS
 
@@ -62,22 +83,43 @@ class DiscMap(Extra):
         None, _DISC, name=name, metavar="FILE", shown="none", parse=parse_disc, fits=_fits, tests=(), tacit=True
     )
     table: str = option(
-        "none", _TABLE, name="disc-table", choices=_TABLES, fits=_fits, tests=("", "edges"), tacit=True, adds=True
-    )
+        "none", _TABLE, name="disc-table", metavar="FORM", parse=_parse_table, fits=_fits, tests=("", "edges"),
+        tacit=True, adds=True,
+    )  # fmt: skip
 
     @property
     def writable(self) -> bool:
         """Whether a program may write the table."""
-        return self.table != "none"
+        return self.table == "edges"
 
     def displacement(self, spec: Numbers) -> Displacement:
+        if table := self.sectors(spec):
+            return replace(_format(spec, _FINEST_OF_SECTORS), entry_bits=table.width)
         known = self.file.disc.displacement if self.file else ()
         worst = max(0.99 * self.writable, *map(abs, known), 0)  # counts; what a program writes may be about 1
-        form = Displacement(spec.timing.tick_cycles if spec.facts.update_by == "count" else int(1 / FINEST))
+        form = _format(spec, FINEST)
         return replace(form, shift=max(0, math.ceil(math.log2(max(worst, 1e-9) / 127 / form.unit))))
 
+    def sectors(self, spec: Numbers) -> Sectors | None:
+        """Return the table of sectors; None: it is one of edges. ParameterError if there can be none."""
+        form, _, number = self.table.partition(":")
+        if form != "sectors":
+            return None
+        try:
+            if self.file is None:
+                raise ValueError("must be edges without --disc: no program writes sectors")
+            if self.index_place(spec) is None:
+                raise ValueError("must be edges without an index in a state of the lines")
+            known, unit = self.file.disc.displacement, _format(spec, _FINEST_OF_SECTORS).unit
+            quarters = spec.facts.update_by == "count" and len(known) % 4 == 0  # `track` learns them
+            return sectors_of(known, int(number or _SECTORS), float(unit), quarters)
+        except ValueError as error:
+            raise ParameterError("disc_table", str(error)) from error
+
     def entries(self, spec: Numbers) -> tuple[int, ...]:
-        """Return the table after configuration, of each edge."""
+        """Return the table after configuration: the displacements of all edges, or the slopes of all sectors."""
+        if table := self.sectors(spec):
+            return table.slopes
         known = self.file.disc.displacement if self.file else (0.0,) * spec.encoder.encoder_counts
         return tuple(round(each / float(self.displacement(spec).unit)) for each in known)
 
@@ -95,8 +137,9 @@ class DiscMap(Extra):
     def check(self, spec: Numbers) -> None:
         encoder, place, disc = spec.encoder, self.index_place(spec), self.file and self.file.disc
         own = encoder.encoder_counts, encoder.decoding
+        most = MOST_IN_SECTORS if self.table.startswith("sectors") else MOST_EDGES
         refusals = {
-            f"must be of at most {MOST_EDGES} counts per turn, not {own[0]}": own[0] > MOST_EDGES,
+            f"must be of at most {most} counts per turn, not {own[0]}": own[0] > most,
             "does not work with --teeth": encoder.teeth is not None,
             "does not work with --bounds": spec.bounds,
         }
@@ -111,6 +154,7 @@ class DiscMap(Extra):
         for why, refused in refusals.items():
             if refused:
                 raise ParameterError(self.name if disc else "disc_table", why)
+        self.sectors(spec)
 
     def _inputs(self, spec: Numbers) -> Iterable[tuple[str, str, Pin]]:
         """Yield the inputs, each with the register and the field that take its place on a bus."""
@@ -158,11 +202,14 @@ class DiscMap(Extra):
         return {} if self.index_place(spec) is None else {"disc_slip": event}
 
     def entry(self, spec: Numbers) -> dict[str, Any]:
-        counts, unit = spec.encoder.encoder_counts, float(self.displacement(spec).unit)
-        table = bytes(each & (1 << ENTRY_BITS) - 1 for each in self.entries(spec))
+        unit, table = float(self.displacement(spec).unit), self.entries(spec)
+        sectors = self.sectors(spec)
+        words, size = ((*table, *sectors.quarters), 2) if sectors else (table, 1)
+        content = b"".join((each % (1 << 8 * size)).to_bytes(size, "little") for each in words)
         return {
-            "form": "edges", "entries": counts, "counts_per_lsb": unit, "index_place": self.index_place(spec),
-            "writable": self.writable, "sha256": hashlib.sha256(table).hexdigest() if self.file else None,
+            "form": "sectors" if sectors else "edges", "entries": len(table), "counts_per_lsb": unit,
+            "index_place": self.index_place(spec), "writable": self.writable,
+            "sha256": hashlib.sha256(content).hexdigest() if self.file else None,
             "error_counts": self.file.disc.error if self.file else None,
         }  # fmt: skip
 

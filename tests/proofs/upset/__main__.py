@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from proofs.upset import axes, loops, tracking
-from proofs.upset.campaign import OUTPUTS, UPSET, Campaign, by_register, upsets
+from proofs.upset.campaign import MAPPED, OUTPUTS, UPSET, Campaign, by_register, upsets
 from rich.console import Console
 from rich.progress import track
 from support.report import Table, arguments, chosen
@@ -21,7 +21,7 @@ def _fortieth(name: str, n: int) -> Campaign:
 
 
 SUBJECTS: dict[str, Callable[[int], Campaign]] = {
-    **{name: partial(upsets, name) for name in (*UPSET, OUTPUTS)},
+    **{name: partial(upsets, name) for name in (*UPSET, OUTPUTS, *MAPPED)},
     **{name: partial(_fortieth, name) for name in tracking.TRACK},
     "axes": axes.upsets,
     **{name: partial(loops.upsets, name) for name in loops.LOOPS},

@@ -15,6 +15,8 @@ from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.sim.signals.run import Run
 from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing
 from tachometry.spec.control import AnySpec
+from tachometry.spec.core.disc import Disc
+from tachometry.spec.core.extras.disc import DiscFile, DiscMap
 from tachometry.spec.core.extras.health import Health
 from tachometry.spec.core.extras.over_speed import OverSpeed
 from tachometry.spec.core.extras.position_compare import Compare, PositionCompare
@@ -24,6 +26,9 @@ from tachometry.spec.core.index import Index
 TICK_CYCLES, MAX_TICKS = 100, 20
 # What a core of M may have beside, which must not keep the velocity from recovering; proofs are about these outputs.
 OUTPUTS = "m, outputs"
+MAPPED = ("t, map", "mt, map")  # their turn has 40 edges
+_FAR = tuple((0.4 * np.sin(np.arange(40) * np.pi / 20)).tolist())
+_MAP = DiscFile("", Disc(40, _FAR, 4, 2, 0.01, 0.05, (60.0, 150.0), 40.0, False))
 _OPTIONS: dict[str, dict[str, Any]] = {
     "m": {"average": 10},
     OUTPUTS: {
@@ -37,6 +42,10 @@ _OPTIONS: dict[str, dict[str, Any]] = {
             PositionCompare(places=Compare(2, 3, 0, "7clk", "both")),
         ),
     },
+    **{
+        name: {"encoder": Encoder(10, 4), "index": Index(), "bounds": False, "extras": (DiscMap(file=_MAP),)}
+        for name in MAPPED
+    },
     "track": {"timing": Timing(5_000_000, 340, 20), "max_speed": Speed.parse("75rev/s"), "multiplier": "block"},
     "track, serial": {"timing": Timing(5_000_000, 1000, 20), "multiplier": "serial"},
 }
@@ -47,7 +56,7 @@ UPSET = [method for method in METHODS if method != "track"]
 
 def spec_of(name: str) -> TachometerSpec:
     """Return a core like the default one, with shorter ticks and a shorter maximum time, so that the campaign ends; of
-    a method, `OUTPUTS`, or tracking without a multiplier block.
+    a method, `OUTPUTS`, of `MAPPED`, or tracking without a multiplier block.
     """
     method = name.split(",")[0]
     options: dict[str, Any] = {
@@ -80,7 +89,7 @@ def motion(spec: TachometerSpec, n_cycles: int, seed: int) -> PinTrace:
                 turns.append(int(np.sign(speed)))
         now += cycles * rng.uniform(longest + 2, longest + 8)
     level, one = quadrature(np.cumsum(turns)), np.uint8(1)
-    z = (np.cumsum(turns) % 40 == 0).astype(np.uint8) if spec.index else None
+    z = (np.cumsum(turns) % 40 == (0 if spec.displacement is None else 2)).astype(np.uint8) if spec.index else None
     return PinTrace(np.round(clocks).astype(np.int64), level & one, level >> one, int(now), z).completed(spec)
 
 
@@ -147,16 +156,21 @@ def right_rows(spec: TachometerSpec, trace: PinTrace, phase: int) -> NDArray[np.
 
 def compared_names(spec: TachometerSpec) -> list[str]:
     """Return the outputs that are compared."""
-    plain = spec_of(spec.method)
-    return [port.name for port in plain.ports if port.direction == "output" and port.name != "position"]
+    plain, own = spec_of(spec.method), {port.name for port in spec.ports}
+    names = [port.name for port in plain.ports if port.direction == "output" and port.name != "position"]
+    return [name for name in names if name in own]
 
 
 def allowed(spec: TachometerSpec, trace: PinTrace, clock: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return clocks after which the outputs must be right if there was an upset in these clocks.
 
     What forgets only gradually forgets all at rest: when there is no count for the maximum time, and before it there
-    was one that is surely right.
+    was one that is surely right. A map is right again at the second index, which agrees with the first one.
     """
+    if spec.displacement is not None:
+        index = np.append(golden.run(spec, trace).index.clock, [trace.n_clocks] * 3)
+        second = index[np.searchsorted(index, np.minimum(clock + spec.recovery.front, trace.n_clocks)) + 1]
+        return second - clock + np.int64(spec.recovery.clocks or 0)
     if spec.recovery.clocks is not None:
         return np.full(len(clock), spec.recovery.clocks)
     silent = np.flatnonzero(
@@ -176,6 +190,8 @@ def upsets(name: str, n: int, seed: int = 1) -> Campaign:
     spec = spec_of(name)
     trace = motion(spec, 40, seed)
     core = Upsettable(spec, trace)
+    if spec.displacement is not None:  # the map would be right again with a new configuration alone
+        core.bits = Bits(core.bits.flip_flops, [])
     end = allowed(spec, trace, np.arange(trace.n_clocks))
     outputs = [port.name for port in spec.ports if port.direction == "output"]
     compared = [outputs.index(name) for name in compared_names(spec)]
