@@ -1,5 +1,7 @@
 """`calibrate` prints these lines: the faults of a disc as a service engineer names them."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from tachometry.cli.reports.terminal import print_rows
@@ -45,8 +47,15 @@ def print_calibration(found: Calibration, spec: TachometerSpec) -> None:
         ("speeds", f"{fit.speeds[0]:.4g} to {fit.speeds[1]:.4g} rad/s"),
         ("ripple of the torque", ripple),
         ("index", text + (f"; {slips} {plural(found.slips, 'turn' if spec.index else 'time')}" * (found.slips > 0))),
-        *([] if found.change is None else [("since --against", f"{found.change:.4f} counts RMS of change")]),
+        *_since(found),
         ("certain to", f"{fit.error:.4f} counts RMS, {fit.error * arc:.2g}', by the two halves of the turns"),
         ("verdict", "refused" if found.reasons else verdict),
     ]
     print_rows(rows)
+
+
+def _since(found: Calibration) -> Iterator[tuple[str, str]]:
+    if found.change is not None:
+        yield "since --against", f"{found.change:.4f} counts RMS of change"
+    if found.turn is not None:
+        yield "DISC_TURN", f"{found.turn}, if the core was reset as the capture began"

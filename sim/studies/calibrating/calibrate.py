@@ -9,7 +9,7 @@ from tachometry.sim.signals.arrays import Floats
 from tachometry.sim.signals.progress import Bar, at_work, no_bar
 from tachometry.sim.signals.recording import Recording
 from tachometry.sim.studies.calibrating.fit import Fit, Waves, fit_disc, harmonics, mean_by_edge, residues, rms
-from tachometry.sim.studies.calibrating.runs import LEAST_TURNS, Run, runs_of
+from tachometry.sim.studies.calibrating.runs import LEAST_TURNS, Run, runs_of, start_of
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.disc import Disc
 
@@ -31,6 +31,8 @@ class Calibration:
     slips: int  # see `runs_of`
     reasons: list[str]  # why the map must not be used
     change: float | None  # counts RMS, since another map of the same encoder
+    # counts by which DISC_TURN aligns a core without an index, reset as the first capture began, with another map
+    turn: int | None
 
 
 def calibrate(
@@ -50,15 +52,7 @@ def calibrate(
     encoder, n = spec.encoder, spec.encoder.encoder_counts
     if n < _FEWEST:
         raise ValueError(f"--ppr must make at least {_FEWEST} counts a turn, not {n}")
-    runs: list[Run] = []
-    place, slips = None, 0
-    with at_work("reading captures"):
-        for number, (name, recording) in enumerate(captures):
-            try:
-                more, lost, place = runs_of(recording, spec, number)
-            except ValueError as error:
-                raise ValueError(f"{name} {error}") from error
-            runs, slips = runs + more, slips + lost
+    runs, slips, place, start = _read(captures, spec)
     if not (runs := runs if spec.index else turned(runs, n)):
         turns = f"{LEAST_TURNS} turns of {n} counts in one direction"
         raise ValueError(f"captures must have more than {turns} in which no count is lost")
@@ -66,12 +60,28 @@ def calibrate(
     (least, greatest), table = (round(speed, 3) for speed in fit.speeds), _rounded(fit.displacement)
     known = (n, table, encoder.decoding, place, round(fit.error, _DIGITS), round(fit.jitter, _DIGITS))
     disc = Disc(*known, (least, greatest), fit.turns, fit.ripple is None)
-    change, reasons = None, fit.reasons
+    change, reasons, turn = None, fit.reasons, None
     if against is not None:
         disc, shift, change, wrong = _compared(disc, against)
         turned_by = {name: np.roll(getattr(fit, name), shift) for name in ("displacement", "seen", "unseen")}
         fit, reasons = replace(fit, **turned_by), reasons + wrong
-    return Calibration(disc, fit, harmonics(np.array(disc.displacement), _LOW), slips, reasons, change)
+        if spec.index is None and not wrong and runs[0].origin == 0:
+            turn = (start + shift) % n
+    return Calibration(disc, fit, harmonics(np.array(disc.displacement), _LOW), slips, reasons, change, turn)
+
+
+def _read(captures: Iterable[tuple[str, Recording]], spec: TachometerSpec) -> tuple[list[Run], int, int | None, int]:
+    """Return the runs of all captures, how often counts were lost, the place of the index, and the first position."""
+    runs: list[Run] = []
+    place, slips, start = None, 0, 0
+    with at_work("reading captures"):
+        for number, (name, recording) in enumerate(captures):
+            try:
+                more, lost, place = runs_of(recording, spec, number)
+            except ValueError as error:
+                raise ValueError(f"{name} {error}") from error
+            runs, slips, start = runs + more, slips + lost, start if number else start_of(recording, spec)
+    return runs, slips, place, start
 
 
 def _rounded(table: Floats) -> tuple[float, ...]:

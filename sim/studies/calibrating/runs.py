@@ -1,6 +1,6 @@
 """Captures become runs: edges that pass in one direction, none missing between them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,11 +39,9 @@ def runs_of(recording: Recording, spec: TachometerSpec, number: int = 0) -> tupl
         raise ValueError("must have the edges of the lines: --count and --angle show no disc")
     encoder, n = spec.encoder, spec.encoder.encoder_counts
     step, wrong = counted(encoder, recording.lines)
-    position, row = np.cumsum(step), np.flatnonzero(step)
-    cycle = encoder.kind.cycle if encoder.sensor == "quadrature" and encoder.decoding == 4 else ()
-    if cycle:  # place 0 of the cycle is position 0; a change of both lines is half a cycle
-        first = cycle.index(tuple(int(recording.lines[name][0] ^ (name in encoder.inverted)) for name in "ab"))
-        position = (-first if encoder.reverse else first) + np.cumsum(step + 2 * wrong)
+    position, row, cycle = np.cumsum(step), np.flatnonzero(step), _cycle(spec)
+    if cycle:  # a change of both lines is half a cycle
+        position = start_of(recording, spec) + np.cumsum(step + 2 * wrong)
     piece, lost, slips, place = np.cumsum(wrong, dtype=np.int64)[row], step[row] == 0, int(wrong.sum()), None
     if spec.index is not None:
         marks, at = _marks(recording, spec, step, position)
@@ -62,6 +60,19 @@ def runs_of(recording: Recording, spec: TachometerSpec, number: int = 0) -> tupl
     pieces = _cut(recording.time[row], step[row], position[row], piece + (number << 48), lost)
     runs = [run for run in pieces if len(run.time) > LEAST_TURNS * n]
     return [Run(run.time, run.first, run.direction) for run in runs] if spec.index else runs, slips, place
+
+
+def start_of(recording: Recording, spec: TachometerSpec) -> int:
+    """Return the position at the beginning: place 0 of the cycle of the lines is position 0, if every edge counts."""
+    if not (cycle := _cycle(spec)):
+        return 0
+    place = cycle.index(tuple(int(recording.lines[name][0] ^ (name in spec.encoder.inverted)) for name in "ab"))
+    return -place if spec.encoder.reverse else place
+
+
+def _cycle(spec: TachometerSpec) -> Sequence[tuple[int, ...]]:
+    encoder = spec.encoder
+    return encoder.kind.cycle if encoder.sensor == "quadrature" and encoder.decoding == 4 else ()
 
 
 def _marks(recording: Recording, spec: TachometerSpec, step: Ints, position: Ints) -> tuple[Ints, Ints]:

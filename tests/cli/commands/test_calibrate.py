@@ -5,6 +5,7 @@ import shlex
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from matplotlib.image import imread
 from support import docs
@@ -67,6 +68,15 @@ def test_a_map_and_a_picture_are_written_or_neither(
     capsys.readouterr()
     assert run("calibrate", "coast.sr", "--ppr", "24", "--against", "out/disc.json") == 0
     assert re.search(r"^since --against +0\.00\d\d counts RMS", capsys.readouterr().out, re.MULTILINE)
+
+
+def test_the_number_that_aligns_a_core_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    save(tmp_path / "coast.sr", "ramp:150rad/s:60rad/s:3s")
+    words = ["calibrate", tmp_path / "coast.sr", "--ppr", "24"]
+    assert run(*words, "--index", "-o", tmp_path / "disc.json") == 0
+    assert run(*words, "--against", tmp_path / "disc.json") == 0
+    begins = int(ENCODER.disc.quarter(np.zeros(1))[0]) % 96
+    assert f"DISC_TURN             {begins}, if the core was reset as the capture began" in capsys.readouterr().out
 
 
 def test_a_disc_without_faults_gains_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,15 +2,17 @@
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.arrays import Floats
-from tachometry.sim.signals.recording import Recording
+from tachometry.sim.signals.recording import PinTrace, Recording
 from tachometry.sim.studies.calibrating.calibrate import Calibration, calibrate
 from tachometry.spec import of_texts
 from tachometry.spec.core.disc import Disc
@@ -82,6 +84,28 @@ def test_a_later_capture_is_counted_as_the_map() -> None:
     assert off(later, true()) < 0.012
     assert later.change is not None
     assert later.change < 0.02
+
+
+@pytest.mark.parametrize("texts", [{}, {"reverse": "yes"}])
+def test_a_capture_without_an_index_aligns_a_core(texts: dict[str, str], tmp_path: Path) -> None:
+    """A core that begins with the capture has the least errors if DISC_TURN gives this number, and no other one."""
+    lines = {"ppr": str(PPR), **texts}
+    first = found(recorded(), texts={**lines, "index": "yes"})
+    later = recorded(start_angle_rad=2.0, seed=0)
+    turn = found(later, texts=texts, against=first.disc).turn
+    (path := tmp_path / "disc.json").write_text(first.disc.text)
+    spec = of_texts("mt", lines | {"clock": "10MHz", "tick": "20us", "max-speed": "400rad/s", "disc": str(path)})
+    trace = PinTrace.of(later, spec)
+    assert turn is not None
+
+    def error(by: int) -> float:
+        high = {"disc_turn_by": np.full(len(trace.clock), by, np.uint8)}
+        lines = PinTrace.of_lines(trace.clock, trace.n_clocks, trace.lines | high).completed(spec)
+        updates = golden.run(spec, lines.with_pulses("disc_turn", np.array([5]))).updates
+        return float(np.std(np.diff(updates.velocity[1000:9000])))
+
+    errors = [error((turn + off) % (4 * PPR)) for off in (-4, -1, 0, 1, 4)]
+    assert errors[2] < 0.8 * min(errors[:2] + errors[3:]), errors
 
 
 def test_another_encoder_is_refused() -> None:
