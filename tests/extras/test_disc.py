@@ -245,7 +245,7 @@ def test_wrong_gates_are_seen(box: Any, text: str, wrong: str, case: int) -> Non
     ("box", "text", "wrong"),
     [
         (None, "", ""),
-        (tick_counts.TickCounts, "Mux(was, latest, ahead)", "ahead"),
+        pytest.param(tick_counts.TickCounts, "Mux(was, latest, ahead)", "ahead", marks=nightly),
         pytest.param(track.TrackMethod, "machine.sign", "0", marks=nightly),
         pytest.param(gates.Gates, "counted | self._looks", "counted", marks=nightly),
         pytest.param(gates.Gates, "Mux(step[0], step[1], was)", "step[1]", marks=nightly),
@@ -254,7 +254,7 @@ def test_wrong_gates_are_seen(box: Any, text: str, wrong: str, case: int) -> Non
 def test_silences_know_the_edges_about(box: Any, text: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A shaft that swings slowly waits at edges, whose displacement says how far it may have gone."""
     spec = Case("track", "disc=far.json index=yes tick=300clk multiplier=block max-time=3000clk").spec
-    moved = parse_motion("constant:50rad/s:300ms+sine:20rad/s:3Hz:500ms")
+    moved = parse_motion("constant:50rad/s:140ms+sine:20rad/s:4Hz:250ms")
     trace = PinTrace.of(VirtualEncoder(25, index=True).record(moved).recording, spec).completed(spec)
     with mutant(box, text, wrong) if box else nullcontext():
         assert bool(lockstep(spec, trace, Cxxrtl()).n_mismatches) == bool(box)

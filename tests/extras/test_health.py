@@ -31,7 +31,12 @@ CASES = (
     Case(
         "m", "ppr=8 tick=40us max-time=400us health=yes health-edges=900 health-errors=900 differential=2 invert=a", 12
     ),
-    Case("m", "ppr=8 tick=40us max-time=400us health=yes health-edges=900 health-errors=900 differential=2", 12),
+    Case(
+        "m",
+        "ppr=8 tick=40us max-time=400us health=yes health-edges=900 health-errors=900 differential=2",
+        12,
+        late=True,
+    ),
 )
 BUS = Case("m", "ppr=2 health=yes health-edges=3 health-errors=0 differential=3 index=yes index-at=edge", swings=True)
 

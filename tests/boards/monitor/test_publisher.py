@@ -148,7 +148,7 @@ def test_the_monitor_publishes_what_it_shows(capsys: pytest.CaptureFixture[str])
     with Broker() as broker, heard(broker.port, "axis1") as messages:
         address = f"mqtt://127.0.0.1:{broker.port}/axis1"
         words = ("--set", "speed=100rad/s", "--duration", "1s", "--plain", "--publish", address)
-        assert run("monitor", f"sim:{BOARD}", *WORDS, *words) == 0
+        assert run("monitor", f"sim:{BOARD}", *WORDS, "--method", "s", *words) == 0
         every = until(messages, ("axis1/status", "offline"))
     found = [json.loads(text) for topic, text in every if topic == "axis1"]
     assert ("axis1/status", "online") in every

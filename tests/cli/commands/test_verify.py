@@ -44,7 +44,7 @@ def few(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
 @pytest.mark.parametrize(
     ("methods", "engines", "few"),
     [
-        (["m"], ["pysim", "cxxrtl"], 1),
+        (["m"], ["cxxrtl"], 1),
         pytest.param(["m"], ["cxxrtl", "verilator"], 1, marks=nightly),  # whose core takes long to compile
         pytest.param(list(METHODS), ["pysim"], 1, marks=nightly),
     ],

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from support.compiled import YOSYS, lint, read_exported
-from support.nightly import nightly, only
+from support.nightly import nightly, only, only_rows
 from support.script import load
 from support.verilog import LintingVerilator, run_in_icarus
 
@@ -91,19 +91,23 @@ def test_options_that_no_pair_has(options: str, tmp_path: Path, monkeypatch: pyt
     assert wrong(of_options(dict(option.split("=", 1) for option in options.split()))) == []
 
 
+MUTANTS = [
+    ("m_s == 9'd499", "m_s == 9'd498", "Unproven"),
+    (r"open_sum \+ ", "open_sum - ", "Unproven"),
+    (r"(reg +\[8:0\] +m_s) = 9'd1", r"\1 = 9'd0", "initial value"),
+    (r"update \? pulse_count : opening", "update ? opening : pulse_count", "Unproven"),
+    (r"m_s <= 9'd1;(?=\s+longest <= 1'b0)", "m_s <= 9'd2;", "Unproven"),
+    (r"lower <= 33'h200000", "lower <= 33'h200001", "Unproven"),
+    ("posedge clk", "negedge clk", "clock"),
+    (r"(table_\[3\] = \d+'h.*).;", r"\g<1>f;", "INIT"),
+    (r"table_\[(?=\w+\];)", "table_[~", "Unproven"),
+]
+
+
+# One of each message; the others are gates that the same proof refuses.
 @pytest.mark.parametrize(
     ("right", "mutant", "message"),
-    [
-        ("m_s == 9'd499", "m_s == 9'd498", "Unproven"),
-        (r"open_sum \+ ", "open_sum - ", "Unproven"),
-        (r"(reg +\[8:0\] +m_s) = 9'd1", r"\1 = 9'd0", "initial value"),
-        (r"update \? pulse_count : opening", "update ? opening : pulse_count", "Unproven"),
-        (r"m_s <= 9'd1;(?=\s+longest <= 1'b0)", "m_s <= 9'd2;", "Unproven"),
-        (r"lower <= 33'h200000", "lower <= 33'h200001", "Unproven"),
-        ("posedge clk", "negedge clk", "clock"),
-        (r"(table_\[3\] = \d+'h.*).;", r"\g<1>f;", "INIT"),
-        (r"table_\[(?=\w+\];)", "table_[~", "Unproven"),
-    ],
+    only_rows([MUTANTS[k] for k in (0, 2, 6, 7)], MUTANTS),
     ids=["compared", "added", "initial", "chosen", "reset", "loaded", "edge", "contents", "address"],
 )
 def test_a_mutant_is_refused(right: str, mutant: str, message: str) -> None:

@@ -10,7 +10,7 @@ from amaranth import Module, Signal
 from amaranth.sim import Simulator
 from extras.harness import Case
 from support.axes import motions
-from support.nightly import nightly
+from support.nightly import nightly, only
 from support.tracking import Interpreter, core, windows
 from support.verilog import run_in_icarus
 
@@ -37,7 +37,8 @@ CASES = (
 )
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.words)
+# The last is played in Icarus.
+@pytest.mark.parametrize("case", only(CASES[:2], CASES), ids=lambda case: case.words)
 def test_gates_and_golden_model_agree(case: Case) -> None:
     """No other output differs from that of the core without."""
     spec, updates = case.spec, case.run().updates
@@ -95,7 +96,7 @@ def differs(spec: Any) -> bool:
     return False
 
 
-@pytest.mark.parametrize("multiplier", ["serial", "block"])
+@pytest.mark.parametrize("multiplier", only(["block"], ["serial", "block"]))  # of which each is another order
 def test_the_program_agrees_with_the_golden_model(multiplier: str) -> None:
     assert not differs(core(smooth="yes", tick="100us", max_speed="1000rad/s", multiplier=multiplier))
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from support.compiled import HEADERS
+from support.nightly import only
 
 from tachometry.sim.build import compiler, run
 from tachometry.sim.engines.cxxrtl import WORDS
@@ -61,7 +62,7 @@ def _case(chance: random.Random, operation: str) -> str:
     return _CASE.format(a=a, b=b, part=part, same=same, first=first, first_value=left, second=right)
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", only([0], range(2)))
 def test_it_is_what_cxxrtl_computes(seed: int, tmp_path: Path) -> None:
     chance = random.Random(seed)
     both = [f"{name}_{sign}" for name in "and or xor add sub mul eq ne lt le gt ge".split() for sign in ("uu", "ss")]

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 import size
 from cores import CONFIGURATIONS
+from support.nightly import nightly
 
 from tachometry.sim.studies import estimate
 from tachometry.sim.studies.estimate import FAMILIES, SPREAD, Estimate, Timing
@@ -153,6 +154,7 @@ def test_a_remedy_is_the_core_that_its_option_makes() -> None:
     assert found.remedy[1] == other.clock_hz > 125e6
 
 
+@nightly  # another synthesis, to see that a core that is refused is none of them
 def test_a_remedy_that_cannot_be_is_none() -> None:
     """A tick that has no time for the serial multiplier, in a core that is too slow with the other."""
     found = Estimate.of(of_options(DRIVE | {"tick": "6us"}), None, "ecp5")

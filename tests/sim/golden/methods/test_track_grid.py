@@ -13,12 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support.nightly import nightly, only_rows
+from support.nightly import nightly, only, only_rows
 from support.tracking import core
 from support.verilog import LintingVerilator
 
 from tachometry.sim import build, golden
-from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.sim.engines.engine import Engine
 from tachometry.sim.golden.methods import track
 from tachometry.sim.signals.recording import PinTrace, quadrature
@@ -111,8 +110,9 @@ def check(spec: TachometerSpec, pattern: Pattern, phases: int, drift: float = 0)
     return int(tracked.size)
 
 
-def test_no_wrong_speed_is_locked_to_in_quadrature() -> None:
-    assert check(QUADRATURE, (0, 1), PHASES) == 28_896
+@pytest.mark.parametrize("phases", only([PHASES // 2], [PHASES // 2, PHASES]))
+def test_no_wrong_speed_is_locked_to_in_quadrature(phases: int) -> None:
+    assert check(QUADRATURE, (0, 1), phases) == 1806 * phases
 
 
 @pytest.mark.parametrize(("pattern", "phases"), only_rows(QUICK_HALLS, [*QUICK_HALLS, *product(MORE_HALLS, [PHASES])]))
@@ -162,10 +162,6 @@ def test_pins_show_the_errors_of_the_search(rate: Fraction, cell: int) -> None:
     assert wrong < 0.002
     if build.find_compiler():
         assert wrong == search(SLOW, clocks_of(float(rate), SLOW.form.tick_cycles), float(rate))[cell, 0]
-
-
-def test_the_core_plays_the_cell_that_was_worst() -> None:
-    assert error(*CELLS[0], Cxxrtl()) < 0.002
 
 
 @nightly
