@@ -80,6 +80,7 @@ class CoreOptions(TypedDict, total=False):
     sample_age: Value | None
     sensor: Value | None
     sincos: bool | None
+    sincos_table: bool | None
     smooth: bool | None
     stream: Value | None
     synchronised: bool | None

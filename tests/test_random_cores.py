@@ -111,7 +111,7 @@ def _add_last(texts: dict[str, str], draw: _Draw) -> None:
     """Add options with random numbers of their own, so that the others of a seed stay."""
     if draw.often(0.05):
         texts |= {"electrical": str(draw.log(1, 512)), "lead": f"{draw.randint(0, 3)}tick"}
-        texts |= {"sincos": "yes"} if draw.often(0.5) else {}
+        texts |= {draw.choice(["sincos", "sincos-table"]): "yes"} if draw.often(0.5) else {}
         texts |= {"electrical": texts["ppr"]} if texts.get("sensor") == "hall" else {}
     if draw.often(0.1):
         texts["blanking"] = str(draw.log(2, 3000))

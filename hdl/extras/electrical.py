@@ -8,7 +8,7 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.products import Product, take_products
 from tachometry.hdl.arithmetic.saturate import saturate
-from tachometry.hdl.arithmetic.sine_cosine import SineCosine
+from tachometry.hdl.arithmetic.sine_cosine import SineCosine, SineTable
 from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import by_name
 from tachometry.spec import TachometerSpec
@@ -31,6 +31,7 @@ class Gates(wiring.Component):
     ) -> None:
         led = (angles.led.width, inputs["native_position_fine"]) if angles.led else ()
         self._angles, self._latency, self._corrects, self._offset = angles, latency, corrects, extra.offset
+        self._turn = SineTable if extra.sincos_table else SineCosine
         super().__init__(
             {
                 "step": In(signed(2)),
@@ -44,7 +45,7 @@ class Gates(wiring.Component):
                 "angle_valid": Out(1),
                 **({REFUSED: Out(REFUSED_BITS)} if corrects else {}),
                 **{name: Out(signed(width)) for name, width in zip(LEADS, led, strict=False)},
-                **(dict.fromkeys(("angle_sin", "angle_cos"), Out(signed(SHOWN_BITS))) if extra.sincos else {}),
+                **(dict.fromkeys(("angle_sin", "angle_cos"), Out(signed(SHOWN_BITS))) if extra.turns else {}),
             }
         )
 
@@ -92,7 +93,7 @@ class Gates(wiring.Component):
         coming = (phase[-SHOWN_BITS:] + shift)[:SHOWN_BITS]
         m.d.sync += [shift.eq(difference + offset), self.angle.eq(coming)]
         if "angle_sin" in members:
-            m.submodules.sine_cosine = box = SineCosine()
+            m.submodules.sine_cosine = box = self._turn()
             m.d.comb += [
                 box.angle.eq(coming + (slope >> self._angles.bits - SHOWN_BITS - AHEAD_BITS)),
                 self.angle_sin.eq(box.sin),

@@ -84,7 +84,7 @@ class Loop(Law):
     )
     command: str = option(
         "ports",
-        "Source of commands: inputs, or a generator in the core. The generator makes constant speeds, ramps and sines.",
+        "Source of commands: inputs or a generator. The generator in the core makes constant speeds, ramps and sines.",
         choices=COMMANDS,
     )
     gains: str = option(

@@ -1,4 +1,4 @@
-"""Sine and cosine by CORDIC (Volder 1959): in each step, a vector is turned by the arc tangent of 2^-step."""
+"""Sine and cosine by CORDIC (Volder 1959), which turns a vector by the arc tangent of 2^-step, or by a table."""
 
 import math
 
@@ -10,3 +10,7 @@ ONE = 32767  # the greatest sine
 TURNS = tuple(round(math.atan(2.0**-step) / (2 * math.pi) * (1 << WIDTH)) for step in range(STEPS))
 # All steps together stretch this to ONE, which no result exceeds.
 START = round((ONE << GUARD_BITS) * math.prod(math.cos(math.atan(2.0**-step)) for step in range(STEPS))) - 1
+# Sines of a quarter turn, each in the middle of 16 angles; how far each of these is from there, in 2^15 radians.
+QUARTER = tuple(round(ONE * math.sin((16 * i + 8) * math.tau / (1 << 16))) for i in range(1024))
+ASIDE = tuple(round((i - 8) * math.pi) for i in range(16))
+FACTOR_SHIFT = 7  # of a sine, which is then a factor of 8 bits

@@ -31,16 +31,11 @@ from tachometry.spec.formats.angles import Angles
 from tachometry.spec.formats.settling import Settling
 
 TRACK = "tick=2000clk max-time=8000clk"
-LED = "lead=0clk unit=rpm velocity-width=12"
+LED = "sincos-table=yes lead=0clk unit=rpm velocity-width=12"
 SLOW = "tick=200clk max-time=1000clk"
 CASES = (
     Case("track", f"electrical=7 index=yes lead=2tick electrical-offset=30deg {TRACK}", swings=True, clocks=20_000),
-    Case(
-        "track",
-        f"electrical=3 multiplier=block sincos=yes index=yes index-reset=yes {TRACK} {LED}",
-        swings=True,
-        late=True,
-    ),
+    Case("track", f"electrical=3 multiplier=block index=yes index-reset=yes {TRACK} {LED}", swings=True),
     Case("s", f"electrical=7 index=yes lead=50clk unit=rpm sincos=yes {SLOW}", edges=60),
     Case("mt", f"electrical=11 index=yes index-once=yes preset=7 {SLOW}", edges=60),
     Case("m", f"electrical=7 index=yes {SLOW}", swings=True, late=True),

@@ -50,7 +50,8 @@ WORDS = {
 }
 # Named only where they are asked for.
 _HEALTH = ("health", "health_edges", "health_errors")
-_TACIT = (*_HEALTH, "electrical", "electrical_offset", "lead", "over_speed", "position_compare", "ratio", "sincos")
+_ANGLE = ("electrical", "electrical_offset", "lead", "sincos", "sincos_table")
+_TACIT = (*_HEALTH, *_ANGLE, "over_speed", "position_compare", "ratio")
 _FLAGS = ("index", "index-reset", "age", "bounds", "paper-exact", "whole-cycles", "health")
 # Entries of the acceleration, and its unit for that of the velocity.
 ACCELERATION = ("width", "frac_bits", "unit", "rad_per_s2_per_lsb")

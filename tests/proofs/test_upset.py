@@ -2,12 +2,12 @@
 
 import pytest
 from proofs.formal.mutants import mutant
-from proofs.upset import axes, loops, tracking
+from proofs.upset import angle, axes, loops, tracking
 from proofs.upset.campaign import MAPPED, OUTPUTS, UPSET, upsets
 from support.nightly import nightly
 
 from tachometry.hdl.control.control_clock import ControlClock
-from tachometry.hdl.extras import disc
+from tachometry.hdl.extras import disc, electrical
 
 
 @nightly
@@ -34,6 +34,16 @@ def test_many_axes_are_right_again_in_time() -> None:
     assert campaign.fine
     assert (campaign.clocks > 0).sum() > 30
     assert campaign.clocks.max() > campaign.spec.timing.tick_cycles
+
+
+@nightly
+def test_an_angle_is_right_again_at_the_second_index() -> None:
+    """Every fifth bit."""
+    campaign = angle.upsets(150)
+    assert campaign.fine
+    assert (campaign.clocks > 0).sum() > 10
+    with mutant(electrical.Gates, "Mux(zeroes, zero, sum_)", "sum_"):
+        assert not angle.upsets(10, only="sum__").fine
 
 
 @nightly

@@ -13,7 +13,17 @@ from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.electrical import LEADS, REFUSED, REFUSED_BITS, ElectricalAngle
 from tachometry.spec.formats.angles import SHOWN_BITS, SLOPE_BITS, Angles, Factor, wrapped
 from tachometry.spec.formats.settling import PLACE_BITS
-from tachometry.spec.formats.sine import AHEAD_BITS, GUARD_BITS, START, STEPS, TURNS, WIDTH
+from tachometry.spec.formats.sine import (
+    AHEAD_BITS,
+    ASIDE,
+    FACTOR_SHIFT,
+    GUARD_BITS,
+    QUARTER,
+    START,
+    STEPS,
+    TURNS,
+    WIDTH,
+)
 
 _TURN = 1 << SHOWN_BITS
 _NEVER = _GROWS = _FREE = 1 << 62  # no clock, a place that grows on, and a place without an end
@@ -47,12 +57,13 @@ def shown(
         refused = np.searchsorted(found[REFUSED].clock, clock, side="right")
         columns[REFUSED] = np.minimum(refused, (1 << REFUSED_BITS) - 1)
     columns |= {name: found["angle_leads"].at(name, clock) for name in (LEADS if angles.led else ())}
-    if extra.sincos:
+    if extra.turns:
         taken = (clock - 1) // STEPS * STEPS - STEPS
         phases = found["angle_phase"]
         row = np.searchsorted(phases.clock, taken + (not angles.tracks), side="right")
         slope = np.append(0, phases["rows"][:, 2])[row] >> angles.bits - SHOWN_BITS - AHEAD_BITS
-        both = sine_cosine((_angle(angles, found, taken + 1) + slope) % _TURN)
+        turn = sine_by_table if extra.sincos_table else sine_cosine
+        both = turn((_angle(angles, found, taken + 1) + slope) % _TURN)
         columns |= {name: np.where(taken < 0, 0, of) for name, of in zip(("angle_sin", "angle_cos"), both, strict=True)}
     return columns
 
@@ -68,6 +79,23 @@ def sine_cosine(angle: Ints) -> tuple[Ints, Ints]:
     x, y = (word + (1 << GUARD_BITS - 1) >> GUARD_BITS for word in (x, y))
     vector = (x + 1j * y) * np.array([1, 1j, -1, -1j])[quadrant % 4]  # exact
     return vector.imag.astype(np.int64), vector.real.astype(np.int64)
+
+
+def sine_by_table(angle: Ints) -> tuple[Ints, Ints]:
+    """Return the same by the table: the other function of its entry is the slope there."""
+    quadrant, rest = np.divmod(angle, _TURN // 4)
+    place, aside = np.divmod(rest, 16)
+    table, slope = np.array(QUARTER), np.array(ASIDE)[aside]
+    both = np.array([table[place], table[~place]])
+
+    def turned(by: Ints) -> Ints:
+        which, sign = by % 2, np.where(by % 4 > 1, -1, 1)
+        of, other = (np.take_along_axis(both, one[None], 0)[0] for one in (which, 1 - which))
+        factor = (other >> FACTOR_SHIFT) * slope * sign * (1 - 2 * which)
+        found: Ints = sign * of + (factor + 128 >> 8)
+        return found
+
+    return turned(quadrant), turned(quadrant + 1)
 
 
 def _angle(angles: Angles, found: Mapping[str, Table], clock: Ints) -> Ints:

@@ -30,6 +30,8 @@ LEADS = ("velocity_lead", "position_lead")
 _SINCOS = """Outputs angle_sin and angle_cos, from -32767 to 32767. CORDIC computes new ones every 16 clocks, for the \
 instant that --lead gives."""
 
+_TABLE = """As --sincos, by a table of sines in a block RAM. It takes a quarter of the cells of CORDIC."""
+
 
 def parse_offset(what: str, text: str) -> int:
     """Return an angle in 2^-16 turns, from degrees or a number of these."""
@@ -62,10 +64,17 @@ class ElectricalAngle(Extra):
     )
     sincos: bool = option(False, _SINCOS, tests=("", "yes"), tacit=True)
 
+    sincos_table: bool = option(False, _TABLE, tests=("", "yes"), tacit=True)
+
     @property
     def ahead(self) -> int:
         """The lead in clocks."""
         return self.lead or 0
+
+    @property
+    def turns(self) -> bool:
+        """Whether it outputs sine and cosine."""
+        return self.sincos or self.sincos_table
 
     @classmethod
     def respelled(cls, texts: Mapping[str, str]) -> Mapping[str, str]:
@@ -135,7 +144,7 @@ class ElectricalAngle(Extra):
             unit = f"2^{-spec.velocity.frac_bits} {spec.unit}"
             yield held(TICK, LEADS[0], led.width, signed=True, unit=unit, help=f"Velocity {when}")
             yield held(TICK, LEADS[1], place.width, signed=True, unit=place.unit, help=f"Position {when}")
-        for name, function in {"angle_sin": "Sine", "angle_cos": "Cosine"}.items() if self.sincos else ():
+        for name, function in {"angle_sin": "Sine", "angle_cos": "Cosine"}.items() if self.turns else ():
             text = f"{function} of the angle. It also changes between ticks, every {STEPS} clocks."
             yield held(TICK, name, SHOWN_BITS, signed=True, unit=f"1/{ONE}", help=text)
 

@@ -1,7 +1,7 @@
 """Single flip-flop upsets of every method, and how long they are seen: `make upset`.
 
-Names of methods as arguments choose those, `axes` a core of many, and `loop` those with a control loop; `--upsets N`
-says how many of each; of `track` a fortieth, as each of them plays 1300 counts.
+Names of methods as arguments choose those, `axes` a core of many, `angle` that of a motor, and `loop` those with a
+control loop; `--upsets N` says how many of each; of `track` and `angle` a fortieth, as each of them plays long.
 """
 
 import sys
@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from proofs.upset import axes, loops, tracking
+from proofs.upset import angle, axes, loops, tracking
 from proofs.upset.campaign import MAPPED, OUTPUTS, UPSET, Campaign, by_register, upsets
 from rich.console import Console
 from rich.progress import track
@@ -24,9 +24,10 @@ SUBJECTS: dict[str, Callable[[int], Campaign]] = {
     **{name: partial(upsets, name) for name in (*UPSET, OUTPUTS, *MAPPED)},
     **{name: partial(_fortieth, name) for name in tracking.TRACK},
     "axes": axes.upsets,
+    "angle": lambda n: angle.upsets(max(n // 40, 1)),
     **{name: partial(loops.upsets, name) for name in loops.LOOPS},
 }
-GROUPS = (*UPSET, "track", "axes", "loop")
+GROUPS = (*UPSET, "track", "axes", "angle", "loop")
 
 
 def _ticks(campaign: Campaign, clocks: int) -> str:

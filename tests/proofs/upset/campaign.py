@@ -222,14 +222,14 @@ def play(
     allowed: NDArray[np.int64],
     seed: int,
     wrong: Callable[[int, NDArray[np.int64]], NDArray[np.bool_]],
-    only: str = "",
+    only: str | tuple[str, ...] = "",
     first: int = 200 * TICK_CYCLES,
 ) -> Campaign:
     """Flip bits as in `upsets`.
 
     - `allowed`, shape (n_clocks,): Clocks after which the outputs must be right, by the clock of the upset.
     - `wrong`: Of the clock of an upset, and what was shown from it on, in which clocks it is wrong.
-    - `only`: Bits of this register alone, by the end of its name.
+    - `only`: Bits of this register alone, or of these, by the end of its name.
     - `first`: Clock of the earliest upset.
     """
     rng = np.random.default_rng(seed)

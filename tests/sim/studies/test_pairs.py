@@ -20,7 +20,7 @@ APART = {
     frozenset({("adaptive", "25%"), ("lowpass", "20kHz")}),
     *(
         frozenset({("electrical", value), other})
-        for value in ("7", "7 electrical-offset 30deg", "7 lead 1.5tick", "7 sincos")
+        for value in ("7", "7 electrical-offset 30deg", "7 lead 1.5tick", "7 sincos", "7 sincos-table")
         for other in (("sensor", "hall"), ("tick", "1"), ("tick", "2"), ("tick", "3"))
     ),
     # A period of halls has six counts, and only A and B have a state for the index and edges to miss.
