@@ -499,6 +499,18 @@ def test_the_driver_converts_to_what_the_shaft_did(tmp_path: Path) -> None:
         assert found == pytest.approx(expected, rel=0.02), unit
 
 
+def test_the_driver_has_electrical_degrees(tmp_path: Path) -> None:
+    spec = of_texts("track", {"ppr": "500", "clock": "20MHz", "tick": "100us", "electrical": "7"})
+    for file, text in register_files(RegisterMap(spec), "core").items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    calls = "core_degrees(0x4000), core_angle_of(-90), core_angle_of(359.999), 1u * CORE_ANGLE_SET_SET_MASK"
+    shown = 'printf("%g %u %u %u", CALLS)'.replace("CALLS", calls)
+    main = f'#include <stdio.h>\n#include "core_driver.h"\nint main(void) {{\n  {shown};\n  return 0;\n}}\n'
+    (tmp_path / "main.c").write_text(main)
+    build.run([*build.compiler(), *STRICT, "main.c", "-o", "main"], "compiler", tmp_path)
+    assert build.run([tmp_path / "main"], "main") == f"90 {0xC000} 0 {1 << 16}"
+
+
 def test_drivers_of_all_methods_are_strict_c(tmp_path: Path) -> None:
     """All in one program: no name of one meets that of another."""
     lines = []
