@@ -220,16 +220,27 @@ def respond(options: Texts, motion: Texts) -> Answer:
 def replay(options: Texts, capture: Texts, name: str, data: str) -> Answer:
     """Return what they show of a capture: the bytes of a file of this name, in base64."""
     core = _core(options)
+    return _of_capture(
+        core, capture, name, data, lambda one: _response(options, core, Source("the capture", one, None))
+    )
+
+
+def calibrate(options: Texts, capture: Texts, name: str, data: str) -> Answer:
+    """Return the report, the picture and the map of a disc, from a capture of a shaft that coasts down."""
+    from tachometry.cli.explore.disc import described  # Matplotlib is slow to import
+
+    return _of_capture(core := _core(options), capture, name, data, lambda one: described(one, core))
+
+
+def _of_capture(
+    core: TachometerSpec, capture: Texts, name: str, data: str, of: Callable[[Recording], Answer]
+) -> Answer:
     suffixes = re.search(r"(\.[a-z0-9]{1,10}){0,2}$", name.lower())
     with scratch() as folder:
         file = folder / f"capture{suffixes[0] if suffixes else ''}"
         try:
             file.write_bytes(base64.b64decode(data, validate=True))
-            return _run(
-                _captured,
-                capture,
-                lambda read: _response(options, core, Source("the capture", read(file, core), None)),
-            )
+            return _run(_captured, capture, lambda read: of(read(file, core)))
         except ValueError as error:
             raise Refused(f"the capture must come as base64: {error}") from error
         except Refused as error:
@@ -384,6 +395,5 @@ def _typed(texts: Texts) -> str:
     )
 
 
-FUNCTIONS: dict[str, Callable[..., Answer]] = {
-    function.__name__: function for function in (options, check, curves, files, respond, replay, estimate, size)
-}
+_ANSWERS = (options, check, curves, files, respond, replay, calibrate, estimate, size)
+FUNCTIONS: dict[str, Callable[..., Answer]] = {one.__name__: one for one in _ANSWERS}

@@ -14,6 +14,11 @@ _RADIUS_MM = 10
 
 def print_calibration(found: Calibration, spec: TachometerSpec) -> None:
     """Print the faults of the disc, and how far they are certain."""
+    print_rows(calibration_rows(found, spec))
+
+
+def calibration_rows(found: Calibration, spec: TachometerSpec) -> list[tuple[str, str]]:
+    """Return the lines of the report, names and values."""
     fit, n, table = found.fit, found.disc.counts_per_rev, np.array(found.disc.displacement)
     arc, first, waves = 360 * 60 / n, found.waves[:1].sum(), np.abs(found.waves)
     worst = int(np.argmax(np.abs(table)))
@@ -51,7 +56,7 @@ def print_calibration(found: Calibration, spec: TachometerSpec) -> None:
         ("certain to", f"{fit.error:.4f} counts RMS, {fit.error * arc:.2g}', by the two halves of the turns"),
         ("verdict", "refused" if found.reasons else verdict),
     ]
-    print_rows(rows)
+    return rows
 
 
 def _since(found: Calibration) -> Iterator[tuple[str, str]]:

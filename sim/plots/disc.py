@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 from matplotlib.ticker import MaxNLocator
 
-from tachometry.sim.plots.style import ERROR, ESTIMATE, FloatArray, save_figure
+from tachometry.sim.plots.style import ERROR, ESTIMATE, FloatArray, picture, save_figure
 from tachometry.sim.studies.calibrating.calibrate import Calibration
 from tachometry.sim.studies.calibrating.fit import harmonics, wave
 
@@ -21,6 +21,11 @@ _FEW = 400  # edges, whose dots can be large
 def save_disc(path: Path, found: Calibration) -> None:
     """Draw a disc into a `.png` or `.pdf`; equal ones give equal files."""
     save_figure(path, lambda: _draw(found))
+
+
+def disc_picture(found: Calibration) -> bytes:
+    """Return the same as the bytes of a `.png`."""
+    return picture(lambda: _draw(found), ".png")
 
 
 def _draw(found: Calibration) -> Figure:

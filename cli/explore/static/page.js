@@ -249,7 +249,7 @@ const respond = latest(async () => {
     responded(capture ? await ask("replay", { options: part("core"), capture: part("capture"), ...capture }) : await ask("respond", { options: part("core"), motion: { motion: $("o-motion").value.trim(), ...part("motion") } }));
     wrong(null, "moving");
     $("encoder").hidden = !!capture;
-    $("lines").hidden = !capture;
+    $("lines").hidden = $("disc").hidden = !capture;
     $("replayed").textContent = capture ? `${capture.name} is replayed; choose a motion to leave it.` : "or drop its file here: .sr, .csv, .vcd and others";
   } catch (error) { wrong(error, "moving"); }
 });
@@ -277,8 +277,31 @@ async function replay(file) {
   capture = { name: file.name, data: url.slice(url.indexOf(",") + 1) };
   $("preset").value = "";
   $("lines").hidden = false;
+  withoutDisc("from a capture of a shaft that coasts down");
   respond();
 }
+function withoutDisc(text) {
+  $("measured-disc").textContent = text;
+  $("disc-error").textContent = "";
+  $("disc-rows").replaceChildren();
+  $("disc-picture").hidden = true;
+}
+$("calibrate").addEventListener("click", async () => {
+  $("calibrate").disabled = true;
+  withoutDisc("Measuring the disc…");
+  try {
+    const { rows, picture, map, reasons } = await ask("calibrate", { options: part("core"), capture: part("capture"), ...capture });
+    $("disc-error").textContent = reasons.length ? `The map is refused: ${reasons.join("; ")}.` : "";
+    $("disc-rows").replaceChildren(...rows.map(([name, value]) => made("tr", {}, made("th", { scope: "row" }, name), made("td", {}, value))));
+    $("disc-picture").src = `data:image/png;base64,${picture}`;
+    $("disc-picture").hidden = false;
+    $("measured-disc").replaceChildren(...(map ? [made("a", { href: URL.createObjectURL(new Blob([map], { type: "application/json" })), download: "disc.json" }, "disc.json for --disc")] : []));
+  } catch (error) {
+    withoutDisc("");
+    $("disc-error").textContent = error.message;
+  }
+  $("calibrate").disabled = false;
+});
 $("file").addEventListener("change", () => { replay($("file").files[0]); $("file").value = ""; });
 for (const [kind, on] of [["dragover", true], ["dragleave", false], ["drop", false]]) $("moving").addEventListener(kind, event => {
   event.preventDefault();

@@ -15,6 +15,10 @@ from support.command import run
 from support.explored import explored
 from support.nightly import nightly
 
+from tachometry.sim.captures.sigrok import write_sr
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.virtual import VirtualEncoder
+
 pytestmark = nightly
 
 FLAGS = "--headless --no-sandbox --disable-gpu --no-first-run --disable-background-networking".split()
@@ -135,6 +139,18 @@ def test_curves_and_motions_and_captures(page: Page, tmp_path: Path) -> None:
     page.locator("#file").set_input_files(capture)
     expect(page.locator("#replayed")).to_contain_text("run.csv is replayed")
     expect(page.locator("#deviation")).to_be_hidden()
+    page.locator("summary", has_text="The disc").click()
+    page.get_by_role("button", name="Measure the disc").click()
+    expect(page.locator("#disc-error")).to_contain_text("captures must have more than 5 turns of 96 counts")
+    coast = tmp_path / "coast.sr"
+    recording = VirtualEncoder(24, eccentricity=0.25).record(parse_motion("ramp:150rad/s:60rad/s:3s")).recording
+    write_sr(coast, recording.place(2_000_000), 2_000_000)
+    page.locator("#file").set_input_files(coast)
+    expect(page.locator("#replayed")).to_contain_text("coast.sr is replayed")
+    page.get_by_role("button", name="Measure the disc").click()
+    expect(page.locator("#disc-rows")).to_contain_text("the map can be used")
+    expect(page.locator("#disc-picture")).to_be_visible()
+    expect(page.get_by_role("link", name="disc.json")).to_be_visible()
 
 
 def test_a_simulated_board_is_shown_live(page: Page) -> None:

@@ -22,6 +22,7 @@ from tachometry.cli.commands import load
 from tachometry.cli.explore.answers import FUNCTIONS, answer
 from tachometry.cli.explore.server import MOST_BYTES, page
 from tachometry.sim.captures.read import read_capture, with_last_tick
+from tachometry.sim.captures.sigrok import write_sr
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals.recording import PinTrace
@@ -265,6 +266,22 @@ def test_a_capture_is_replayed(client: TestClient, tmp_path_factory: pytest.Temp
     assert found["true"] is None
     assert found["curves"][0]["velocity"] == pytest.approx(curve.estimate.at(np.array(found["x"]) + 1e-9), rel=1e-5)
     assert abs(found["curves"][0]["velocity"][-1]) > 1
+
+
+@pytest.mark.parametrize(("motion", "certain"), [("ramp:150rad/s:60rad/s:3s", True), ("constant:100rad/s:2s", False)])
+def test_a_disc_is_measured(client: TestClient, motion: str, certain: bool, tmp_path_factory: Any) -> None:
+    """By the map of the command, with report and picture; a map that is not certain is not given."""
+    path = tmp_path_factory.mktemp("capture") / "coast.sr"
+    encoder = VirtualEncoder(24, index=True, eccentricity=0.25, jitter=0.05)
+    write_sr(path, encoder.record(parse_motion(motion)).recording.place(2_000_000), 2_000_000)
+    data, core = base64.b64encode(path.read_bytes()).decode(), {**CORE, "index": "yes"}
+    found = asked(client, "calibrate", options=core, capture={}, name="coast.sr", data=data)
+    assert base64.b64decode(found["picture"]).startswith(b"\x89PNG")
+    assert dict(found["rows"])["counts per turn"].startswith("96")
+    assert ("there is one speed" in str(found["reasons"]), bool(found["reasons"])) == (not certain, not certain)
+    out = path.with_name("disc.json")
+    assert run("calibrate", path, "--ppr", "24", "--index", "-o", out) == (0 if certain else 2)
+    assert found["map"] == (out.read_text() if certain else "")
 
 
 def replayed(client: TestClient, name: str, data: bytes, **capture: str) -> dict[str, Any]:
