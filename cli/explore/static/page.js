@@ -383,7 +383,8 @@ $("measure").addEventListener("click", async () => {
 
 const estimate = latest(async () => {
   if (!checked) return;
-  $("size").textContent = (await ask("estimate", { options: part("core") })).size;
+  // An option may be wrong since the check, which then comes anew.
+  $("size").textContent = (await ask("estimate", { options: part("core") }).catch(() => ({ size: "" }))).size;
 });
 
 const refresh = latest(async () => {
