@@ -1,10 +1,12 @@
 // The values of CXXRTL's text in as few words as they have bits. With CXXRTL's own header, whose words are arrays of 32
 // bits, a core takes four times as long to compile.
-#include <algorithm>
+#include <stddef.h>
 #include <cstdint>
-#include <iterator>
-#include <memory>
 #include <vector>
+#ifndef __GLIBCXX__  // whose vector has copy, equal, min and swap; the rest takes a quarter of the time of a small core
+#include <algorithm>
+#include <iterator>
+#endif
 
 // More than 128 bits, which are not multiplied.
 template <size_t parts> struct Wide {
@@ -209,8 +211,8 @@ template <size_t width> struct memory {
     const Write *begin() const { return &write; }
     const Write *end() const { return begin() + any; }
   } write_queue;
-  std::unique_ptr<word[]> data;
-  explicit memory(size_t depth) : data(new word[depth]) {}
+  std::vector<word> data;
+  explicit memory(size_t depth) : data(depth) {}
   const word &operator[](size_t index) const { return data[index]; }
   void update(size_t index, const word &val, const word &mask, int) {
     write_queue.write = {index, val, mask};

@@ -42,7 +42,7 @@ CORES = {
 Generated = Callable[..., Path]
 
 
-@pytest.mark.parametrize("core", only(["rio", "loop", "external ticks"], [*CORES]))
+@pytest.mark.parametrize("core", only(["rio", "loop"], [*CORES]))
 def test_what_is_generated_is_right_and_a_change_of_any_file_is_found(core: str, generated: Generated) -> None:
     folder = generated("core", *CORES[core].split())
     made = cache(core_files)  # once, not for every change
