@@ -142,7 +142,7 @@ class Option:
         """Return a text that is read as this value."""
         if isinstance(value, bool):
             return ("no", "yes")[value]
-        return str(getattr(self.parse, "written", str)(value))
+        return str(getattr(self.parse_at or self.parse, "written", str)(value))
 
 
 def option(default: Any, help: str, *, text: str | None = None, also: tuple[Option, ...] = (), **about: Any) -> Any:

@@ -76,11 +76,13 @@ def read_quantity(what: str, text: str, units: Units, default: str = "", also: s
     unit = _in_table(plain_unit(match[3]), units) or default if match else ""
     if match is None or unit not in units:
         names = ", ".join(filter(None, units))
-        allowed = f"in {names} (default {default})" if default else f"with one of the units {names}"
+        allowed = f"with {'one of the units' if ',' in names else 'the unit'} {names}"
+        if default:
+            allowed = f"in {names} (default {default})"
         if "" in units:
             allowed = names and f"or one in {names}"
         typed = [f"{match[1]}{name}" for name in units] if match and not match[3] else []
-        hint = f": type {', '.join(typed[:-1])} or {typed[-1]}" if typed and not also else ""
+        hint = f": type {' or '.join(filter(None, (', '.join(typed[:-1]), *typed[-1:])))}" if typed and not also else ""
         raise ParameterError(what, f"{' '.join(filter(None, ('must be a number', allowed, also)))}{hint}, not {text!r}")
     value = Fraction(match[1]) / int(match[2] or 1)
     if value and not _LEAST <= abs(value) <= _GREATEST:

@@ -68,11 +68,13 @@ test_verilog = in_icarus(CASES[0])
 test_refusals = refused(
     {
         "electrical=0": "electrical must be from 1 to 512",
-        "electrical=7 lead=65536": "lead must be from 0 to 65535, not 65536",
-        "electrical=7 electrical-offset=1rad": "electrical_offset must be a number or one in deg, not '1rad'",
+        "electrical=7 lead=65536clk": "lead must be from 0clk to 65535clk, 3277 ticks, not '65536clk'",
+        "electrical=7 electrical-offset=12.3": "electrical_offset must be a number with the unit deg: type 12.3deg",
+        "electrical=7 electrical-offset=400deg": "electrical_offset must be from -360deg to 360deg",
+        "electrical=7 lead=1.5": "lead must be a number with .*: type 1.5tick, ",
         "electrical=60": "electrical must be at most 49",
         "electrical=7": "electrical needs a tick of 43 clocks: take a longer --tick",
-        "lead=3": "lead must be given together with --electrical",
+        "lead=3clk": "lead must be given together with --electrical",
     }
 )
 
@@ -85,12 +87,12 @@ def test_the_phase_is_there_so_many_clocks_after_an_update(multiplier: str, cloc
 
 def test_pole_pairs_beside_the_lines_are_those_of_the_motor() -> None:
     """With halls they are those of the halls."""
-    texts = {"clock": "48MHz", "tick": "100us", "pole-pairs": "7", "lead": "1tick"}
+    texts = {"clock": "48MHz", "tick": "100us", "pole-pairs": "7", "lead": "1tick", "electrical-offset": "0"}
     for encoder in ({"lines": "1000"}, {"cpr": "20000"}, {"ppr": "90", "sensor": "up-down"}):
         spec = of_texts("auto", texts | encoder)
         assert (spec.options["electrical"], "pole-pairs" in spec.options) == ("7", False)
         assert of_options(spec.options).options == spec.options
-    with pytest.raises(ValueError, match="pole_pairs must not be given together with --lines"):
+    with pytest.raises(ValueError, match="pole_pairs must not be given together with --electrical"):
         of_texts("s", texts | {"lines": "1000", "electrical": "7"})
     assert not of_texts("s", {"clock": "48MHz", "pole-pairs": "7", "sensor": "Hall"}).extras
 

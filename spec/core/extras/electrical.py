@@ -18,11 +18,12 @@ from tachometry.spec.language.port import FINE, TICK, Port, held, pin
 from tachometry.spec.language.units import DEGREES, TIME, Unit, read_quantity
 
 REFUSED = "angle_refused"
+_MOST_LEAD = 65535
 REFUSED_BITS = 16  # of the number of refused indices, which stays at its end
 _UNIT = f"2^-{SHOWN_BITS} electrical turns"
 _POLE_PAIRS = """Electrical angle of a motor with P pole pairs, 1 to 512. Outputs angle, in 2^-16 electrical turns and \
 new in every clock, and angle_valid. It is 0 at the index, at the rise of A of halls, or what angle_set sets it to."""
-_OFFSET = "Electrical angle that is added, as 12.3deg. Or a number of 2^-16 turns. ANGLE_OFFSET begins with it."
+_OFFSET = "Electrical angle that is added, as 12.3deg. Register ANGLE_OFFSET begins with it."
 _USE = """Time from the angle at the port to its use, as 1.5tick. Or 75us, or 300clk; below 65536 clocks. The angle \
 is that of the motor so much later. Register ANGLE_LEAD begins with it. With track it also outputs velocity_lead and \
 position_lead, of that instant."""
@@ -34,16 +35,28 @@ _TABLE = """As --sincos, by a table of sines in a block RAM. It takes a quarter 
 
 
 def parse_offset(what: str, text: str) -> int:
-    """Return an angle in 2^-16 turns, from degrees or a number of these."""
-    value, unit = read_quantity(what, text, {"": Unit(), **DEGREES})
-    return round(value * (1 << SHOWN_BITS) / 360 if unit else value) % (1 << SHOWN_BITS)
+    """Return an angle in 2^-16 turns, from degrees."""
+    value, _ = read_quantity(what, "0deg" if text.strip() == "0" else text, DEGREES)
+    if abs(value) > 360:
+        raise ParameterError(what, f"must be from -360deg to 360deg, not {text!r}")
+    return round(value * (1 << SHOWN_BITS) / 360) % (1 << SHOWN_BITS)
+
+
+parse_offset.written = lambda turns: f"{turns * 360 / (1 << SHOWN_BITS)!r}deg"  # type: ignore[attr-defined]
 
 
 def parse_lead(what: str, text: str, timing: Mapping[str, Any]) -> int:
     """Return a time in clocks, from a time, ticks or clocks."""
-    value, unit = read_quantity(what, text, {**TIME, "tick": Unit(), "clk": Unit()}, "clk")
+    value, unit = read_quantity(what, "0clk" if text.strip() == "0" else text, {"tick": Unit(), **TIME, "clk": Unit()})
     clocks = {"tick": timing["tick_cycles"], "clk": 1}
-    return round(value * (clocks[unit] if unit in clocks else TIME[unit].exact * timing["clock_hz"]))
+    found = round(value * (clocks[unit] if unit in clocks else TIME[unit].exact * timing["clock_hz"]))
+    if not 0 <= found <= _MOST_LEAD:
+        most = f"{_MOST_LEAD}clk, {_MOST_LEAD / timing['tick_cycles']:.4g} ticks"
+        raise ParameterError(what, f"must be from 0clk to {most}, not {text!r}")
+    return found
+
+
+parse_lead.written = "{}clk".format  # type: ignore[attr-defined]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +73,14 @@ class ElectricalAngle(Extra):
         0, _OFFSET, name="electrical-offset", metavar="ANGLE", parse=parse_offset, tests=("", "30deg"), tacit=True
     )
     lead: int | None = option(
-        None, _USE, shown="0", metavar="TIME", parse_at=parse_lead, limits=(0, 65535), tests=("", "1.5tick"), tacit=True
+        None,
+        _USE,
+        shown="0",
+        metavar="TIME",
+        parse_at=parse_lead,
+        limits=(0, _MOST_LEAD),
+        tests=("", "1.5tick"),
+        tacit=True,
     )
     sincos: bool = option(False, _SINCOS, tests=("", "yes"), tacit=True)
 
@@ -79,8 +99,10 @@ class ElectricalAngle(Extra):
     @classmethod
     def respelled(cls, texts: Mapping[str, str]) -> Mapping[str, str]:
         halls = texts.get("sensor", "").strip().lower() == "hall"
-        if halls or cls.name in texts or not {"lines", "ppr", "cpr"} & texts.keys():
+        if halls or not {"lines", "ppr", "cpr"} & texts.keys():
             return texts
+        if {cls.name, "pole-pairs"} <= texts.keys():
+            raise ParameterError("pole_pairs", "must not be given together with --electrical, which means the same")
         return {cls.name if name == "pole-pairs" else name: text for name, text in texts.items()}
 
     def angles(self, spec: Numbers) -> Angles:
@@ -131,7 +153,8 @@ class ElectricalAngle(Extra):
         yield Pin(pin("angle_value", text, SHOWN_BITS), act=True)
 
     def ports(self, spec: Numbers) -> Iterable[Port]:
-        text = "Electrical angle, ANGLE_LEAD clocks after this one. It also changes between ticks, in every clock."
+        use = f"{self.ahead} clocks (ANGLE_LEAD) after"
+        text = f"Electrical angle, {use} this one. It also changes between ticks, in every clock."
         yield held(TICK, "angle", SHOWN_BITS, unit=_UNIT, help=text)
         text = "The angle is that of the motor: by an index, by halls, or set. It also changes between ticks."
         yield held(TICK, "angle_valid", help=text)
@@ -139,7 +162,7 @@ class ElectricalAngle(Extra):
             text = "Refused indices: the angle was off by more than 1/16 turn. It also changes between ticks, to 65535."
             yield held(TICK, REFUSED, REFUSED_BITS, unit="indices", help=text)
         if led := self.angles(spec).led:
-            when = "ANGLE_LEAD clocks after the one in which it is new: once a tick, tick_to_lead clocks after that."
+            when = f"{use} the one in which it is new: once a tick, tick_to_lead clocks after that."
             place = next(one for one in spec.method_ports if one.name == FINE)
             unit = f"2^{-spec.velocity.frac_bits} {spec.unit}"
             yield held(TICK, LEADS[0], led.width, signed=True, unit=unit, help=f"Velocity {when}")
