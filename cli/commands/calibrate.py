@@ -87,4 +87,5 @@ def _read_disc(path: Path) -> Disc:
     try:
         return Disc.parse(read_text(path, MOST_BYTES))
     except ValueError as error:
-        raise ValueError(f"--against {path} {error}") from error
+        why = "it is no text" if isinstance(error, UnicodeDecodeError) else error
+        raise ValueError(f"--against {path} must be a file that tachometry calibrate -o wrote: {why}") from error

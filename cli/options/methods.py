@@ -60,6 +60,8 @@ def listed_methods(text: str, others: Collection[str] = ()) -> list[tuple[str, s
             methods.append((name, method, own_texts(method, words)))
         elif method in others:
             methods.append((name, None, {}))
+        elif name == "all":
+            raise ValueError(f"--methods must be all alone, or a list without it, not {text!r}")
         else:
             raise ValueError(f"--methods must be of {', '.join([AUTO, *METHODS, *others])}, or all, not {name!r}")
     return methods

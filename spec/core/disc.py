@@ -45,7 +45,7 @@ class Disc:
             values = {about.name: found[about.name] for about in fields(Disc)}
             tuples = {name: tuple(map(float, values[name])) for name in ("displacement", "speeds_rad_per_s")}
         except (ValueError, TypeError, KeyError, RecursionError):
-            raise ValueError("must be a file that tachometry calibrate has written") from None
+            raise ValueError("it has no map of a disc") from None
         if found.get("format") != FORMAT:
-            raise ValueError(f"must have format {FORMAT}, not {found.get('format')!r}")
+            raise ValueError(f"its format must be {FORMAT}, not {found.get('format')!r}")
         return Disc(**values | tuples)

@@ -116,13 +116,17 @@ test_refusals = refused(
     [
         ("mt", "disc=far.json", ""),
         ("s", "disc=far.json", "must not be given with method s"),
-        ("mt", "disc=none.json", "disc must be a file of tachometry calibrate: none.json: "),
-        ("mt", "disc=far.json ppr=24", "must be the map of this encoder, not of 100 counts a turn with x4 decoding"),
-        ("mt", "disc=other.json index=yes", "must have the index at 2, as --index-at, not None"),
+        ("mt", "disc=none.json", "disc must be a file that can be read, not 'none.json': "),
+        (
+            "mt",
+            "disc=far.json ppr=24",
+            "must be the map of this encoder, 96 counts a turn with x4 decoding, not of 100 with x4",
+        ),
+        ("mt", "disc=other.json index=yes", "must have an index: type tachometry calibrate with --index"),
         ("mt", "disc=far.json index=yes index-at=A=0,B=1", "must have the index at 3, as --index-at, not 2"),
         ("mt", "disc-table=edges ppr=4097", "disc_table must be of at most 16384 counts per turn, not 16388"),
         ("mt", "disc-table=sectors:3", "disc_table must be of 4 to 256 sectors, not 3"),
-        ("mt", "disc-table=edge", "disc_table must be none, edges or sectors:N, as sectors:32, not edge"),
+        ("mt", "disc-table=edge", "disc_table must be none, edges or sectors:N, N from 4 to 256, not edge"),
         ("mt", "disc-table=sectors", "disc_table must be edges without --disc: no program writes sectors"),
         (
             "t",

@@ -49,8 +49,11 @@ def parse_disc(what: str, text: str) -> DiscFile:
     """Read the map from the file of this name; ParameterError if it has none."""
     try:
         return DiscFile(text, Disc.parse(read_text(Path(text), MOST_BYTES)))
-    except (OSError, ValueError) as error:
-        raise ParameterError(what, f"must be a file of tachometry calibrate: {text}: {error}") from error
+    except OSError as error:
+        raise ParameterError(what, f"must be a file that can be read, not {text!r}: {error.strerror}") from error
+    except ValueError as error:
+        why = "it is no text" if isinstance(error, UnicodeDecodeError) else error
+        raise ParameterError(what, f"must be a file that tachometry calibrate -o wrote, not {text!r}: {why}") from error
 
 
 def _parse_table(what: str, text: str) -> str:
@@ -58,7 +61,9 @@ def _parse_table(what: str, text: str) -> str:
     if form != "sectors" or (text != form and not (number.isascii() and number.isdigit() and len(number) < 4)):
         if text in ("none", "edges"):
             return text
-        raise ParameterError(what, f"must be none, edges or sectors:N, as sectors:{_SECTORS}, not {text}")
+        raise ParameterError(
+            what, f"must be none, edges or sectors:N, N from {_LEAST_SECTORS} to {_MOST_SECTORS}, not {text}"
+        )
     if not _LEAST_SECTORS <= int(number or _SECTORS) <= _MOST_SECTORS:
         raise ParameterError(what, f"must be of {_LEAST_SECTORS} to {_MOST_SECTORS} sectors, not {number}")
     return text
@@ -145,8 +150,10 @@ class DiscMap(Extra):
         }
         if disc:
             refusals |= {
-                f"must be the map of this encoder, not of {disc.counts_per_rev} counts a turn with x{disc.decoding} "
-                "decoding": (disc.counts_per_rev, disc.decoding) != own,
+                f"must be the map of this encoder, {own[0]} counts a turn with x{own[1]} decoding, not of "
+                f"{disc.counts_per_rev} with x{disc.decoding}": (disc.counts_per_rev, disc.decoding) != own,
+                "must have an index: type tachometry calibrate with --index": place is not None
+                and disc.index_place is None,
                 f"must have the index at {place}, as --index-at, not {disc.index_place}: see tachometry calibrate": (
                     place not in (None, disc.index_place)
                 ),

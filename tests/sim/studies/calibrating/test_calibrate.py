@@ -138,10 +138,10 @@ def test_a_map_is_read_as_it_is_written() -> None:
     disc = found(recorded()).disc
     assert Disc.parse(disc.text) == disc
     for text in ("", "[]", "{}", "1", disc.text.replace("-0.", "-Infinity")[:-9], "[" * 100_000):
-        with pytest.raises(ValueError, match="must be a file that tachometry calibrate has written"):
+        with pytest.raises(ValueError, match="it has no map of a disc"):
             Disc.parse(text)
     for before, after, message in (
-        ('"format": 1', '"format": 2', "must have format 1, not 2"),
+        ('"format": 1', '"format": 2', "its format must be 1, not 2"),
         ('_rev": 200', '_rev": 201', "must have 201 displacements, not 200"),
     ):
         with pytest.raises(ValueError, match=message):
