@@ -15,6 +15,7 @@ def lay_out() -> None:
     """Put all pages where mkdocs.yml finds them: those of docs/, and what lies beside it; without links to tests."""
     shutil.rmtree(PAGES, ignore_errors=True)
     shutil.copytree(ROOT / "docs", PAGES)
+    shutil.copytree(ROOT / "examples", PAGES / "examples", ignore=shutil.ignore_patterns("papers"))
     for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE"):
         shutil.copy(ROOT / name, PAGES / name.replace("README", "index"))
     for page in PAGES.rglob("*.md"):

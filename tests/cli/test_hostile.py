@@ -185,6 +185,8 @@ def table() -> dict[str, list[Row]]:
             continue
         options, _, message = line.partition(" => ")
         starts = [" ".join(without(start.replace("CORE", CORE).split(), options.split())) for start in before]
+        if "--method " in options:  # others have --methods
+            starts = [start for start in starts if start.split()[0] not in ("compare", "sweep")]
         groups[group] += [Row(f"{start} {options}".replace("CORE", CORE).strip(), message) for start in starts]
     return groups
 

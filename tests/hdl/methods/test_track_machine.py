@@ -12,7 +12,7 @@ from support.tracking import Interpreter, core, windows
 from tachometry.hdl.methods import track_machine
 from tachometry.sim.golden.methods.track_recursion import Recursion, log2
 from tachometry.spec import TrackTachometer
-from tachometry.spec.formats.tracking_code import OUTPUTS, Instruction, Program
+from tachometry.spec.formats.tracking_code import Instruction, Program
 from tachometry.spec.formats.tracking_units import Start
 
 CORES = {
@@ -21,7 +21,6 @@ CORES = {
     "block": core(multiplier="block", external_tick="yes", max_tick_period="683us", ppr="81000"),
 }
 NAMES = ("number", "times", "places", "last", "moved", "kind", "down", "end", "length")
-SHOWN = OUTPUTS[1:]
 
 
 def check(spec: TrackTachometer, rows: Sequence[Sequence[int]], play: Player = clock_by_clock) -> int:
@@ -32,13 +31,13 @@ def check(spec: TrackTachometer, rows: Sequence[Sequence[int]], play: Player = c
     for row in rows:
         # What the tick had comes a clock after it, as it comes from the front end.
         inputs += [{"begin": 1}, {"begin": 0, **dict(zip(NAMES, row, strict=True))}, *[{}] * (spacing - 2)]
-    seen = play(track_machine.TrackMachine(program), inputs, SHOWN)
+    seen = play(track_machine.TrackMachine(program), inputs, program.outputs)
     right = Interpreter(program)
     for number, row in enumerate(rows):
         expected = right.tick(*row)
         for after in (program.clocks - 1, spacing - 1):
             shown = seen[number * spacing + after]
-            assert tuple(shown[name] for name in SHOWN) == expected, f"tick {number}, {after} clocks later"
+            assert tuple(shown[name] for name in program.outputs) == expected, f"tick {number}, {after} clocks later"
     return len(right.met)
 
 
