@@ -59,12 +59,13 @@ class Changes:
     """Recording in the making, from changes of variables.
 
     It begins when all lines have first been 0 or 1. What is neither, later on, is as before. Lines are given as to
-    `choose_channels`; numbers count the variables of one bit.
+    `choose_channels`; numbers count the variables of one bit, and what is
+    declared twice is one of them.
     """
 
     def __init__(self, path: Path, variables: Sequence[Variable], wanted: Channels) -> None:
         self._path, self._lines = path, ("a", "b", *wanted.others)
-        ordered = sorted(variables, key=lambda variable: variable.size > 1)
+        ordered = sorted(dict.fromkeys(variables), key=lambda variable: variable.size > 1)
         self._names = {number: variable.name for number, variable in enumerate(ordered)}
         scalars = {number: self._names[number] for number, variable in enumerate(ordered) if variable.size == 1}
         vectors = {number: name for number, name in self._names.items() if number not in scalars}
