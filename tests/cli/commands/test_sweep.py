@@ -1,9 +1,13 @@
 """`tachometry sweep`: what it runs, keeps, tells and draws."""
 
+import random
 import re
+import signal
 import socket
+import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,6 +16,7 @@ import pyarrow.parquet as pq
 import pytest
 from distributed import LocalCluster
 from support import command
+from support.nightly import nightly
 
 from tachometry.sim.studies.sweeping import results, sweep
 from tachometry.sim.studies.sweeping.sweep import COLUMNS
@@ -231,6 +236,27 @@ def test_a_scheduler_that_goes_is_one_line(
     assert err.endswith(f"{file}: the same command goes on from there\n")
     assert err.count("\n") == 1
     assert 0 < len(rows(file)) == int(found[1]) < 400
+
+
+@nightly  # the next file kills a sweep at a known point
+def test_a_sweep_that_is_killed_and_goes_on_has_the_same_bytes(tmp_path: Path) -> None:
+    """Two workers, killed five times after a random share of the points; a seed that fails is printed."""
+    seed = random.randrange(2**32)
+    print("seed", seed)
+    rng = random.Random(seed)
+    axes = ["--methods", "s", "--vary", "speed=5rad/s..50rad/s:500", "--vary", "seed=1,2"]
+    line = ["sweep", *CORE, *MOTION, *axes, "--jobs", "2", "--results"]
+    whole, parts = tmp_path / "whole.parquet", tmp_path / "parts.parquet"
+    assert run(*line[1:], whole) == 0
+    for most in range(1, 6):
+        with subprocess.Popen([sys.executable, "-m", "tachometry", *line, parts], stdout=subprocess.DEVNULL) as sweep:
+            journal, least = tmp_path / ".parts.parquet.new", rng.uniform(0, 80_000)
+            while sweep.poll() is None and not (journal.exists() and journal.stat().st_size > least):
+                time.sleep(0.01)
+            sweep.kill()
+        assert sweep.returncode in (0, -signal.SIGKILL), most
+    assert run(*line[1:], parts) == 0
+    assert parts.read_bytes() == whole.read_bytes()
 
 
 @pytest.mark.parametrize("name", ["distributed", "pyarrow"])
