@@ -264,9 +264,8 @@ def compare(specs: Sequence[TachometerSpec], motion: str, **encoder: Unpack[Enco
         raise ValueError("specs must be of different methods, at least one")
     truth = _recorded(specs[0], motion, 0, encoder)
     source = Source("motion", truth.recording, truth.true_speed, truth.true_angle)
-    return comparison(
-        shown_in_unit_of(motion, specs[0]), dict(named), lambda method, texts: named[method], source, Judging()
-    )
+    spec = shown_in_unit_of(motion, specs[0])
+    return comparison(spec, dict(named), lambda method, texts: named[method], source, Judging())
 
 
 def generate(

@@ -16,8 +16,7 @@ from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim.signals.recording import Recording
 from tachometry.sim.studies.calibrating.calibrate import calibrate as calibration_of
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.disc import MOST_BYTES, Disc
-from tachometry.spec.language.files import read_text
+from tachometry.spec.core.disc import Disc
 
 
 @click.command(
@@ -85,7 +84,6 @@ def calibrate(
 
 def _read_disc(path: Path) -> Disc:
     try:
-        return Disc.parse(read_text(path, MOST_BYTES))
+        return Disc.read(path)
     except ValueError as error:
-        why = "it is no text" if isinstance(error, UnicodeDecodeError) else error
-        raise ValueError(f"--against {path} must be a file that tachometry calibrate -o wrote: {why}") from error
+        raise ValueError(f"--against {error}") from error

@@ -26,8 +26,9 @@ def print_plan(core: CoreSpec, plans: Plans, unit: str, bus: Bus | None, size: E
     per_unit = SpeedUnit(unit).rad_per_s
     heads = (f"speed ({unit})", "counts/tick", "m_s (ticks)", "T_m", f"Q_V ({unit})", "error/V (%)", "update by")
     rows = []
-    columns = zip(*(column.tolist() for column in vars(expected).values() if not isinstance(column, str)), strict=True)
-    for speed, counts, m_s, t_m, q_v, forced, _ in columns:
+    times = expected.interval, expected.measurement_time
+    columns = expected.speed, expected.counts_per_tick, *times, expected.resolution, expected.forced
+    for speed, counts, m_s, t_m, q_v, forced in zip(*(column.tolist() for column in columns), strict=True):
         cells = (
             f"{speed / per_unit:.6g}",
             f"{counts:.6g}",

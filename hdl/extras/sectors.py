@@ -33,13 +33,11 @@ class SectorTable(wiring.Component):
         m = Module()
         table = self._table
         values, half = table.values, 1 << table.fine - 1
-        slopes = [
-            *table.slopes,
-            *table.slopes[-1:] * (-len(table.slopes) % (1 << (len(table.slopes) - 1).bit_length())),
-        ]
+        depth = 1 << (len(table.slopes) - 1).bit_length()
+        slopes = [*table.slopes, *table.slopes[-1:] * (depth - len(table.slopes))]
         value = Signal(signed((max(map(abs, values)) + half).bit_length() + 1), init=half)
         slope = Signal(signed(SLOPE_BITS))
-        sector = Signal(range(len(slopes)))
+        sector = Signal(range(depth))
         begins = self.back & ~self.place[: table.bits].any()  # backward from the first edge of a sector
         m.d.comb += sector.eq((self.place >> table.bits) - begins)  # below the first one is the last one
         m.d.sync += slope.eq(Array(slopes)[sector])

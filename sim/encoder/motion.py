@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tachometry.sim.signals.files import file_of
 from tachometry.spec.language.option import ParameterError
-from tachometry.spec.language.units import ANGLE, FREQUENCY, PLAIN, SPEED, TIME, TORQUE, Units, read_nearest
+from tachometry.spec.language.units import ANGLE, FREQUENCY, PLAIN, SPEED, TIME, TORQUE, Units, is_zero, read_nearest
 
 FloatArray = NDArray[np.float64]
 
@@ -276,8 +276,7 @@ def _parse_segment(text: str) -> list[_Segment]:
                 raise ValueError(f"JERK of s-curve must be more than 0 and change the speed, not {number!r}")
             values.append(math.sqrt(2 * math.pi * abs(values[1] - values[0]) / steepest))
             continue
-        zero = number.strip() in ("0", "0.0")
-        plain = "" if units in (SPEED, TIME) and not zero else default  # 300 may be rad/s or rpm
+        plain = "" if units in (SPEED, TIME) and not is_zero(number) else default  # 300 may be rad/s or rpm
         value = read_nearest(f"{name} of {kind}", number, units, plain)
         if units not in _SIGNED and value <= 0 and (name != "FRICTION" or value < 0):
             raise ValueError(f"{name} of {kind} must be more than 0{f' {default}' * bool(default)}, not {number!r}")

@@ -3,9 +3,12 @@
 import json
 import math
 from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+from tachometry.spec.language.files import read_text
 
 FORMAT = 1
-MOST_BYTES = 1 << 28  # of a file
+_MOST_BYTES = 1 << 28  # of a file
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,15 @@ class Disc:
         """The file: JSON, a value a line."""
         values = {"format": FORMAT, **asdict(self)}.items()
         return "{\n" + ",\n".join(f'"{name}": {json.dumps(value)}' for name, value in values) + "\n}\n"
+
+    @staticmethod
+    def read(path: Path) -> "Disc":
+        """Return the map in a file; OSError if it cannot be read, ValueError if it has none."""
+        try:
+            return Disc.parse(read_text(path, _MOST_BYTES))
+        except ValueError as error:
+            why = "it is no text" if isinstance(error, UnicodeDecodeError) else error
+            raise ValueError(f"must be a file that tachometry calibrate -o wrote, not '{path}': {why}") from error
 
     @staticmethod
     def parse(text: str) -> "Disc":

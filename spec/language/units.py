@@ -90,6 +90,11 @@ def read_quantity(what: str, text: str, units: Units, default: str = "", also: s
     return value, unit
 
 
+def is_zero(text: str) -> bool:
+    """Return whether a text is the number 0, which needs no unit."""
+    return re.fullmatch(r"0+(\.0*)?", text.strip()) is not None
+
+
 def plain_unit(unit: str) -> str:
     """Return the name of a unit in the tables, such as `us` for `µs`."""
     return re.sub("^[µμ]", "u", unit)
@@ -298,7 +303,7 @@ class Speed:
 
 def parse_speed(what: str, text: str) -> Speed:
     """Read a speed with its unit, for an option."""
-    value, unit = (Fraction(0), "") if re.fullmatch(r"0+(\.0*)?", text.strip()) else read_quantity(what, text, SPEED)
+    value, unit = (Fraction(0), "") if is_zero(text) else read_quantity(what, text, SPEED)
     if value <= 0:
         raise ParameterError(what, f"must be greater than 0, not {text}: leave it out for none")
     return Speed(value, unit)

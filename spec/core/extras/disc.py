@@ -9,14 +9,13 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from tachometry.spec.core.disc import MOST_BYTES, Disc
+from tachometry.spec.core.disc import Disc
 from tachometry.spec.core.extras.extra import Event, Extra
 from tachometry.spec.core.front_end import FrontEnd, Pin
 from tachometry.spec.core.numbers import Numbers
 from tachometry.spec.formats.displacement import ENTRY_BITS, FINEST, Displacement
 from tachometry.spec.formats.sectors import Sectors, sectors_of
 from tachometry.spec.language.field import Draft, Field
-from tachometry.spec.language.files import read_text
 from tachometry.spec.language.option import ParameterError, option
 from tachometry.spec.language.port import TICK, Port, held, pin, strobe
 from tachometry.spec.language.units import format_time
@@ -48,25 +47,20 @@ class DiscFile:
 def parse_disc(what: str, text: str) -> DiscFile:
     """Read the map from the file of this name; ParameterError if it has none."""
     try:
-        return DiscFile(text, Disc.parse(read_text(Path(text), MOST_BYTES)))
+        return DiscFile(text, Disc.read(Path(text)))
     except OSError as error:
         raise ParameterError(what, f"must be a file that can be read, not {text!r}: {error.strerror}") from error
     except ValueError as error:
-        why = "it is no text" if isinstance(error, UnicodeDecodeError) else error
-        raise ParameterError(what, f"must be a file that tachometry calibrate -o wrote, not {text!r}: {why}") from error
+        raise ParameterError(what, str(error)) from error
 
 
 def _parse_table(what: str, text: str) -> str:
     form, _, number = text.partition(":")
-    if form != "sectors" or (text != form and not (number.isascii() and number.isdigit() and len(number) < 4)):
-        if text in ("none", "edges"):
-            return text
-        raise ParameterError(
-            what, f"must be none, edges or sectors:N, N from {_LEAST_SECTORS} to {_MOST_SECTORS}, not {text}"
-        )
-    if not _LEAST_SECTORS <= int(number or _SECTORS) <= _MOST_SECTORS:
-        raise ParameterError(what, f"must be of {_LEAST_SECTORS} to {_MOST_SECTORS} sectors, not {number}")
-    return text
+    many = number.isascii() and number.isdigit() and len(number) < 4 and _LEAST_SECTORS <= int(number) <= _MOST_SECTORS
+    if text in ("none", "edges", "sectors") or (form == "sectors" and many):
+        return text
+    form = f"none, edges or sectors:N, N from {_LEAST_SECTORS} to {_MOST_SECTORS}"
+    raise ParameterError(what, f"must be {form}, not {text}")
 
 
 def _format(spec: Numbers, finest: Fraction) -> Displacement:
@@ -122,9 +116,7 @@ class DiscMap(Extra):
             raise ParameterError("disc_table", str(error)) from error
 
     def entries(self, spec: Numbers) -> tuple[int, ...]:
-        """Return the table after configuration: the displacements of all edges, or the slopes of all sectors."""
-        if table := self.sectors(spec):
-            return table.slopes
+        """Return the table of edges after configuration."""
         known = self.file.disc.displacement if self.file else (0.0,) * spec.encoder.encoder_counts
         return tuple(round(each / float(self.displacement(spec).unit)) for each in known)
 
@@ -209,10 +201,9 @@ class DiscMap(Extra):
         return {} if self.index_place(spec) is None else {"disc_slip": event}
 
     def entry(self, spec: Numbers) -> dict[str, Any]:
-        unit, table = float(self.displacement(spec).unit), self.entries(spec)
-        sectors = self.sectors(spec)
-        words, size = ((*table, *sectors.quarters), 2) if sectors else (table, 1)
-        content = b"".join((each % (1 << 8 * size)).to_bytes(size, "little") for each in words)
+        unit, sectors = float(self.displacement(spec).unit), self.sectors(spec)
+        table, own, size = (sectors.slopes, sectors.quarters, 2) if sectors else (self.entries(spec), (), 1)
+        content = b"".join((each % (1 << 8 * size)).to_bytes(size, "little") for each in (*table, *own))
         return {
             "form": "sectors" if sectors else "edges", "entries": len(table), "counts_per_lsb": unit,
             "index_place": self.index_place(spec), "writable": self.writable,

@@ -15,10 +15,9 @@ from tachometry.spec.formats.velocity_output import VelocityOutput
 from tachometry.spec.language.field import Draft, Field
 from tachometry.spec.language.option import REQUIRED, ParameterError, option, parse_whole
 from tachometry.spec.language.port import FINE, TICK, Port, held, pin
-from tachometry.spec.language.units import DEGREES, TIME, Unit, read_quantity
+from tachometry.spec.language.units import DEGREES, TIME, Unit, is_zero, read_quantity
 
 REFUSED = "angle_refused"
-_MOST_LEAD = 65535
 REFUSED_BITS = 16  # of the number of refused indices, which stays at its end
 _UNIT = f"2^-{SHOWN_BITS} electrical turns"
 _POLE_PAIRS = """Electrical angle of a motor with P pole pairs, 1 to 512. Outputs angle, in 2^-16 electrical turns and \
@@ -30,13 +29,12 @@ position_lead, of that instant."""
 LEADS = ("velocity_lead", "position_lead")
 _SINCOS = """Outputs angle_sin and angle_cos, from -32767 to 32767. CORDIC computes new ones every 16 clocks, for the \
 instant that --lead gives."""
-
 _TABLE = """As --sincos, by a table of sines in a block RAM. It takes a quarter of the cells of CORDIC."""
 
 
 def parse_offset(what: str, text: str) -> int:
     """Return an angle in 2^-16 turns, from degrees."""
-    value, _ = read_quantity(what, "0deg" if text.strip() == "0" else text, DEGREES)
+    value, _ = read_quantity(what, text, DEGREES, "deg" if is_zero(text) else "")
     if abs(value) > 360:
         raise ParameterError(what, f"must be from -360deg to 360deg, not {text!r}")
     return round(value * (1 << SHOWN_BITS) / 360) % (1 << SHOWN_BITS)
@@ -47,12 +45,13 @@ parse_offset.written = lambda turns: f"{turns * 360 / (1 << SHOWN_BITS)!r}deg"  
 
 def parse_lead(what: str, text: str, timing: Mapping[str, Any]) -> int:
     """Return a time in clocks, from a time, ticks or clocks."""
-    value, unit = read_quantity(what, "0clk" if text.strip() == "0" else text, {"tick": Unit(), **TIME, "clk": Unit()})
-    clocks = {"tick": timing["tick_cycles"], "clk": 1}
+    units = {"tick": Unit(), **TIME, "clk": Unit()}
+    value, unit = read_quantity(what, text, units, "clk" if is_zero(text) else "")
+    clocks, most = {"tick": timing["tick_cycles"], "clk": 1}, (1 << LEAD_BITS) - 1
     found = round(value * (clocks[unit] if unit in clocks else TIME[unit].exact * timing["clock_hz"]))
-    if not 0 <= found <= _MOST_LEAD:
-        most = f"{_MOST_LEAD}clk, {_MOST_LEAD / timing['tick_cycles']:.4g} ticks"
-        raise ParameterError(what, f"must be from 0clk to {most}, not {text!r}")
+    if not 0 <= found <= most:
+        limit = f"{most}clk, {most / timing['tick_cycles']:.4g} ticks"
+        raise ParameterError(what, f"must be from 0clk to {limit}, not {text!r}")
     return found
 
 
@@ -73,17 +72,9 @@ class ElectricalAngle(Extra):
         0, _OFFSET, name="electrical-offset", metavar="ANGLE", parse=parse_offset, tests=("", "30deg"), tacit=True
     )
     lead: int | None = option(
-        None,
-        _USE,
-        shown="0",
-        metavar="TIME",
-        parse_at=parse_lead,
-        limits=(0, _MOST_LEAD),
-        tests=("", "1.5tick"),
-        tacit=True,
+        None, _USE, shown="0", metavar="TIME", parse_at=parse_lead, tests=("", "1.5tick"), tacit=True
     )
     sincos: bool = option(False, _SINCOS, tests=("", "yes"), tacit=True)
-
     sincos_table: bool = option(False, _TABLE, tests=("", "yes"), tacit=True)
 
     @property
