@@ -113,8 +113,7 @@ def test_results_print_in_ten_lines() -> None:
     for result in results:
         assert repr(result).count("\n") < 10
     assert repr(results[1]).splitlines()[1].split("  ")[0] == "speed (rad/s)"
-    rpm = tachometry.plan(tachometry.Tachometer(**CORE, method="s", unit="rpm"))
-    assert "resolution (rpm)" in repr(rpm)
+    assert "resolution (rpm)" in repr(tachometry.plan(tachometry.Tachometer(**CORE, method="s", unit="rpm")))
     assert "RMS error (rpm)" in repr(results[3])
     assert "mismatches  0\n" in repr(results[2])
     assert [line.split()[0] for line in repr(results[3]).splitlines()[2:]] == ["s", "m", "t", "mt", "rairan"]

@@ -306,7 +306,7 @@ def has_a_broken_docstring(node: ast.AST) -> bool:
 
 # What may only fall, with the rule by which it is counted. A change that brings a capability raises lines alone.
 CEILING: dict[str, tuple[int, Callable[[], Counter[str]]]] = {
-    "lines of Python of the product": (53516, lambda: lines(*PRODUCT)),
+    "lines of Python of the product": (53510, lambda: lines(*PRODUCT)),
     "lines of Python of the tests": (44316, lambda: lines("tests")),
     "lines of Python of the benchmarks": (3457, lambda: lines("bench")),
     "functions over 40 lines": (14, lambda: every(is_long, *PRODUCT)),

@@ -98,11 +98,7 @@ def rule(case: Case) -> None:
 
 test_cores = agreeing(CASES + TRACKED + BESIDE, rule)
 test_first_bus, test_second_bus = map(on_a_bus, BUS)
-test_refusals = refused(
-    {
-        "disc-table=edges": "disc_table must not be given with method m",
-    }
-)
+test_refusals = refused({"disc-table=edges": "disc_table must not be given with method m"})
 
 
 @pytest.mark.parametrize(
@@ -185,6 +181,7 @@ def test_sectors_are_the_nearest_line() -> None:
         lines = sectors_of(tuple(far.tolist()), 32, 1 / 960, True)
         wrong = np.array(lines.values[:-1]) / 960 / 2**lines.fine + np.tile(lines.quarters, 500) / 960 - far
         assert (len(lines.slopes), lines.bits) == (32, 6)
+        assert len(sectors_of(tuple(far[:100].tolist()), 32, 1 / 960, True).slopes) == 25
         assert np.std(wrong) < left
         assert np.abs(np.fft.rfft(wrong)[1:7]).max() * 2 / 2000 < 0.003
 

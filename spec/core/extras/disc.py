@@ -153,7 +153,6 @@ class DiscMap(Extra):
         for why, refused in refusals.items():
             if refused:
                 raise ParameterError(self.name if disc else "disc_table", why)
-        self.sectors(spec)
 
     def _inputs(self, spec: Numbers) -> Iterable[tuple[str, str, Pin]]:
         """Yield the inputs, each with the register and the field that take its place on a bus."""

