@@ -17,6 +17,7 @@ from tachometry.sim.encoder.crossings import Disc, IntArray, find_crossings
 from tachometry.sim.encoder.imperfections import BOUNCE, ILLEGAL, JITTER, LOST, NONUNIFORMITY
 from tachometry.sim.encoder.motion import FloatArray, Motion, Vibration, sin2pi
 from tachometry.sim.encoder.options import EncoderOptions
+from tachometry.sim.signals.memory import EDGE, check_memory
 from tachometry.sim.signals.recording import MAX_EDGES, Recording, packed, quadrature
 from tachometry.spec import Encoder, TachometerSpec
 from tachometry.spec.core.sensors import KINDS, READ, SENSORS
@@ -193,6 +194,7 @@ class VirtualEncoder(EncoderOptions):
                 f"must be of at most {MAX_EDGES} encoder edges, start angle {'and bounce ' * bool(self.bounce)}"
                 f"included, not {n_edges:.3g}",
             )
+        check_memory(n_edges * EDGE, "--motion", "shorten it, or turn more slowly")
         time, quarter = find_crossings(shaft, self.disc)
         if self.jitter:
             time = imperfections.jittered(time, motion.duration, self.jitter, self._stream(JITTER))

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim.signals.memory import bytes_of, check_memory
 from tachometry.sim.signals.source import Source
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.front_end import OF_CONTROLS
@@ -199,9 +200,12 @@ class PinTrace(_Lines):
         """Return what the pins of a core see of a recording: with nominal external ticks if the core takes them and
         there are none, and with probes that are always armed and a stream that is always ready.
 
-        It raises ValueError if there are too many clocks to be told apart, or more than `MAX_TICKS` ticks.
+        It raises ValueError if there are too many clocks to be told apart, more than `MAX_TICKS` ticks, or more than
+        the memory that is free can hold.
         """
         check_ticks(recording.duration, spec)
+        n_ticks = recording.duration / float(spec.timing.tick_seconds)
+        check_memory(bytes_of(spec, n_ticks, len(recording.time)), "what is run", "shorten it, or take longer ticks")
         return recording.place(spec.timing.clock_hz).completed(spec)
 
     @classmethod
