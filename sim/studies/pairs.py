@@ -4,11 +4,15 @@ The factors are the options that a method declares, with the values that these d
 exclude each other are found by trying.
 """
 
+import json
 from fractions import Fraction
 from functools import cache
+from importlib.metadata import version
 from itertools import combinations, product
 from operator import itemgetter
+from pathlib import Path
 
+from tachometry.sim.build import cached, digest
 from tachometry.spec import (
     AxesSpec,
     CoreSpec,
@@ -86,7 +90,14 @@ def rows(method: str) -> tuple[Texts, ...]:
         for names in never
     ]
     every = {name: list(values) for name, values in factors(method).items()}
-    return tuple(dict(row) for row in make(every, constraints=constraints))
+    key = digest(every, sorted((names, sorted(pairs)) for names, pairs in never.items()), version("covertable"))
+
+    def array(folder: Path) -> Path:
+        (folder / "rows").write_text(json.dumps(make(every, constraints=constraints)), encoding="utf-8")
+        return folder / "rows"
+
+    found: list[Texts] = json.loads(cached(key, ".json", array).read_text(encoding="utf-8"))
+    return tuple(found)
 
 
 @cache
