@@ -16,6 +16,7 @@ So the output is less than one LSB from the exact recursion.
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
 from fractions import Fraction
+from functools import cache
 
 # Up to this many intervals E is looked up in one table; beyond, it is the product of two.
 MAX_TABLE = 1024
@@ -33,7 +34,7 @@ class LowPass:
     @property
     def extra_bits(self) -> int:
         """k: bits below the LSB in which the state is kept, the least with 2^k ≥ 4/α for m = 1."""
-        least = 1 - self._decay(1)
+        least = 1 - _decay(self.exponent)
         k = 2
         while k <= MAX_EXTRA_BITS and least * (1 << k) < 4:
             k += 1
@@ -53,10 +54,10 @@ class LowPass:
     @property
     def tables(self) -> tuple[tuple[int, ...], ...]:
         """E by address, in 2^−p: a table for the low bits of m and, if that is not enough, one for the bits above."""
-        low = self._table(1, min(1 << self.low_bits, self.max_interval + 1))
-        if self.max_interval < MAX_TABLE:
-            return (low,)
-        return low, self._table(1 << self.low_bits, (self.max_interval >> self.low_bits) + 1)
+        every = [(1, min(1 << self.low_bits, self.max_interval + 1))]
+        if self.max_interval >= MAX_TABLE:
+            every.append((1 << self.low_bits, (self.max_interval >> self.low_bits) + 1))
+        return tuple(_table(self.exponent, self.factor_bits, *one) for one in every)
 
     @property
     def latency(self) -> int:
@@ -65,13 +66,15 @@ class LowPass:
         """
         return 4 + (1 if self.max_interval < MAX_TABLE else 2) * (self.factor_bits + 2)
 
-    def _table(self, step: int, entries: int) -> tuple[int, ...]:
-        one = 1 << self.factor_bits
-        return tuple(min(round(self._decay(k * step) * one), one - 1) for k in range(entries))
 
-    def _decay(self, intervals: int) -> Fraction:
-        """Return e^(−exponent·intervals) to 60 digits."""
-        with localcontext() as context:
-            context.prec = 70
-            power = self.exponent * intervals
-            return Fraction((-Decimal(power.numerator) / Decimal(power.denominator)).exp())
+@cache
+def _table(exponent: Fraction, factor_bits: int, step: int, entries: int) -> tuple[int, ...]:
+    one = 1 << factor_bits
+    return tuple(min(round(_decay(exponent * k * step) * one), one - 1) for k in range(entries))
+
+
+def _decay(power: Fraction) -> Fraction:
+    """Return e^(−power) to 60 digits."""
+    with localcontext() as context:
+        context.prec = 70
+        return Fraction((-Decimal(power.numerator) / Decimal(power.denominator)).exp())
