@@ -19,11 +19,12 @@ from tachometry.cli.reports.terminal import progress_bar
 from tachometry.hdl.export import export
 from tachometry.sim.signals.files import write_csv
 from tachometry.sim.signals.recording import Recording
-from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES
+from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES, OF_READS
 from tachometry.sim.studies.comparing.comparison import Comparison, Judging, Source, comparison
 from tachometry.sim.studies.size import CORE, SEEDS, TARGETS, Measurement, measure_core, versions
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras import EXTRAS
+from tachometry.spec.core.sensors import READ
 from tachometry.spec.language.units import parse_time
 
 # Options of a core that change its size alone.
@@ -54,7 +55,8 @@ Examples:
     help="Methods to compare: all, or names with commas between. Methods take options, as in m:average=10 or "
     "hostmot2:period=500us. difference, hostmot2, simplefoc, odrive and moteus are float models of what is in use; "
     "least-squares, foaw, kalman, kf-cv, kf-ca and imm are float models of estimators in the literature. "
-    "docs/measured/compare.md has their options.",
+    "docs/measured/compare.md has their options. Of positions that are read there are alpha-beta and "
+    "alpha-beta-gamma with index, pll with bandwidth, and savitzky-golay with reads and order in place of these.",
 )
 @option(
     "Methods",
@@ -106,6 +108,7 @@ Examples:
 )
 def compare(
     make: Make,
+    sensor: str | None,
     methods: str,
     record: Recorder | None,
     tables: list[Path],
@@ -131,9 +134,10 @@ def compare(
     """
     inputs = tables if capture is None else [capture]
     outputs = Outputs({"--plot": plot, "--csv": csv, "--tradeoff": tradeoff}, inputs=inputs)
-    missing = {name: one.missing for name, one in BASELINES.items() if methods.strip() == "all" and one.missing}
-    named = named_methods(methods, make, [name for name in BASELINES if name not in missing])
-    spec = next((spec for spec in named.specs.values() if spec is not None), None) or make("s", {})
+    known, usual = (OF_READS, "track") if sensor in READ else (BASELINES, "s")
+    missing = {name: one.missing for name, one in known.items() if methods.strip() == "all" and one.missing}
+    named = named_methods(methods, make, [name for name in known if name not in missing])
+    spec = next((spec for spec in named.specs.values() if spec is not None), None) or make(usual, {})
     for name in (
         () if size else (*_NO_VELOCITY, *(extra.name.replace("_", "-") for extra in EXTRAS if not extra.compared))
     ):
@@ -168,6 +172,8 @@ def _source(
     if (record is None) == (capture is None):
         raise ValueError("--motion must be given, or --replay, and not both")
     if capture is not None:
+        if spec.encoder.sampled is not None:
+            raise ValueError(f"--replay must be of edges, not with --sensor {spec.encoder.sensor}: give --motion")
         return Source(str(capture), read(capture, spec), None)
     assert record is not None
     truth = record(spec)

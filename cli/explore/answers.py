@@ -37,7 +37,7 @@ from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.signals.recording import Recording
 from tachometry.sim.signals.temporary import scratch
-from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES
+from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES, OF_READS
 from tachometry.sim.studies.comparing.comparison import Judging, Source, comparison
 from tachometry.sim.studies.estimate import FAMILIES
 from tachometry.sim.studies.plan import Plan, Plans, cells_of, default_range
@@ -272,7 +272,8 @@ def size(options: Texts) -> Answer:
 
 def _response(options: Texts, core: TachometerSpec, source: Source) -> Answer:
     methods = _methods(options, core)
-    rivals = [name for name, one in BASELINES.items() if not one.missing]
+    known = BASELINES if core.encoder.sampled is None else OF_READS
+    rivals = {name: one.title for name, one in known.items() if not one.missing}
     specs = {core.method: core} | methods.specs | {core.method: core} | dict.fromkeys(rivals)
     found = comparison(core, specs, of_texts, source, Judging())
     unit = core.scale.shown_unit
@@ -288,8 +289,8 @@ def _response(options: Texts, core: TachometerSpec, source: Source) -> Answer:
             {
                 "name": curve.name,
                 "own": curve.name == core.method,
-                "rival": curve.name in BASELINES,
-                "what": BASELINES[curve.name].title if curve.name in BASELINES else "",
+                "rival": curve.name in rivals,
+                "what": rivals.get(curve.name, ""),
                 "velocity": _numbers(unit.of(curve.estimate.at(at))),
                 "cells": row[1:],
             }

@@ -21,7 +21,6 @@ from tachometry.spec import (
     of_texts,
     own_options,
 )
-from tachometry.spec.core.sensors import READ
 from tachometry.spec.language import option as declaration
 from tachometry.spec.language.option import options_of
 from tachometry.spec.language.units import parse_frequency
@@ -144,9 +143,7 @@ class Part:
 
 def _read_make(**given: Any) -> dict[str, Any]:
     texts = _with_tick(_taken(given))
-    if (sensor := texts.get("sensor")) in READ:
-        raise ParameterError("sensor", f"must not be {sensor}: methods are compared on edges; type tachometry simulate")
-    return dict(make=lambda method, own: of_texts(method, texts | own), **given)
+    return dict(make=lambda method, own: of_texts(method, texts | own), sensor=texts.get("sensor"), **given)
 
 
 def _read_spec_and_make(parts: Sequence[Part], *, method: str, **given: Any) -> dict[str, Any]:

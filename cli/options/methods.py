@@ -27,13 +27,15 @@ def named_methods(text: str, make: Make, others: Collection[str] = ()) -> Method
     """
     if text.strip() == "all":
         specs: dict[str, TachometerSpec | None] = {}
-        left_out = {}
-        make(next(iter(METHODS)), {})  # what is wrong for all is reported at once
+        wrong: dict[str, ValueError] = {}
         for name in METHODS:
             try:
                 specs[name] = make(name, {})
             except ValueError as error:
-                left_out[name] = message_of(error)
+                wrong[name] = error
+        if not specs:
+            raise next(iter(wrong.values()))
+        left_out = {name: message_of(error) for name, error in wrong.items()}
         return Methods(specs | dict.fromkeys(others), left_out)
     specs = {}
     for name, method, given in listed_methods(text, others):

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from tachometry.sim import build
-from tachometry.sim.studies.comparing import baselines, estimators
+from tachometry.sim.studies.comparing import baselines, estimators, read_filters
 from tachometry.sim.studies.comparing.baselines import Estimate, Steps
 from tachometry.sim.studies.comparing.compare import Curve
 from tachometry.sim.studies.comparing.edge_filters import edge_kalman
@@ -214,6 +214,39 @@ BASELINES: dict[str, Baseline] = {
     ),
 }
 
+_INDICES = " ".join(f"{digit}e{power}" for power in range(-9, 1) for digit in (1, 2, 5))
+# On positions of an absolute encoder, in place of those on edges.
+OF_READS: dict[str, Baseline] = {
+    "alpha-beta": Baseline(
+        "alpha-beta filter",
+        "tracking index 0.01",
+        read_filters.alpha_beta,
+        {"index": Parameter("index", _number)},
+        ({"index": _INDICES},),
+    ),
+    "alpha-beta-gamma": Baseline(
+        "alpha-beta-gamma filter",
+        "tracking index 0.01",
+        partial(read_filters.alpha_beta, order=3),
+        {"index": Parameter("index", _number)},
+        ({"index": f"1e-12 1e-11 1e-10 {_INDICES}"},),
+    ),
+    "pll": Baseline(
+        "phase-locked loop, critically damped",
+        "1000 rad/s",
+        read_filters.phase_locked_loop,
+        {"bandwidth": Parameter("bandwidth_rad_s", _bandwidth)},
+        ({"bandwidth": BASELINES["odrive"].swept[0]["bandwidth"]},),
+    ),
+    "savitzky-golay": Baseline(
+        "polynomial through the latest positions (Savitzky, Golay 1964)",
+        "9 reads, order 2",
+        read_filters.savitzky_golay,
+        {"reads": Parameter("reads", parse_whole), "order": _ORDER},
+        ({"reads": "5 7 9 13 17 25 33 49 65 97 129 257", "order": "1 2 3"},),
+    ),
+}
+
 
 def baseline_model(name: str) -> tuple[str, Callable[[Steps], Estimate]]:
     """Return what a baseline with options is in words, and its model, of a name as `kalman:order=3:process-noise=1e5`.
@@ -222,9 +255,10 @@ def baseline_model(name: str) -> tuple[str, Callable[[Steps], Estimate]]:
     refused by the model.
     """
     method, *words = name.split(":")
-    if method not in BASELINES:
-        raise ParameterError("methods", f"must be of {', '.join(BASELINES)}, not {method!r}")
-    baseline = BASELINES[method]
+    known = BASELINES | OF_READS
+    if method not in known:
+        raise ParameterError("methods", f"must be of {', '.join(known)}, not {method!r}")
+    baseline = known[method]
     arguments = dict(baseline.fixed)
     for word in words:
         option, _, text = word.partition("=")
@@ -250,7 +284,7 @@ def steps_curve(name: str, steps: Steps) -> Curve:
 def settings(method: str) -> list[str]:
     """Return names of a baseline with all settings that are tried for the best, its usual one first."""
     found = [method]
-    for swept in BASELINES[method].swept:
+    for swept in (BASELINES | OF_READS)[method].swept:
         for values in product(*(texts.split() for texts in swept.values())):
             found.append(":".join([method, *(f"{name}={text}" for name, text in zip(swept, values, strict=True))]))
     return found

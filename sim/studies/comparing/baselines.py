@@ -38,6 +38,10 @@ class Steps:
     counts_per_rev: Fraction | int
     reads: FloatArray = field(default_factory=lambda: np.empty(0))  # shape (n,), seconds: when a loop reads the speed
     clock_s: float = 1e-7  # seconds: unit of timestamps
+    # of an encoder that is read: its positions at `reads`, how old they are, and what is between two reads; no steps
+    taken: IntArray | None = None
+    age_s: float = 0.0
+    tick_s: float = 0.0
 
     def __post_init__(self) -> None:
         if len(self.time) != len(self.step) or np.any(np.abs(self.step) != 1):
@@ -97,7 +101,7 @@ def read(steps: Steps, period_s: float | None) -> Readings:
     Without a period (s) they are at these reads. It raises ValueError if the period is not more than 0, or there were
     more than `MAX_TICKS` readings.
     """
-    if period_s is None:
+    if period_s is None or steps.taken is not None:
         return _readings(steps, steps.reads)
     if not period_s > 0:
         raise ValueError(f"control period must be more than 0 s, not {short_time(period_s)}")
@@ -111,6 +115,8 @@ def read(steps: Steps, period_s: float | None) -> Readings:
 
 
 def _readings(steps: Steps, time: FloatArray) -> Readings:
+    if steps.taken is not None:
+        return Readings(time, steps.taken, time - steps.age_s)
     seen = np.searchsorted(steps.time, time, side="right")
     count = np.append(0, np.cumsum(steps.step))
     return Readings(time, count[seen], np.append(0.0, steps.time)[seen])

@@ -9,7 +9,8 @@ from functools import partial
 import numpy as np
 
 from tachometry.sim.encoder.motion import FloatArray, parse_motion
-from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.encoder.sampled import encoder_of
+from tachometry.sim.golden.sampled import Reads
 from tachometry.sim.signals.progress import Bar, no_bar
 from tachometry.sim.signals.recording import PinTrace, Recording
 from tachometry.sim.signals.shown import Shown
@@ -181,8 +182,27 @@ def _time(seconds: float) -> str:
 
 def steps_beside(spec: TachometerSpec, recording: Recording) -> Steps:
     """Return the steps for float models, which are read with a core, and stamp edges with its clock or with 0.1 us."""
-    steps, reads = Steps.of_sensor(recording, spec.encoder), read_times(spec, PinTrace.of(recording, spec))
+    reads = read_times(spec, trace := PinTrace.of(recording, spec))
+    if spec.encoder.sampled is not None:
+        return _positions(spec, trace, reads)
+    steps = Steps.of_sensor(recording, spec.encoder)
     return replace(steps, reads=reads, clock_s=min(steps.clock_s, 1 / spec.timing.clock_hz))
+
+
+def _positions(spec: TachometerSpec, trace: PinTrace, reads: FloatArray) -> Steps:
+    """Return the positions that a core has taken, each held until the next one."""
+    sampled, taken, hz = spec.encoder.sampled, Reads.of(spec, trace), spec.timing.clock_hz
+    assert sampled is not None
+    half = 1 << sampled.width - 1
+    moved = (np.diff(taken.sample, prepend=taken.sample[:1]) + half & 2 * half - 1) - half
+    place = np.append(0, np.cumsum(moved))
+    at = np.searchsorted(taken.clock, np.round(reads * hz), side="right")
+    old = reads * hz - (taken.clock - taken.age)[np.maximum(at - 1, 0)] if len(taken.clock) else reads
+    none = np.empty(0, np.int64)
+    return Steps(
+        *(np.empty(0), none, trace.n_clocks / hz, spec.encoder.encoder_counts, reads, 1 / hz),
+        *(place[at], float(np.median(old)) / hz, float(spec.timing.tick_seconds)),
+    )
 
 
 @dataclass(frozen=True)
@@ -240,8 +260,8 @@ class _Trial:
         if not speed:
             raise ValueError("--motion must move the shaft where there is a --tradeoff")
         found: dict[str, list[Cost]] = {}
-        index = any(spec is not None and spec.index is not None for spec in specs.values())
-        moving = VirtualEncoder.of(self.spec.encoder, index=index).record(parse_motion(triangle(speed)))
+        own = next((spec for spec in specs.values() if spec is not None and spec.index is not None), self.spec)
+        moving = encoder_of(own).record(parse_motion(triangle(speed)))
         judge = replace(self.judge, true_speed=moving.true_speed, begin=SETTLED_S, end=moving.recording.duration)
         edges = moving.recording, steps_beside(self.spec, moving.recording)
         for name, tried in self._counted(self._settings(specs, of_cores=True), "measuring"):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tachometry.sim.encoder.motion import FloatArray
-from tachometry.sim.studies.comparing.baselines import Estimate, IntArray, Steps, clocks, read
+from tachometry.sim.studies.comparing.baselines import Estimate, IntArray, Readings, Steps, clocks, read
 
 QUANTISATION = 1 / math.sqrt(12)
 """Standard deviation of what is lost when a position is counted, in counts."""
@@ -240,7 +240,12 @@ def kalman(steps: Steps, period_s: float, process_noise: float = 300.0, order: i
     """
     readings = read(steps, period_s)
     index = process_noise * period_s ** min(order, 3) / (steps.count_rad * QUANTISATION)
-    alpha, beta, gamma = kalman_gains(index, order)
+    return filtered(steps, readings, period_s, kalman_gains(index, order))
+
+
+def filtered(steps: Steps, readings: Readings, period_s: float, gains: tuple[float, float, float]) -> Estimate:
+    """Return the speed of a filter with constant gains of position, speed and acceleration, at each reading."""
+    (alpha, beta, gamma), ahead = gains, steps.age_s / period_s
     position = speed = acceleration = 0.0  # counts, per period, per period squared
     speeds = []
     for count in readings.counts.tolist():
@@ -250,5 +255,5 @@ def kalman(steps: Steps, period_s: float, process_noise: float = 300.0, order: i
         position += alpha * error
         speed += beta * error
         acceleration += gamma * error
-        speeds.append(speed)
+        speeds.append(speed + acceleration * ahead)
     return Estimate(readings.time, np.array(speeds) / period_s * steps.count_rad)
