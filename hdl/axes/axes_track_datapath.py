@@ -64,6 +64,7 @@ class AxesTrackDatapath(wiring.Component):
                 "axis": Out(range(max(spec.axes, 2))),  # valid with `tick`, as are all others
                 **{name: Out(shape) for name, shape in tick_layout(axis).members.items()},
                 **{name: Out(shape) for name, shape in layout.members.items()},
+                **only_if(axis.extras, native_velocity=Out(signed(axis.velocity.native))),
             }
         )
 
@@ -96,6 +97,8 @@ class AxesTrackDatapath(wiring.Component):
             *(port.eq(ticks[name]) for name, port in by_name(self, tick_layout(self._axis).members).items()),
             *(port.eq(shown[name]) for name, port in by_name(self, self._update.members).items()),
         ]
+        if self._axis.extras:
+            m.d.comb += self.native_velocity.eq(update.velocity)
         return m
 
     def _shown(self, m: Module) -> tuple[Signal, Signal, data.View, data.View]:

@@ -15,6 +15,7 @@ from tachometry.hdl.axes.axis_index import AxisIndex
 from tachometry.hdl.axes.axis_tick_counts import AxisTickCounts
 from tachometry.hdl.axes.held_outputs import HeldOutputs
 from tachometry.hdl.axes.rounds import Rounds
+from tachometry.hdl.extras import gates_of, place
 from tachometry.hdl.front_end.index_state import in_state
 from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import by_name, drive, follow, members
@@ -55,6 +56,7 @@ class AxesTachometer(wiring.Component):
             self.axis_index = AxisIndex(
                 slots=spec.slots, width=spec.axis.position_width, resets=spec.axis.front_end.index_resets
             )
+        self.extras = {extra.name: gates_of(extra, spec) for extra in spec.axis.extras}
 
     @property
     def spec(self) -> AxesSpec:
@@ -96,6 +98,9 @@ class AxesTachometer(wiring.Component):
         m.d.comb += [
             box.eq(value) for box, value in zip((datapath.complete, datapath.slot, datapath.count), handed, strict=True)
         ]
+        taps = {"ready": at["ready"], "slot": counters.axis, "step": counters.step, "complete": counters.complete}
+        taps |= {} if self.axis_index is None else {"index_rises": self.axis_index.index_valid}
+        place(m, datapath, self.extras, taps)
         self._show(m, TICK, "axis", datapath)
         self._show(m, UPDATE, "axis", datapath)
         if self.axis_index is not None:
@@ -133,8 +138,12 @@ class AxesTachometer(wiring.Component):
 
     def _show(self, m: Module, name: str, axis_name: str, box: wiring.Component) -> None:
         """Show what is new with a strobe: as it comes, or held for each axis."""
-        values = by_name(box, (port.name for port in self._spec.axis.ports.outputs if port.held_by == name))
+        names, values = [port.name for port in self._spec.axis.ports.outputs if port.held_by == name], _Values()
+        for source in (*self.extras.values(), box):
+            values |= by_name(source, (one for one in names if one in source.signature.members))
         strobe, axis = values.pop(name), box.axis
+        for extra in self.extras.values() if name != INDEX else ():
+            strobe = extra.shows  # the box still shows the same
         if self._spec.parallel:
             shapes = {value: signal.shape() for value, signal in values.items()}
             held = HeldOutputs(self._spec.axes, len(axis), shapes)

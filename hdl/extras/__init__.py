@@ -13,11 +13,11 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 
 from tachometry.hdl.wires.ports import drive, follow
-from tachometry.spec import TachometerSpec
+from tachometry.spec import CoreSpec, TachometerSpec
 from tachometry.spec.core.extras.extra import Extra
 
 
-def gates_of(extra: Extra, spec: TachometerSpec) -> wiring.Component:
+def gates_of(extra: Extra, spec: CoreSpec) -> wiring.Component:
     """Return the gates of an extra of this core."""
     gates: wiring.Component = import_module(f"{__name__}.{extra.name}").Gates.of(extra, spec)
     return gates

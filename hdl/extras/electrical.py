@@ -107,10 +107,9 @@ class Gates(wiring.Component):
         It is a sum for each count, and a remainder whose carry is one more. An index behind the first is refused if the
         angle is off by more than 1/16 of a turn, and is not that of the index before.
         """
-        counts, zero, (quotient, remainder) = self._angles.counts, self._angles.of(0), self._angles.count
+        counts, zero = self._angles.counts, self._angles.of(0)
         sum_ = Signal(self._angles.bits, init=zero)
         rest = Signal(range(counts))
-        back = step[1]
         marks = Signal()
         zeroes = Signal()
         later = Signal()
@@ -125,17 +124,8 @@ class Gates(wiring.Component):
             m.d.sync += before.eq(Mux(marks, place, before))
             with m.If(marks & ~zeroes & ~self.angle_refused.all()):
                 m.d.sync += self.angle_refused.eq(self.angle_refused + 1)
-        angle, left, move = Mux(zeroes, zero, sum_), Mux(zeroes, 0, rest), Const(quotient, len(sum_))
-        up = Signal(range(2 * counts))
-        down = Signal(signed(counts.bit_length() + 1))
-        carry = Mux(back, ~(down < 0), up >= counts)
-        m.d.comb += [up.eq(left + remainder), down.eq(left - remainder)]
-        m.d.sync += [
-            sum_.eq(angle + Mux(step[0], move ^ back.replicate(len(move)), 0) + (step[0] & carry)),
-            rest.eq(left),
-        ]
-        with m.If(step[0]):
-            m.d.sync += rest.eq(Mux(back, Mux(down < 0, down + counts, down), Mux(up >= counts, up - counts, up)))
+        angle, left = counted_on(m, self._angles, step, Mux(zeroes, zero, sum_), Mux(zeroes, 0, rest))
+        m.d.sync += [sum_.eq(angle), rest.eq(left)]
         return sum_, zeroes
 
     def _read(self, m: Module, known: Signal) -> tuple[Signal, Signal]:
@@ -166,24 +156,14 @@ class Gates(wiring.Component):
         with m.If(self.tick):
             m.d.sync += [at.eq(counted), place.eq(self.position)]
         m.d.comb += between.eq(self.native_position_fine - (place << fine_bits))
-        velocity, fine, acceleration = angles.factors
-        bend = _term(acceleration, self.native_acceleration)
-        curve = Signal(signed(max(len(bend), 2)))
         s = Signal(factor_bits)
-        target = Signal(bits)
-        slope = Signal(signed(bits))
         now = Signal(signed(bits))
-        bent = curve << factor_bits - SLOPE_BITS
         led = Signal()
-        products = (
-            (_term(fine, between), fine.number, at, target),  # before the next tick
-            (bend, acceleration.number, C(0), curve),
-            (_term(velocity, self.native_velocity), velocity.number, C(0), slope),
-            (bent, s + (half - angles.late), slope, now),
-            (bent, (s >> 1) - angles.late, slope, slope),
-            *(self._lead(m, s, angles.led, led) if angles.led else ()),
-            (slope, s, target, target),
-        )
+        update = between, self.native_velocity, self.native_acceleration
+        *first, mean, last = phase_products(angles, update, at, (s, (s >> 1) - angles.late))
+        bent, _, slope, _ = mean
+        more = self._lead(m, s, angles.led, led) if angles.led else ()
+        products = (*first, (bent, s + (half - angles.late), slope, now), mean, *more, last)
         done, start = take_products(m, self.native_valid, products, factor_bits, bits, block=angles.block)
         phase = Signal(bits)
         run = Signal(bits)
@@ -255,6 +235,38 @@ class Gates(wiring.Component):
         m.d.sync += [phase.eq(coming), moved.eq(done | step[0] | moves)]
         debt = _owed(m, angles, moved, Mux(known, phase - coming, 0)[:bits])
         return (phase + debt)[:bits], grows
+
+
+def counted_on(m: Module, angles: Angles, step: Value, angle: Value, left: Value) -> tuple[Value, Value]:
+    """Return an angle, and what is left of it in 1/counts, after a step."""
+    counts, (quotient, remainder), back = angles.counts, angles.count, step[1]
+    up = Signal(range(2 * counts))
+    down = Signal(signed(counts.bit_length() + 1))
+    m.d.comb += [up.eq(left + remainder), down.eq(left - remainder)]
+    carry, move = Mux(back, ~(down < 0), up >= counts), Const(quotient, angles.bits)
+    rest = Mux(back, Mux(down < 0, down + counts, down), Mux(up >= counts, up - counts, up))
+    moved = angle + Mux(step[0], move ^ back.replicate(len(move)), 0) + (step[0] & carry)
+    return moved, Mux(step[0], rest, left)
+
+
+def phase_products(
+    angles: Angles, update: tuple[Value, Value, Value], at: Value, times: tuple[Value, Value]
+) -> tuple[Product, ...]:
+    """Return products whose last one is the phase at a time after an update: place between counts, velocity, and
+    acceleration. Beside the time is how much later than the velocity its middle is.
+    """
+    (between, speed, acceleration), (velocity, fine, slopes) = update, angles.factors
+    bend = _term(slopes, acceleration)
+    curve = Signal(signed(max(len(bend), 2)))
+    target = Signal(angles.bits)
+    slope = Signal(signed(angles.bits))
+    return (
+        (_term(fine, between), fine.number, at, target),  # before the next tick
+        (bend, slopes.number, C(0), curve),
+        (_term(velocity, speed), velocity.number, C(0), slope),
+        (curve << angles.factor_bits - SLOPE_BITS, times[1], slope, slope),
+        (slope, times[0], target, target),
+    )
 
 
 def _term(factor: Factor, value: Value) -> Value:

@@ -1,9 +1,11 @@
 """The golden registers of a core of many axes."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from tachometry.sim import golden
-from tachometry.sim.golden.registers import GoldenBank, rises
+from tachometry.sim.golden.registers import Access, GoldenBank, rises
 from tachometry.sim.signals.axes import AxesTrace
 from tachometry.spec.language.port import INDEX, TICK, UPDATE
 from tachometry.spec.registers.axes import AxesMap
@@ -19,7 +21,7 @@ class GoldenAxesBank(GoldenBank):
         self._strobes = tuple(strobe for strobe in (TICK, UPDATE, INDEX) if strobe in self._tables)
         ticks, updates = self._tables[TICK], self._tables[UPDATE]
         # An update comes with the tick of its axis.
-        whose = {UPDATE: ticks["axis"][np.searchsorted(ticks.clock, updates.clock)]}
+        whose = {TICK: ticks["axis"], UPDATE: ticks["axis"][np.searchsorted(ticks.clock, updates.clock)]}
         kinds = {"updated": UPDATE}
         if INDEX in self._tables:
             whose[INDEX] = self._tables[INDEX]["index_axis"]
@@ -35,10 +37,13 @@ class GoldenAxesBank(GoldenBank):
         self._follow(overflow)
         stalls = []
         for axis in range(registers.axes.axes):
-            rows = self._tables[registers.axes.axis.facts.rests_with]
-            own = rows["axis"] == axis
+            strobe = registers.axes.axis.facts.rests_with
+            rows, own = self._tables[strobe], whose[strobe] == axis
             stalls.append(rises(rows.clock[own], rows[f"standstill_{axis}"][own]))
         self._stalls = np.unique(np.concatenate(stalls))
+
+    def _act(self, accesses: Sequence[Access]) -> None:
+        """No program writes to features beside the measurement."""
 
     def _of_clock(self, clock: int) -> dict[str, int]:
         return {}

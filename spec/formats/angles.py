@@ -64,6 +64,7 @@ class Angles:
     cycle: tuple[int, ...] = ()  # levels of halls, in the order of the counts
     block: bool = False  # whether a multiplier of the FPGA computes products
     led: VelocityOutput | None = None  # of `velocity_lead`; None: there is none
+    once: bool = False  # whether a phase is that of one clock, and does not grow
 
     @property
     def bits(self) -> int:
@@ -89,7 +90,7 @@ class Angles:
     @property
     def clocks(self) -> int:
         """Clocks from an update to the first one of its phase."""
-        return ((12 if self.led else 6) if self.tracks else 2) * self.product + 1
+        return ((12 if self.led else 6 - self.once) if self.tracks else 2) * self.product + 1
 
     @property
     def product(self) -> int:

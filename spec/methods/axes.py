@@ -125,6 +125,9 @@ class AxesSpec(WithTachometer):
             if getattr(spec, name) != value:
                 raise ParameterError(name, f"must be left out with --axes: {why}")
         refuse(spec.extras, "axes")
+        if spec.extras:
+            spec = replace(spec, extras=tuple(extra.in_turn(1) for extra in spec.extras))
+            object.__setattr__(self, "tachometer", spec)
         if spec.front_end.index_once:
             raise ParameterError("index_once", f"must be left out with --axes: what waits for home {_FOR_ONE}")
         if spec.encoder.sensor != "quadrature":

@@ -40,6 +40,7 @@ def own_options(spec: TachometerSpec, slots: int) -> dict[str, Any]:
         "timing": Timing(clock_hz, timing.tick_cycles // slots, timing.max_ticks),
         "frac_bits": spec.velocity.frac_bits,
         "filter_clocks": looks,
+        "extras": tuple(extra.in_turn(slots) for extra in spec.extras),
         "max_tick_cycles": spec.tick.longest // slots if spec.external_tick else None,
     }
     return {**asked, **own}
@@ -59,11 +60,12 @@ class Plan:
     cycles: int  # clocks of a turn
     latency: int  # clocks from the beginning of a turn to what is shown of it
     machines: int = 1  # datapaths that work side by side: axis k has number k modulo this
+    beside: int = 0  # clocks for which features beside the measurement work on what is shown, for one axis at a time
 
     @property
     def apart(self) -> int:
         """Clocks by which a datapath begins later than the one before: no two axes are shown in clocks side by side."""
-        return _APART
+        return max(_APART, self.beside)
 
     def start(self, axis: int) -> int:
         """Return clocks from the beginning of the first turn to that of an axis."""
@@ -72,7 +74,7 @@ class Plan:
     @property
     def end(self) -> int:
         """Clocks from the beginning of the first turn to the end of the last one."""
-        return -(-self.axes // self.machines) * self.cycles + (self.machines - 1) * self.apart
+        return -(-self.axes // self.machines) * self.cycles + (self.machines - 1) * self.apart + self.beside
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,6 +83,7 @@ class OneAxis(TachometerSpec):
 
     axes_of_tick: int  # how many have their turn in a tick
     slots: int  # clocks of a round
+    late: int = 0  # clocks from the mean edge of a round to what is shown; only features beside the measurement need it
 
     @cached_property
     def times(self) -> Times:

@@ -7,7 +7,7 @@ from functools import cached_property
 
 from tachometry.spec.formats.tracking_code import Program
 from tachometry.spec.formats.tracking_units import BLOCK, Serial
-from tachometry.spec.methods.axis import OneAxis, Plan, output_cycles, own_options
+from tachometry.spec.methods.axis import WARM_UP, OneAxis, Plan, output_cycles, own_options
 from tachometry.spec.methods.track import TrackTachometer
 
 
@@ -41,12 +41,15 @@ class TrackAxis(OneAxis, TrackTachometer):
     def plan(self) -> Plan:
         """When each axis has its turn: on as few machines as all turns end in time with."""
         program = self.program
-        cycles = program.all_clocks + 1
-        latency = program.clocks + output_cycles(self)
-        found = [Plan(self.axes_of_tick, cycles, latency, n) for n in range(1, self.axes_of_tick + 1)]
+        cycles, output = program.all_clocks + 1, output_cycles(self)
+        more = sum(extra.turn_clocks(self) for extra in self.extras)
+        latency, beside = program.clocks + output + more, more and output + more + 2
+        found = [Plan(self.axes_of_tick, cycles, latency, n, beside) for n in range(1, self.axes_of_tick + 1)]
         room = self.tick_clocks // (1 + self.external_tick)  # external ticks may come in half the time
-        return next((plan for plan in found if plan.end + self.slots <= room), found[0])
+        fitting = (plan for plan in found if plan.end + self.slots <= room and plan.machines * beside <= cycles)
+        return next(fitting, found[0])
 
     def at(self, axis: int, clocks: int) -> TrackAxis:
         """Return the core that one of the axes is, which is shown so many clocks after its last look."""
-        return replace(self, ahead=self.latency.pin_to_count + round(clocks / self.slots))
+        late = WARM_UP - 1 + self.slots // 2 + self.filter_clocks * self.slots + clocks
+        return replace(self, ahead=self.latency.pin_to_count + round(clocks / self.slots), late=late)

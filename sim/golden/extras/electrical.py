@@ -33,7 +33,7 @@ _LONGEST = 1 << 31  # clocks in which every place that has an end comes to it
 def tables(extra: ElectricalAngle, view: View) -> dict[str, Table]:
     """Return phases, refused indices, and from each clock on the values of registers that are added to a phase."""
     states = extra.angles(view.spec).states
-    counts, refused = (_states(states, view), []) if states else _counts(extra, view)
+    counts, refused = (_states(states, view), []) if states else counts_of(extra, view)
     updates = view.tables["measured"].clock
     offsets = zip(updates + 1, view.trace.line_at("angle_offset", updates, extra.offset), strict=True)
     offset = _latest([(0, extra.offset), *offsets], "offset")
@@ -118,7 +118,7 @@ def _latest(rows: Sequence[tuple[int, ...]], *names: str) -> Table:
     return Table(clock[last], {name: column[last] for name, column in zip(names, columns, strict=True)})
 
 
-def _counts(extra: ElectricalAngle, view: View) -> tuple[Table, list[int]]:
+def counts_of(extra: ElectricalAngle, view: View, late_index: int = 1) -> tuple[Table, list[int]]:
     """Return the angle that the gates have from each clock on, with the step in it, and when an index is refused."""
     steps, late, angles = view.steps, view.spec.latency.tick, extra.angles(view.spec)
     events = [(at, 0, step) for at, step in zip(steps.clock.tolist(), steps.step.tolist(), strict=True) if step]
@@ -132,7 +132,7 @@ def _counts(extra: ElectricalAngle, view: View) -> tuple[Table, list[int]]:
             refused.append(at + late + 1)
         else:
             number *= not is_index
-            rows.append((at + late + is_index, angles.of(number), step))
+            rows.append((at + late + is_index * late_index, angles.of(number), step))
         before = angle if is_index else before
     return _latest(rows, "angle", "step"), refused
 
@@ -153,7 +153,6 @@ def _states(states: Mapping[int, int], view: View) -> Table:
 def _tracked(extra: ElectricalAngle, view: View, counts: Table) -> Table:
     """Return the phases of updates of method track."""
     updates, ticks, angles = view.tables["measured"], view.tables["tick"], extra.angles(view.spec)
-    bits, late, (of_velocity, of_fine, of_acceleration) = angles.factor_bits, angles.late, angles.factors
     place = ticks["position"][np.searchsorted(ticks.clock, updates["cause"])] << angles.position_fine_bits
     lead = view.trace.line_at("angle_lead", updates.clock, extra.ahead)
     between = [
@@ -163,12 +162,19 @@ def _tracked(extra: ElectricalAngle, view: View, counts: Table) -> Table:
     columns = np.column_stack((updates.clock, *of_ticks, updates["velocity"], updates["acceleration"])).tolist()
     rows = list[list[int]]()
     for clock, at, between, ahead, velocity, acceleration in columns:
-        s, slope = angles.span + ahead, of_velocity.times(velocity)
-        curve = of_acceleration.times(acceleration) << bits - SLOPE_BITS
-        mean, now = (slope + Factor(t - late, bits, 0).times(curve) for t in (s >> 1, s + (angles.tick >> 1)))
-        start = at + of_fine.times(between) + mean * s
+        s = angles.span + ahead
+        times = (s >> 1) - angles.late, s + (angles.tick >> 1) - angles.late
+        mean, now = slopes_at(angles, velocity, acceleration, times)
+        start = at + angles.factors[1].times(between) + mean * s
         rows.append([clock + angles.clocks, wrapped(start, angles.bits), wrapped(now, angles.bits), 0, 0])
     return _owing(angles, rows)
+
+
+def slopes_at(angles: Angles, velocity: int, acceleration: int, times: Sequence[int]) -> list[int]:
+    """Return the slopes of the phase so many clocks after the velocity."""
+    of_velocity, _, of_acceleration = angles.factors
+    curve = of_acceleration.times(acceleration) << angles.factor_bits - SLOPE_BITS
+    return [of_velocity.times(velocity) + Factor(time, angles.factor_bits, 0).times(curve) for time in times]
 
 
 def _led(extra: ElectricalAngle, view: View) -> Table:

@@ -1,7 +1,7 @@
 """The electrical angle of a motor, new in every clock, at the instant of its use."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from typing import Any
 
@@ -114,10 +114,13 @@ class ElectricalAngle(Extra):
 
     def missing(self) -> Mapping[str, str]:
         return {
-            "axes": "does not work with --axes",
+            **({"axes": "does not work with both --axes and --sincos"} if self.turns else {}),
             "loop": "does not work with --loop",
             "sampled": "must be left out with --sensor sampled: it needs edges",
         }
+
+    def in_turn(self, slots: int) -> "AngleInTurn":
+        return AngleInTurn(**{one.name: getattr(self, one.name) for one in fields(ElectricalAngle)}, slots=slots)
 
     def check(self, spec: Numbers) -> None:
         if spec.encoder.sensor == "hall" and self.pole_pairs != (pairs := spec.encoder.pulses_per_rev):
@@ -178,3 +181,42 @@ class ElectricalAngle(Extra):
 
     def row(self, spec: Numbers, run: Any) -> tuple[str, str]:
         return "angle", f"{[0, *run.ticks.angle][-1] * 360 / 2**SHOWN_BITS:.1f}° electrical at the end"
+
+
+@dataclass(frozen=True, kw_only=True)
+class AngleInTurn(ElectricalAngle):
+    """One of these for each axis of many: with its tick, `lead` clocks after that; every index is its zero."""
+
+    name = "electrical_in_turn"
+    compared = settles = False
+
+    slots: int  # clocks of a round
+
+    def angles(self, spec: Numbers) -> Angles:
+        carrying, slots = spec.carrying, self.slots
+        if carrying is None:
+            raise ParameterError("electrical", "must be given together with --method track if there are --axes")
+        tick, counts = spec.timing.tick_cycles * slots, spec.encoder.encoder_counts
+        formats = (1, carrying.position_fine_bits, carrying.slope / slots**2)  # a turn ends within a tick
+        bits, longest = spec.velocity.native_frac_bits, spec.tick.longest * slots
+        return Angles(counts, self.pole_pairs, tick, longest, bits, tick, *formats, block=carrying.block, once=True)
+
+    def check(self, spec: Numbers) -> None:
+        self.angles(spec)
+
+    def corrects(self, spec: Numbers) -> bool:
+        return False
+
+    def pins(self, spec: Numbers) -> Iterable[Pin]:
+        return ()
+
+    def ports(self, spec: Numbers) -> Iterable[Port]:
+        text = f"Electrical angle, {self.ahead} clocks after this one."
+        yield held(TICK, "angle", SHOWN_BITS, unit=_UNIT, help=text)
+        yield held(TICK, "angle_valid", help="The angle is that of the motor: there was an index.")
+
+    def registers(self, spec: Numbers) -> Iterable[Draft]:
+        return ()
+
+    def turn_clocks(self, spec: Numbers) -> int:
+        return self.angles(spec).clocks

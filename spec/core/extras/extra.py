@@ -55,6 +55,14 @@ class Extra:
         """Return its inputs."""
         return ()
 
+    def in_turn(self, slots: int) -> Self:
+        """Return what an axis of many has of it, whose clock is a round of so many clocks."""
+        return self
+
+    def turn_clocks(self, spec: Numbers) -> int:
+        """Return clocks from an update of an axis of many to the outputs that it adds to that."""
+        return 0
+
     def ports(self, spec: Numbers) -> Iterable[Port]:
         """Return its outputs."""
         return ()
