@@ -4,13 +4,18 @@ from amaranth import Module, Mux, Signal, Value
 from amaranth.lib import wiring
 
 from tachometry.hdl.core.tachometer import Tachometer
+from tachometry.hdl.front_end.encoder_master import EncoderMaster
 from tachometry.hdl.front_end.sampled_position import SampledPosition
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.front_end.serial_encoder import SerialEncoder
+from tachometry.hdl.front_end.spi_encoder import SpiEncoder
+from tachometry.hdl.front_end.tformat_encoder import TformatEncoder
 from tachometry.hdl.output.update import update_layout
 from tachometry.hdl.wires.ports import by_name, drive, follow, hand_through
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.reads import JUMP, NO_ANSWER, READ_FAULT_BITS, WARNING, WRONG_CHECK
+from tachometry.spec.core.chips import SpiReads
+from tachometry.spec.core.reads import JUMP, NO_ANSWER, READ_FAULT_BITS, WARNING, WRONG_CHECK, Reads
+from tachometry.spec.core.tformat import TformatReads
 
 
 class SampledTachometer(Tachometer):
@@ -20,7 +25,7 @@ class SampledTachometer(Tachometer):
 
     def _make_front(self, spec: TachometerSpec) -> None:
         self.reader = SampledPosition(spec)
-        self.master = None if spec.reads is None else SerialEncoder(spec.reads)
+        self.master = None if spec.reads is None else master_of(spec.reads)
         self.read_fault = Signal(READ_FAULT_BITS)
         self.controls, self.modulo_counter, self.index_capture = {}, None, None
 
@@ -49,10 +54,11 @@ class SampledTachometer(Tachometer):
         names = ("coming", "next_count", "number", "times", "phase", "forgets", "silent", "elapsed", "length")
         return by_name(reader, names)
 
-    def _read(self, m: Module, master: SerialEncoder) -> SerialEncoder:
+    def _read(self, m: Module, master: EncoderMaster) -> EncoderMaster:
         """Let the master read once in each tick, so that the answer comes before it ends, or after an external one."""
         m.submodules.master = master
-        hand_through(m, self, master, ("encoder_clock", "encoder_data"))
+        assert self._spec.reads is not None
+        hand_through(m, self, master, (port.name for port in self._spec.reads.ports))
         clock = self.sampling_clock
         m.d.comb += master.start.eq(clock.early if isinstance(clock, SamplingClock) else clock.last)
         return master
@@ -61,6 +67,13 @@ class SampledTachometer(Tachometer):
         updates = self.datapath.updates
         shown = {f"native_{name}": updates.p[name] for name in update_layout(self._spec).members}
         return {"read_fault": self.read_fault, "native_valid": updates.valid, **shown}
+
+
+def master_of(reads: Reads) -> EncoderMaster:
+    """Return the master that makes these reads."""
+    if isinstance(reads, SpiReads):
+        return SpiEncoder(reads)
+    return TformatEncoder(reads) if isinstance(reads, TformatReads) else SerialEncoder(reads)
 
 
 def tachometer_of(spec: TachometerSpec) -> Tachometer:

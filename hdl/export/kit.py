@@ -55,13 +55,13 @@ def _help(port: Port) -> str:
 
 def _synchronizers(spec: AnySpec, bus: Bus | None) -> dict[str, list[str]]:
     """Return where the synchroniser of each pin is in the core: the boxes from the outermost to itself."""
-    box = {"tick_in": ["sampling_clock"], "encoder_data": ["master"]} if spec.axes is None else {}
+    box = {"tick_in": ["sampling_clock"]} if spec.axes is None else {}
     default = ["conditioner"] if spec.axes is None else []
     tacho = spec.tachometer
     complements = [f"{line}_n" for line in tacho.front_end.complemented]
     pins = (*tacho.front_end.lines, *complements, *tacho.front_end.sensed, *["tick_in"] * tacho.external_tick)
-    pins += ("encoder_data",) if tacho.reads else ()
     boxes = {pin: box.get(pin, default) for pin in pins}
+    boxes |= {tacho.reads.line: ["master"]} if tacho.reads else {}
     boxes |= {line: ["bridge"] for line in (bus.asynchronous if bus else ())}
     return {pin: [*path, f"sync_{pin}"] for pin, path in boxes.items()}
 
@@ -71,7 +71,7 @@ def _first_levels(spec: AnySpec) -> dict[str, int]:
     encoder, all_ones = spec.tachometer.encoder, (1 << (spec.axes or 1)) - 1
     first = dict(zip(encoder.kind.lines, encoder.kind.legal[0], strict=encoder.sampled is None)) | {"z": 0}
     if spec.tachometer.reads is not None:
-        first["encoder_data"] = 1
+        first[spec.tachometer.reads.line] = 1
     at_pins = {line: level ^ (line in encoder.inverted) for line, level in first.items()}
     at_pins |= {f"{line}_n": 1 - at_pins[line] for line in spec.tachometer.front_end.complemented}
     return {line: all_ones for line, level in at_pins.items() if level}
@@ -136,6 +136,8 @@ def _bench(tacho: TachometerSpec) -> dict[str, object]:
         "mirrored": encoder.reverse and encoder.sensor != "pulses",
         "backward": encoder.reverse and encoder.sensor == "pulses",
         "steps": "quarter periods" if encoder.kind.cycle else "LSB" if encoder.sampled else "steps",
+        # A late answer has no command before it at first, and is not taken.
+        "first_errors": -int(tacho.reads is not None and tacho.reads.late),
     }
 
 
@@ -165,6 +167,7 @@ def _axes_bench(tacho: AxesSpec) -> dict[str, object]:
         "expected": expected,
         "mirrored": False,
         "steps": "quarter periods",
+        "first_errors": 0,
     }
 
 

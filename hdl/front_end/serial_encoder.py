@@ -1,18 +1,14 @@
 """A master for absolute encoders with SSI or BiSS-C."""
 
 from amaranth import Cat, Module, Mux, Signal, Value
-from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.wires.synchronizer import Synchronizer
-from tachometry.spec.core.reads import ERROR_BIT, NO_ANSWER, SYNCHRONISER, WRONG_CHECK, Reads
+from tachometry.hdl.front_end.encoder_master import EncoderMaster, Frame
+from tachometry.spec.core.reads import ERROR_BIT, SYNCHRONISER, WRONG_CHECK, Reads
 
 
-class _Frame:
-    """Signals of the frame that is read."""
-
+class _Frame(Frame):
     def __init__(self, reads: Reads) -> None:
-        self.line = Signal()  # the input, synchronised
+        super().__init__()
         self.time = Signal(range(max(reads.oldest, reads.rest) + 1))  # clocks of the read, then of the rest
         self.at = Signal(range(2 * reads.half))  # clocks until a bit is read
         self.beat = self.at == 0
@@ -20,42 +16,27 @@ class _Frame:
         self.past = Signal()  # the bit before, of Gray code decoded
         self.flags = Signal(2, init=3)  # nW, nE
         self.check = Signal(max(reads.crc_width, 1))
-        self.silent = Signal()  # there is no answer
         self.unequal = Signal()  # the second reading differs from the first, or CDS is not low
         self.second = Signal()
         self.rests = Signal()
-        self.idle = Signal()
-        self.done = Signal()
 
 
-class SerialEncoder(wiring.Component):
+class SerialEncoder(EncoderMaster):
     """Reads a position by SSI or BiSS-C; see `Reads`.
 
     The encoder shifts at rises of its clock. Of SSI each bit is read half a period and the delay of the line after its
     rise. Of BiSS-C the middle of the bits is found by the first fall of the data. The clock runs until the last bit is
-    read. A read that is due while another one runs, or while the clock rests, is left out and reported as not answered.
+    read.
     """
 
     def __init__(self, reads: Reads) -> None:
         self._reads = reads
-        super().__init__(
-            {
-                "encoder_clock": Out(1, init=1),
-                "encoder_data": In(1),
-                "start": In(1),
-                "sample": Out(reads.width),  # valid with the strobe, as are the others
-                "sample_valid": Out(1),
-                "sample_age": Out(range(reads.oldest + 1)),  # clocks since the encoder took its position
-                "sample_ok": Out(1),
-                "sample_warning": Out(1),
-                "reason": Out(2),  # why not `sample_ok`: NO_ANSWER, WRONG_CHECK, ERROR_BIT
-            }
-        )
+        super().__init__(reads)
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         frame, reads = _Frame(self._reads), self._reads
-        m.submodules.sync_encoder_data = Synchronizer(self.encoder_data, frame.line)
+        self._synchronise(m, reads, frame)
         m.d.sync += [frame.at.eq(Mux(frame.beat, 2 * reads.half - 1, frame.at - 1)), frame.time.eq(frame.time + 1)]
         self._run_clock(m, frame)
         with m.FSM():
@@ -80,7 +61,11 @@ class SerialEncoder(wiring.Component):
                 m.d.comb += frame.rests.eq(1)
                 with m.If(frame.time == reads.rest - 2):
                     m.next = "IDLE"
-        self._report(m, frame)
+        wrong: Value = frame.unequal
+        if reads.crc:
+            wrong |= frame.check != self._reads.residue
+        reason = Mux(wrong, WRONG_CHECK, Mux(~frame.flags[1], ERROR_BIT, 0))
+        self._report(m, frame, reason, ~frame.flags[0], frame.time)
         return m
 
     def _run_clock(self, m: Module, frame: _Frame) -> None:
@@ -144,20 +129,3 @@ class SerialEncoder(wiring.Component):
                 m.d.sync += [frame.second.eq(1), left.eq(reads.frame_bits - 1), frame.past.eq(0)]
                 with m.If(~frame.second):
                     m.next = "FRAME"
-
-    def _report(self, m: Module, frame: _Frame) -> None:
-        """Drive the record of a read that is done or left out."""
-        wrong: Value = frame.unequal
-        if self._reads.crc:
-            wrong |= frame.check != self._reads.residue
-        error = ~frame.flags[1]
-        left_out = Signal()
-        m.d.sync += left_out.eq((self.start & ~frame.idle) | (left_out & frame.done))
-        reason = Mux(wrong, WRONG_CHECK, Mux(error, ERROR_BIT, 0))
-        m.d.comb += [
-            self.sample_valid.eq(frame.done | left_out),
-            self.sample_age.eq(frame.time),
-            self.sample_ok.eq(self.reason == 0),
-            self.sample_warning.eq(self.sample_ok & ~frame.flags[0]),
-            self.reason.eq(Mux(frame.silent | ~frame.done, NO_ANSWER, reason)),
-        ]

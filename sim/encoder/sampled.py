@@ -54,10 +54,11 @@ class SampledEncoder(VirtualEncoder):
         if (reads := self.core.reads) is not None:
             start, age = np.array(self.core.read_starts(n_ticks * cycles)), reads.oldest
             clock = start + reads.longest
-        clock = clock[clock >= max(age, 1)]
+        clock = clock[clock >= max(age, 1)] if reads is None else clock
         time = clock / timing.clock_hz
         shaft = Encoding(self, motion, Recording.of_level(np.zeros(1), np.zeros(1, np.uint8), 1.0), 0, 0)
-        turn = shaft.true_angle((clock - age) / timing.clock_hz) / (2 * math.pi) * float(Fraction(self.ratio or 1))
+        angle = shaft.true_angle(np.maximum(clock - age, 0) / timing.clock_hz)
+        turn = angle / (2 * math.pi) * float(Fraction(self.ratio or 1))
         place = self._disturbed(-turn if self.reverse else turn, len(clock), 1 << sampled.bits)
         wrong = imperfections.uniform(self._stream(WRONG_READS), len(clock)) < self.frame_errors
         if reads is not None:
@@ -66,7 +67,7 @@ class SampledEncoder(VirtualEncoder):
             at, level = answer(reads, start, replace(sent, flip=np.floor(begin * frames(reads, sent).shape[1])))
             at = at[at < n_ticks * cycles]
             none = np.zeros(len(at), dtype=np.uint8)
-            more = {"encoder_data": level[: len(at)]}
+            more = {reads.line: level[: len(at)]}
         else:
             lines = read_lines(sampled, place, np.full(len(clock), age), (~wrong).astype(np.int64))
             at = np.append(0, np.stack([clock, clock + 1], axis=1).ravel())
@@ -151,4 +152,4 @@ def _stress_answers(spec: TachometerSpec, reads: Reads, rng: np.random.Generator
     sent = replace(sent, flip=wrong, error=rng.random(n_ticks) < 0.02, warning=rng.random(n_ticks) < 0.3, silent=gone)
     at, level = answer(reads, np.array(spec.read_starts(n_clocks)), sent)
     none = np.zeros(len(at), dtype=np.uint8)
-    return PinTrace.of_lines(at, n_clocks, {"a": none, "b": none, "encoder_data": level})
+    return PinTrace.of_lines(at, n_clocks, {"a": none, "b": none, reads.line: level})

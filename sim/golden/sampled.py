@@ -35,7 +35,7 @@ class Reads:
         assert sampled is not None
         if spec.reads is not None:
             begin = windows(spec, trace)[0] if spec.external_tick else np.array(spec.read_starts(trace.n_clocks))
-            level = trace.lines["encoder_data"]
+            level = trace.lines[spec.reads.line]
             changed = np.append(True, level[1:] != level[:-1])
             found = records(spec.reads, begin, Line(trace.clock[changed], level[changed]))
             return cls.those(spec, found)

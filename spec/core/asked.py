@@ -11,7 +11,7 @@ from tachometry.spec.core.index import Index
 from tachometry.spec.core.reads import Reads
 from tachometry.spec.core.sampled import Reach
 from tachometry.spec.core.sensors import parse_modulo
-from tachometry.spec.core.timing import Timing, parse_clocks, parse_filter
+from tachometry.spec.core.timing import MAX_TICK_CYCLES, Timing, parse_clocks, parse_filter
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS, parse_lsb
 from tachometry.spec.language.option import Option, option, parse_whole
 from tachometry.spec.language.units import FRACTION, Quantity, Speed, parse_bandwidth, parse_speed
@@ -168,7 +168,16 @@ class Asked:
     @cached_property
     def reads(self) -> Reads | None:
         """Reads of the encoder that the core makes; None: it makes none."""
-        return self.encoder.reads(self.timing.clock_hz, self.timing.tick_cycles)
+        reads = self.encoder.reads(self.timing.clock_hz)
+        return reads and reads.within(self.timing.tick_cycles, self.longest_tick)
+
+    @property
+    def longest_tick(self) -> int:
+        """Most clocks in a tick; an external one lasts two nominal ones at most, if nothing else was asked for."""
+        cycles = self.timing.tick_cycles
+        if not self.external_tick:
+            return cycles
+        return min(2 * cycles, MAX_TICK_CYCLES) if self.max_tick_cycles is None else self.max_tick_cycles
 
     @cached_property
     def reach(self) -> Reach | None:

@@ -53,6 +53,9 @@ def _check_sampled(spec: Core) -> None:
         if spec.timing.tick_cycles < least:
             rest = f"must be at least {least} clocks for a read, {format_time(Fraction(least, spec.timing.clock_hz))}"
             raise ParameterError("tick_cycles", f"{rest}, not {spec.timing.tick_cycles}")
+        if not reads.is_exact:
+            rest = f"must be nearer to a multiple of {reads.encoder_hz} Hz for tformat, not {spec.timing.clock_hz}"
+            raise ParameterError("clock_hz", rest)
     age, most = spec.encoder.sample_age, Sampled.most_age(spec.tick.longest)
     if age is not None and not 0 <= age <= most:
         raise ParameterError("sample_age", f"must be from 0 to {most} clocks, two ticks, not {age}")

@@ -7,9 +7,11 @@ from fractions import Fraction
 from math import ceil
 from typing import Any
 
+from tachometry.spec.core.chips import CHIPS, SpiReads
 from tachometry.spec.core.reads import BISS_CRC, Reads
 from tachometry.spec.core.sampled import Sampled, parse_bits
 from tachometry.spec.core.sensors import KINDS, READ, Sensor
+from tachometry.spec.core.tformat import MOST_BITS, RATES, TformatReads
 from tachometry.spec.core.tooth_wheel import parts_of
 from tachometry.spec.language.option import Option, ParameterError, check_options, option, parse_whole
 from tachometry.spec.language.units import parse_frequency, parse_time
@@ -18,12 +20,14 @@ _MOST = 1 << 24  # counts
 _INVERTIBLE = ("a", "b", "c", "z")
 _FASTEST_LINE = 10_000_000  # Hz
 _SERIAL = ("ssi", "biss")
+_MASTERS = (*_SERIAL, "spi", "tformat")
 # Options that only some sensors have.
 _OF_SENSORS = {
     "bits": tuple(READ),
     "sample_age": ("sampled",),
-    "encoder_clock": _SERIAL,
-    "line_delay": _SERIAL,
+    "chip": ("spi",),
+    "encoder_clock": _MASTERS,
+    "line_delay": _MASTERS,
     "crc": ("biss",),
     "gray": _SERIAL,
     "repeat": ("ssi",),
@@ -142,11 +146,13 @@ class Encoder:
     )
     sensor: str = option(
         "quadrature",
-        "Kind of the encoder lines. quadrature: A and B. pulses: A alone, of a tooth wheel, fan or flow "
-        "meter, always forward. step-dir: each rise of A is a step, with --decoding 2 each edge, forward "
-        "while B is high. up-down: each rise of A counts up, each rise of B down. hall: A, B and C of a "
-        "motor, 120 electrical degrees apart. sampled: an absolute position of --bits, read once a tick. ssi, "
-        "biss: such a position, read by the core itself from an encoder with SSI or BiSS-C.",
+        "Kind of the encoder, as quadrature, pulses, hall or biss. quadrature: A and B. pulses: A alone, of "
+        "a tooth wheel, fan or flow meter, always forward. step-dir: each rise of A is a step, with --decoding 2 "
+        "each edge, forward while B is high. up-down: each rise of A counts up, each rise of B down. hall: A, B "
+        "and C of a motor, 120 electrical degrees apart. sampled: an absolute position of --bits, read once a "
+        "tick. ssi, biss, spi, tformat: such a position, read by the core itself from an encoder with SSI, "
+        "BiSS-C, SPI or T-format.",
+        metavar="KIND",
         choices=tuple(KINDS),
         tests=("", "hall", "pulses", "step-dir", "up-down"),
         tacit=True,
@@ -197,19 +203,25 @@ class Encoder:
         parse=parse_whole,
         **_READ,
     )
-
+    chip: str | None = option(
+        None,
+        "Chip of an encoder with spi. as5047p answers a tick late.",
+        choices=tuple(CHIPS),
+        **_READ,
+    )
     encoder_clock: int | None = option(
         None,
-        "Clock of an encoder with ssi or biss, at most 10 MHz. It is rounded down to an even number of clocks.",
-        shown="1MHz, with biss 5MHz",
+        "Clock of an encoder that is read, at most 10 MHz. It is rounded down to an even number of clocks. amt22 has "
+        "at most 2 MHz, tformat 2.5 or 5 MHz, the bits of a second.",
+        shown="1MHz of ssi and amt22, 5MHz of biss and as5047p, 2.5MHz of tformat",
         metavar="FREQUENCY",
         parse=parse_frequency,
         **_READ,
     )
     line_delay: Fraction | None = option(  # noqa: RUF009
         None,
-        "Delay of the lines to an encoder and back. With ssi each bit is read this much later; biss measures "
-        "it in every frame, and simulations take it.",
+        "Delay of the lines to an encoder and back. With ssi and spi each bit is read this much later; biss and "
+        "tformat measure it in every frame, and simulations take it.",
         shown="0",
         metavar="TIME",
         parse=parse_time,
@@ -260,6 +272,8 @@ class Encoder:
             if self.pulses_per_rev is None:
                 raise ParameterError("ppr", "must be given, or --lines, or --cpr, or --pole-pairs")
             return
+        if self.sensor == "spi" and self.chip is None:
+            raise ParameterError("chip", f"must be given with --sensor spi: {' or '.join(CHIPS)}")
         if self.bits is None:
             rest = f"must be given with --sensor {self.sensor}, as 17, or 12+17 with 12 of turns"
             raise ParameterError("bits", rest)
@@ -269,8 +283,20 @@ class Encoder:
             rest = f"must be left out with --sensor {self.sensor}, not {self.pulses_per_rev}: type --bits"
             raise ParameterError("ppr", rest)
         object.__setattr__(self, "pulses_per_rev", counts)
-        if self.encoder_clock is not None and not 1 <= self.encoder_clock <= _FASTEST_LINE:
-            raise ParameterError("encoder_clock", f"must be from 1 Hz to 10 MHz, not {self.encoder_clock} Hz")
+        self._check_master(Sampled.of(self.bits, None))
+
+    def _check_master(self, sampled: Sampled) -> None:
+        fastest, hertz = CHIPS[self.chip].fastest_hz if self.chip else _FASTEST_LINE, self.encoder_clock
+        if hertz is not None and not 1 <= hertz <= fastest:
+            raise ParameterError("encoder_clock", f"must be from 1 Hz to {fastest // 10**6} MHz, not {hertz} Hz")
+        if self.chip and (sampled.turn_bits or sampled.bits not in CHIPS[self.chip].bits):
+            allowed = " or ".join(map(str, sorted(CHIPS[self.chip].bits)))
+            raise ParameterError("bits", f"must be {allowed} for {self.chip}, not {self.bits}")
+        if self.sensor == "tformat":
+            if hertz not in (None, *RATES):
+                raise ParameterError("encoder_clock", f"must be 2.5MHz or 5MHz for tformat, not {hertz} Hz")
+            if sampled.turn_bits > MOST_BITS:
+                raise ParameterError("bits", f"must be at most {MOST_BITS} of turns for tformat, not {self.bits}")
 
     def _check_decoding(self) -> None:
         if self.decoding in self.kind.decodings:
@@ -300,21 +326,20 @@ class Encoder:
         """Facts of a position that is read; None: edges are counted."""
         return None if self.bits is None else Sampled.of(self.bits, self.sample_age)
 
-    def reads(self, clock_hz: int, tick_cycles: int) -> Reads | None:
+    def reads(self, clock_hz: int) -> Reads | None:
         """Return the reads that a core makes itself, one in each tick; None: it makes none."""
         if (sampled := self.sampled) is None or self.sensor == "sampled":
             return None
+        usual = {"ssi": 1_000_000, "biss": 5_000_000, "spi": CHIPS[self.chip or "amt22"].usual_hz, "tformat": RATES[0]}
+        hertz = self.encoder_clock or usual[self.sensor]
+        every = (sampled.width, clock_hz, hertz, ceil((self.line_delay or 0) * clock_hz))
+        if self.chip:
+            return SpiReads(*every, chip=self.chip)
+        if self.sensor == "tformat":
+            return TformatReads(*every, turn_bits=sampled.turn_bits)
         biss = self.sensor == "biss"
-        return Reads(
-            sampled.width,
-            clock_hz,
-            self.encoder_clock or (5_000_000 if biss else 1_000_000),
-            ceil((self.line_delay or 0) * clock_hz),
-            biss=biss,
-            gray=self.gray,
-            repeat=self.repeat,
-            crc=0 if self.crc == "none" or not biss else int(self.crc or hex(BISS_CRC), 16),
-        ).within(tick_cycles)
+        crc = 0 if self.crc == "none" or not biss else int(self.crc or hex(BISS_CRC), 16)
+        return Reads(*every, biss=biss, gray=self.gray, repeat=self.repeat, crc=crc)
 
     @property
     def inverted(self) -> frozenset[str]:

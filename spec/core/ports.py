@@ -43,7 +43,7 @@ def ports_of(spec: Core, own: Iterable[Port]) -> Iterator[Port]:
         text = "position is that of a good read; it falls when none has come for the maximum time."
         yield held(TICK, "position_valid", help=text)
     if spec.reads is not None:
-        yield Port("encoder_clock", "output", help="Clock of the encoder; it is high between reads.")
+        yield from spec.reads.ports[1:]
     if spec.velocity.output:
         yield held(UPDATE, "velocity_overflow", help="This velocity was saturated to the width of the port.")
     if spec.age:
@@ -87,7 +87,7 @@ def _inputs(spec: Core) -> Iterator[Port]:
     for line, help in zip(spec.encoder.kind.lines, spec.encoder.kind.pins, strict=True):
         yield pin(line, help)
     if spec.reads is not None:
-        yield pin("encoder_data", "Data of the encoder, asynchronous; it is high between reads.")
+        yield spec.reads.ports[0]
     elif spec.encoder.sampled:
         yield from spec.encoder.sampled.ports(spec.tick.longest)
     if "z" in front.lines:

@@ -5,6 +5,9 @@ from fractions import Fraction
 from functools import reduce
 from math import ceil
 from operator import xor
+from typing import ClassVar
+
+from tachometry.spec.language.port import Port, pin
 
 # Why a read yields no position.
 NO_ANSWER, WRONG_CHECK, ERROR_BIT = 1, 2, 3
@@ -38,19 +41,47 @@ class Reads:
     crc: int = 0  # of BiSS-C: the polynomial with its highest term; 0: the frame has none
     start_wait: int = 0  # of BiSS-C: clocks from the first rise until the start bit, at most
 
-    def within(self, tick_cycles: int) -> "Reads":
-        """Return the same with a wait for the start bit, of at most 40 us, that leaves time for the rest of a tick."""
-        left = tick_cycles - self.least_tick
-        least = 4 * self.half + self.delay
-        return replace(self, start_wait=max(min(self._clocks(40), left), least)) if self.biss else self
+    # The first is the input.
+    ports: ClassVar[tuple[Port, ...]] = (
+        pin("encoder_data", "Data of the encoder, asynchronous; it is high between reads."),
+        Port("encoder_clock", "output", help="Clock of the encoder; it is high between reads."),
+    )
 
-    def _clocks(self, microseconds: int) -> int:
-        return ceil(Fraction(microseconds * self.clock_hz, 10**6))
+    def within(self, tick: int, longest_tick: int) -> "Reads":
+        """Return the same for ticks of so many clocks, with as long a wait for the start bit as they leave time for."""
+        left = tick - self.least_tick
+        least = 4 * self.half + self.delay
+        return replace(self, start_wait=max(min(self._clocks_of_ns(40_000), left), least)) if self.biss else self
+
+    def _clocks_of_ns(self, nanoseconds: int) -> int:
+        return ceil(Fraction(nanoseconds * self.clock_hz, 10**9))
+
+    @property
+    def line(self) -> str:
+        """Name of the input."""
+        return self.ports[0].name
+
+    @property
+    def reasons(self) -> tuple[int, ...]:
+        """All that can be wrong with an answer."""
+        if self.biss:
+            return NO_ANSWER, WRONG_CHECK, ERROR_BIT, WARNING
+        return (NO_ANSWER, *(WRONG_CHECK,) * self.repeat)
 
     @property
     def half(self) -> int:
         """Clocks of half a period of the encoder's clock, at least two."""
         return max(ceil(Fraction(self.clock_hz, 2 * self.encoder_hz)), 2)
+
+    @property
+    def late(self) -> bool:
+        """Whether an answer is that to the frame before, at whose end the encoder took its position."""
+        return False
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether bits are read near enough to their middle."""
+        return True
 
     @property
     def crc_width(self) -> int:
@@ -90,6 +121,11 @@ class Reads:
         return self.delay + SYNCHRONISER + 2 * self.half * self.sent_bits + 1
 
     @property
+    def age_width(self) -> int:
+        """Bits of `sample_age`."""
+        return self.oldest.bit_length()
+
+    @property
     def age_spread(self) -> int:
         """Clocks by which ages differ, at most."""
         return self.start_wait if self.biss else 0
@@ -102,7 +138,7 @@ class Reads:
     @property
     def rest(self) -> int:
         """Clocks from the strobe that ends a read until another one can begin."""
-        return 2 * self.half + self._clocks(20 if self.biss else 25) + 2
+        return 2 * self.half + self._clocks_of_ns(20_000 if self.biss else 25_000) + 2
 
     @property
     def least_tick(self) -> int:

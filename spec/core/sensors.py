@@ -113,7 +113,7 @@ _SENSORS = (
 SENSORS = {sensor.name: sensor for sensor in _SENSORS}  # whose edges are counted
 _NOT_TAKEN = "a read was wrong or older than two ticks, and was not taken."
 # Whose position is read: by what is around the core, or by the core itself.
-READ = {name: Sensor(name, (), (1,), (), (), _NOT_TAKEN) for name in ("sampled", "ssi", "biss")}
+READ = {name: Sensor(name, (), (1,), (), (), _NOT_TAKEN) for name in ("sampled", "ssi", "biss", "spi", "tformat")}
 KINDS = {**SENSORS, **READ}
 
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from tachometry.spec.core.asked import Asked
-from tachometry.spec.core.timing import MAX_TICK_CYCLES
 from tachometry.spec.formats.velocity_output import NATIVE, per_count
 from tachometry.spec.language.units import SpeedUnit
 
@@ -22,12 +21,8 @@ class Tick:
 
     @property
     def longest(self) -> int:
-        """Most clocks in a tick; an external one lasts two nominal ones at most, if nothing else was asked for."""
-        cycles = self.asked.timing.tick_cycles
-        if not self.asked.external_tick:
-            return cycles
-        longest = self.asked.max_tick_cycles
-        return min(2 * cycles, MAX_TICK_CYCLES) if longest is None else longest
+        """Most clocks in a tick."""
+        return self.asked.longest_tick
 
     @property
     def room(self) -> int:

@@ -207,7 +207,10 @@ def ports_on(spec: AnySpec, bus: Bus | None) -> tuple[Port, ...]:
     if bus is None:
         return spec.ports
     registers = registers_on(spec, bus)
-    return (*registers.core_ports, *bus.ports(registers))
+    ports = (*registers.core_ports, *bus.ports(registers))
+    if len({port.name for port in ports}) < len(ports):
+        raise ParameterError("bus", f"must not be {bus.name}, whose pins have the names of the encoder's")
+    return ports
 
 
 def registers_on(spec: AnySpec, bus: Bus) -> RegisterMap:

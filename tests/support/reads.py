@@ -7,14 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from support.compiled import build
-from tachometry.hdl.front_end.serial_encoder import SerialEncoder
+from tachometry.hdl.core.sampled_tachometer import master_of
 from tachometry.sim.build import run
 from tachometry.sim.golden.encoder_read import Records
+from tachometry.spec.core.reads import Reads
 
 Clocks = NDArray[np.int64]
 
 # Rows in: clock, and the inputs from it on. Rows out: clock of a strobe and the record; or clock of a change, −1 and
-# the level of the encoder's clock.
+# the levels of the outputs to the encoder, the first lowest.
 _PLAYER = """
 #include <cstdio>
 int main(int, char **argv) {
@@ -26,11 +27,11 @@ int main(int, char **argv) {
   for (int64_t clock = 0; clock < clocks; clock++) {
     for (; more && next[0] == clock; more = fread(next, sizeof next, 1, in) == 1) {
       top.p_start.set<bool>(next[1]);
-      top.p_encoder__data.set<bool>(next[2]);
+      top.LINE.set<bool>(next[2]);
     }
     top.p_clk.set<bool>(false);
     top.step();
-    const int64_t now = top.p_encoder__clock.get<bool>();
+    const int64_t now = PINS;
     if (now != pins) {
       const int64_t row[] = {clock, -1, pins = now, 0, 0};
       fwrite(row, sizeof row, 1, out);
@@ -49,17 +50,18 @@ int main(int, char **argv) {
 """
 
 
-def play(
-    master: SerialEncoder, start: Clocks, line: tuple[Clocks, NDArray[np.uint8]], clocks: int
-) -> tuple[Records, Clocks]:
-    """Return the records of a master, and the clocks in which its clock changes, with its levels."""
+def play(reads: Reads, start: Clocks, line: tuple[Clocks, NDArray[np.uint8]], clocks: int) -> tuple[Records, Clocks]:
+    """Return the records of a master, and the clocks in which its outputs to the encoder change, with their levels."""
+    read, *driven = ("p_" + port.name.replace("_", "__") for port in reads.ports)
+    pins = " | ".join(f"top.{name}.get<bool>() << {place}" for place, name in enumerate(driven))
+    player = _PLAYER.replace("LINE", read).replace("PINS", pins)
     clock = np.unique(np.concatenate([[0], start, start + 1, line[0]]))
     level = line[1][np.searchsorted(line[0], clock, side="right") - 1]
     rows = np.stack([clock, np.isin(clock, start), level], axis=1).astype(np.int64)
     with TemporaryDirectory() as folder:
         played, seen = Path(folder) / "in", Path(folder) / "out"
         rows.tofile(played)
-        run([build(master, _PLAYER), played, seen, str(clocks)], "simulation")
+        run([build(master_of(reads), player), played, seen, str(clocks)], "simulation")
         found = np.fromfile(seen, dtype=np.int64).reshape(-1, 5)
     changes = found[found[:, 1] == -1][:, [0, 2]]
     at, sample, age, reason, warning = found[found[:, 1] != -1].T

@@ -9,7 +9,7 @@ from typing import Any
 from tachometry.spec.core.extras.extra import Event, Extra
 from tachometry.spec.core.front_end import Pin
 from tachometry.spec.core.numbers import Numbers
-from tachometry.spec.core.reads import NO_ANSWER
+from tachometry.spec.core.reads import JUMP, NO_ANSWER, WRONG_CHECK
 from tachometry.spec.core.timing import parse_filter
 from tachometry.spec.language.option import ParameterError, check_options, option, parse_flag
 from tachometry.spec.language.port import TICK, Port, held, pin
@@ -136,11 +136,8 @@ class Health(Extra):
     def faults(self, spec: Numbers) -> tuple[Fault, ...]:
         """Return the faults that can be seen."""
         if spec.encoder.sampled:
-            reads = spec.reads
-            biss = reads is not None and reads.biss
-            seen = {Fault.NO_ANSWER: True, Fault.WRONG_CHECK: reads is None or biss or reads.repeat}
-            seen |= {Fault.ERROR_BIT: biss, Fault.WARNING: biss, Fault.JUMP: spec.reach is not None}
-            return tuple(fault for fault, can_be in seen.items() if can_be)
+            reasons = (NO_ANSWER, WRONG_CHECK) if spec.reads is None else spec.reads.reasons
+            return tuple(Fault(READ_FAULTS + one) for one in (*reasons, *(JUMP,) * (spec.reach is not None)))
         lines = spec.front_end.complemented
         absent = {fault for line, fault in OPEN.items() if line not in lines}
         absent |= {Fault.INDEX_MISSED} if spec.front_end.index_state is None else set()

@@ -22,6 +22,7 @@ from tachometry.spec.core.extras.health import READ_FAULTS
 from tachometry.spec.core.reads import JUMP, WARNING, WRONG_CHECK
 
 BASE = {"sensor": "biss", "bits": "17", "clock": "50MHz", "tick": "100us", "max-time": "2ms"}
+AMT22 = {"sensor": "spi", "chip": "amt22", "bits": "12"}
 SSI = {"sensor": "ssi", "bits": "3+12", "encoder-clock": "2MHz"}
 CASES = {
     "m": SSI | {"gray": "yes", "repeat": "yes", "line-delay": "300ns", "reverse": "yes", "health": "yes"},
@@ -29,6 +30,11 @@ CASES = {
     | {"health": "yes", "max-speed": "6000rpm"},
     "m short": SSI | {"tick": "40us", "average": "3"},
     "track": {},
+    "m late": {"sensor": "spi", "chip": "as5047p", "bits": "14", "external-tick": "yes", "max-speed": "6000rpm"}
+    | {"max-time": "1ms", "tick": "50us", "health": "yes"},
+    "m bytes": AMT22 | {"reverse": "yes"},
+    "m tformat": {"sensor": "tformat", "bits": "16+17", "line-delay": "100ns", "health": "yes"},
+    "track tformat": {"sensor": "tformat", "bits": "23", "encoder-clock": "5MHz", "max-speed": "3000rpm"},
 }
 
 
@@ -36,7 +42,7 @@ def core(case: str) -> TachometerSpec:
     return of_texts(case.split()[0], BASE | CASES[case])
 
 
-@pytest.mark.parametrize("case", only(["m", "m outside"], CASES))
+@pytest.mark.parametrize("case", only(["m", "m outside", "m late"], CASES))
 def test_gates_and_golden_model_agree_on_every_read(case: str) -> None:
     spec = core(case)
     found = lockstep(spec, stress(spec, 26, 30), Cxxrtl())  # where the first fault is a jump with a warning
@@ -62,7 +68,7 @@ def test_a_wrong_code_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     assert lockstep(spec, stress(spec, 1, 30), Cxxrtl()).n_mismatches > 0
 
 
-@pytest.mark.parametrize("case", only(["m"], [*CASES]))
+@pytest.mark.parametrize("case", only(["m", "m late", "m bytes", "m tformat"], [*CASES]))
 def test_exported_verilog_reads_a_model_in_icarus(case: str, tmp_path: Path) -> None:
     assert "PASS: position 24" in smoke(core(case), tmp_path)
 
@@ -109,6 +115,18 @@ def test_a_core_is_made_again_from_its_options() -> None:
         ({"sample-age": "3"}, "sample_age must be given with --sensor sampled, not biss"),
         ({"sensor": "sampled", "gray": "yes"}, "gray must be given with --sensor ssi or biss, not sampled"),
         ({"encoder-clock": "20MHz"}, "encoder_clock must be from 1 Hz to 10 MHz, not 20000000 Hz"),
+        ({"sensor": "spi"}, "chip must be given with --sensor spi: as5047p or amt22"),
+        ({"sensor": "spi", "chip": "amt22"}, "bits must be 12 or 14 for amt22, not 17"),
+        (AMT22 | {"encoder-clock": "4MHz"}, "encoder_clock must be from 1 Hz to 2 MHz, not 4000000 Hz"),
+        (
+            {"sensor": "tformat", "encoder-clock": "4MHz"},
+            "encoder_clock must be 2.5MHz or 5MHz for tformat, not 4000000 Hz",
+        ),
+        ({"sensor": "tformat", "bits": "25+12"}, r"bits must be at most 24 of turns for tformat, not 25\+12"),
+        (
+            {"sensor": "tformat", "clock": "12MHz"},
+            "clock_hz must be nearer to a multiple of 2500000 Hz for tformat, not 12000000",
+        ),
     ],
 )
 def test_what_has_no_meaning_is_refused(more: dict[str, str], message: str) -> None:

@@ -257,7 +257,11 @@ def test_a_core_is_made_again_from_its_options() -> None:
         ("m", {"filter": "3"}, "filter_clocks must be left out with --sensor sampled: it is for edges"),
         ("m", {"sample-age": "81"}, "sample_age must be from 0 to 80 clocks, two ticks, not 81"),
         ("m", {"health": "yes", "health-edges": "3"}, "health must be alone for an encoder that is read"),
-        ("m", {"sensor": "hall"}, "bits must be given with --sensor sampled or ssi or biss, not hall"),
+        (
+            "m",
+            {"sensor": "hall"},
+            "bits must be given with --sensor sampled or ssi or biss or spi or tformat, not hall",
+        ),
         ("m", {"decoding": "4"}, "decoding must be 1 for sampled, not 4"),
         ("m", {"period": "64"}, "period must not be given with method m"),
         ("track", SLOW | {"period": "4"}, "period must be a power of two from 8 to 131072 LSB, a turn, not 4"),
