@@ -74,6 +74,10 @@ class Client:
         for offset, word in self.registers.written(name, value):
             self._write(offset, word)
 
+    def write_degrees(self, name: str, degrees: float) -> None:
+        """Write an electrical angle, to ANGLE_OFFSET or ANGLE_SET; KeyError if the core has no such register."""
+        self.write(name, self.registers.of_degrees(name, degrees))
+
     def write_disc(self, displacement: Sequence[float]) -> bool:
         """Write a map of the disc, and return whether the core has it then; it forgets its place in the turn.
 

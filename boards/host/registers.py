@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tachometry.boards.host.snapshot import Snapshot
+from tachometry.boards.host.snapshot import Snapshot, lsb_of
 
 
 class HostRegisters:
@@ -25,6 +25,7 @@ class HostRegisters:
         self._rad_per_s_per_lsb: float = manifest["velocity"]["rad_per_s_per_lsb"]
         self._flags = frozenset(field["name"] for field in self._registers["STATUS"]["fields"])
         self.disc: Mapping[str, Any] | None = manifest.get("disc")
+        self._units = {field["port"]: field["unit"] for one in self.captured for field in one["fields"]}
         self._unused = [self._unused_of(register) for register in self.captured]
 
     def __contains__(self, name: str) -> bool:
@@ -56,6 +57,14 @@ class HostRegisters:
             word = word & ~(mask << found["low"]) | (value & mask) << found["low"]
         return word
 
+    def of_degrees(self, name: str, degrees: float) -> int:
+        """Return what to write to a register for an electrical angle; bits that let it act are 1. KeyError if there is
+        none.
+        """
+        value, *acts = self._registers[name]["fields"]
+        turns = round(degrees / lsb_of(value["unit"])) % (1 << value["width"])
+        return turns | sum(self.mask(name, one["name"]) for one in acts)
+
     def written(self, name: str, value: int) -> list[tuple[int, int]]:
         """Return offsets and words to be written for a value of a register, or of two; KeyError if there is none,
         ValueError if it does not fit.
@@ -83,7 +92,7 @@ class HostRegisters:
                     bits -= (bits >> field["width"] - 1) << field["width"]
                 name, low = field["port"] or field["name"], (1 << field["shift"]) - 1
                 values[name] = values.get(name, 0) & low | bits << field["shift"]
-        return Snapshot(values, self._flags, self._rad_per_s_per_lsb)
+        return Snapshot(values, self._flags, self._rad_per_s_per_lsb, self._units)
 
     def possible(self, words: Sequence[int]) -> bool:
         """Return whether the captured registers can show these words: bits that no port has are as they must be."""

@@ -1,9 +1,19 @@
 """A snapshot holds what a core showed in one clock."""
 
+import re
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 
 _VELOCITIES = ("velocity_lower", "velocity_upper")  # ports with the LSB of velocity
+
+
+def lsb_of(unit: str) -> float:
+    """Return one LSB of a port in its unit, as of `2^-8 counts` or `1/32767`; of electrical turns in degrees."""
+    found = re.match(r"2\^-(\d+) (electrical)?|1/(\d+)", unit)
+    if found is None:
+        return 1.0
+    power, turns, part = found.groups()
+    return 1 / int(part) if part else (360 if turns else 1) / 2 ** int(power)
 
 
 class Snapshot(Mapping[str, int]):
@@ -12,12 +22,20 @@ class Snapshot(Mapping[str, int]):
     Ports of one bit are there as 0 or 1, and so are `updated` and `indexed`, the events since the capture before.
 
     - `rad_per_s_per_lsb`: What one LSB of `velocity` is.
+    - `units`: Units of ports, as the manifest has them.
     """
 
-    __slots__ = ("_flags", "_rad_per_s_per_lsb", "_values")
+    __slots__ = ("_flags", "_rad_per_s_per_lsb", "_units", "_values")
 
-    def __init__(self, values: Mapping[str, int], flags: frozenset[str], rad_per_s_per_lsb: float) -> None:
+    def __init__(
+        self,
+        values: Mapping[str, int],
+        flags: frozenset[str],
+        rad_per_s_per_lsb: float,
+        units: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
         self._values = MappingProxyType(dict(values))
+        self._units = units
         self._flags = flags
         self._rad_per_s_per_lsb = rad_per_s_per_lsb
 
@@ -37,6 +55,10 @@ class Snapshot(Mapping[str, int]):
     def flags(self) -> Mapping[str, bool]:
         """The flags alone."""
         return MappingProxyType({name: bool(self[name]) for name in self if name in self._flags})
+
+    def in_unit(self, name: str) -> float:
+        """Return a value in its unit: a sine from -1 to 1, and an electrical angle in degrees."""
+        return self[name] * lsb_of(self._units.get(name, ""))
 
     @property
     def velocity_rad_per_s(self) -> float:

@@ -9,6 +9,7 @@ from tachometry.spec.language.port import Port
 from tachometry.spec.registers.demo import DemoMap
 
 Value = float | int | bool | None
+DEGREES = "degrees"
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,8 @@ def columns(registers: DemoMap) -> list[Column]:
             )
         if port.width == 1 and not port.unit:
             return Column(name, "", bool, lambda now: bool(now[name]))
+        if (turns := port.unit.endswith(" electrical turns")) or port.unit.startswith("1/"):
+            return Column(name, DEGREES * turns, float, lambda now: now.in_unit(name))
         return Column(name, port.unit, int, lambda now: now[name])
 
     def bound(name: str) -> Callable[[Snapshot], Value]:

@@ -11,6 +11,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from tachometry.boards.monitor.columns import DEGREES
 from tachometry.boards.monitor.selftest import Result
 from tachometry.boards.monitor.watch import HISTORY, Display, State
 from tachometry.cli.reports.standard_streams import printable
@@ -24,6 +25,7 @@ _SIDE = 46  # columns beside the plot
 _LEAST = 24  # columns of a plot
 _ERRORS = {"decode_errors": "illegal transitions", "overflows": "overflows", "tick_errors": "tick errors"}
 _SATURATED = 255
+_DIAL = "→↗↑↖←↙↓↘"
 
 
 class PlainLines:
@@ -176,6 +178,8 @@ def measured_rows(state: State) -> list[tuple[str, str]]:
         lower, upper = (shown(name, "{:.6g}".format, "none") for name in BOUNDS)
         rows.append(("bounds", f"{lower} .. {upper} {unit}"))
     rows.append(("position", f"{shown('position')} counts"))
+    angles = (name for name, column in state.columns.items() if column.unit == DEGREES)
+    rows += [(name, shown(name, lambda at: f"{at:5.1f}° {_DIAL[round(at / 45) % 8]}")) for name in angles]
     if "age" in state.columns:
         rows.append(("age", f"{shown('age')} ticks"))
     return [*rows, ("standstill", shown("standstill", lambda rests: "yes" if rests else "no"))]

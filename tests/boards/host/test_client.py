@@ -148,3 +148,21 @@ def test_a_map_of_the_disc_is_written_and_read_back() -> None:
     board = GoldenBoard(RegisterMap(spec), trace, 9)
     with pytest.raises(KeyError, match="no map of the disc that is written: see --disc-table"):
         client.Client(board.read, board.write, described).write_disc(displacement)
+
+
+def test_angles_are_in_degrees_and_sines_in_1() -> None:
+    texts = {"ppr": "25", "clock": "1MHz", "tick": "100clk", "max-time": "600clk", "electrical": "7", "sincos": "yes"}
+    spec = of_texts("s", texts)
+    trace = PinTrace.of(VirtualEncoder(25).record(parse_motion("stop:9ms")).recording, spec).completed(spec)
+    board, described = GoldenBoard(RegisterMap(spec), trace, 9), manifest(spec, "spindle")
+    bench = client.Client(board.read, board.write, described | {"registers": RegisterMap(spec).described()})
+    bench.write_degrees("ANGLE_SET", -90)
+    board.clock += 1000
+    now = bench.snapshot()
+    assert (now.in_unit("angle"), now["angle_valid"]) == (270, 1)
+    assert [now.in_unit(name) for name in ("angle_sin", "angle_cos", "position")] == [-1, pytest.approx(0, abs=1e-4), 0]
+    bench.write_degrees("ANGLE_OFFSET", 12.3)
+    board.clock += 1000
+    assert bench.snapshot().in_unit("angle") == pytest.approx(282.3, abs=0.01)
+    with pytest.raises(KeyError):
+        bench.write_degrees("ANGLE_ON", 0)

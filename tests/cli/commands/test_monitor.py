@@ -314,12 +314,14 @@ def shown(state: State, width: int, height: int) -> str:
 
 @pytest.mark.parametrize("width", [20, 60, 100, 200])
 def test_the_view_fits(width: int) -> None:
-    registers = demo_map("s", bounds="yes", age="yes")
+    registers = demo_map("s", bounds="yes", age="yes", electrical="7", sincos="yes")
     state = State("a\x1b[31m title", registers.spec, {column.name: column for column in columns(registers)})
     assert "\x1b" not in shown(state, width, 24)
     host = HostRegisters(manifest_of(registers))
     words = [number + 1 for number, _ in enumerate(host.captured)]
-    state.take(Frame(number / 10, host.snapshot([number * word for word in words])) for number in range(300))
+    (place,) = (number for number, one in enumerate(host.captured) if one["name"] == "ANGLE")
+    words[place] = 2**14
+    state.take(Frame(number / 10, host.snapshot([number * word % 2**16 for word in words])) for number in range(302))
     assert state.history[-1][0] - state.history[0][0] <= 10
     state.counters = {"decode_errors": 255, "overflows": 0, "lost_updates": 3}
     text = shown(state, width, 24)
@@ -328,6 +330,7 @@ def test_the_view_fits(width: int) -> None:
         assert "255 or more" in text
         assert "speed " in text
         assert "bounds" in text
+        assert re.search(r"angle +90\.0° ↑ ", text)
     state.waits_for = "it is out"
     assert "waiting" in shown(state, width, 24)
 
