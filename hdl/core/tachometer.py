@@ -29,7 +29,7 @@ from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput, Seria
 from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import follow, members
 from tachometry.spec import TachometerSpec
-from tachometry.spec.formats.displacement import DISPLACED
+from tachometry.spec.formats.displacement import DISPLACED, MAPPED
 from tachometry.spec.language.port import MISSED, TICK, UPDATE, WIDE
 
 
@@ -288,7 +288,7 @@ class Tachometer(wiring.Component):
                 m,
                 self.datapath,
                 box,
-                box.signature.members.keys() & self.datapath.signature.members.keys() & {*DISPLACED},
+                box.signature.members.keys() & self.datapath.signature.members.keys() & {*DISPLACED, MAPPED},
             )
 
     def _taps(self, m: Module) -> dict[str, Value]:

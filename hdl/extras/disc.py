@@ -13,7 +13,7 @@ from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import only_if
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.disc import SLIPS_BITS, DiscMap
-from tachometry.spec.formats.displacement import DISPLACED, ENTRY_BITS, Displacement
+from tachometry.spec.formats.displacement import DISPLACED, ENTRY_BITS, MAPPED, Displacement
 from tachometry.spec.formats.sectors import Sectors
 
 
@@ -44,7 +44,7 @@ class Gates(wiring.Component):
                 **only_if(not indexed, disc_turn=In(1), disc_turn_by=In(edge)),
                 **only_if(writable, disc_write=In(1), disc_address=In(edge), disc_data=In(ENTRY_BITS)),
                 **only_if(writable, disc_entry=Out(signed(ENTRY_BITS))),
-                **dict.fromkeys(("disc_used", "disc_sure"), Out(1)),
+                **dict.fromkeys(("disc_used", "disc_sure", MAPPED), Out(1)),
                 **dict.fromkeys(DISPLACED, Out(signed(form.width))),
             }
         )
@@ -69,7 +69,7 @@ class Gates(wiring.Component):
         m.d.sync += [self.displaced.eq(entry << self._shift), latest.eq(self.displaced_before)]
         with m.If(~(self.disc_used & (counted | self._looks))):  # the reset of a flip-flop is free
             m.d.sync += self.displaced.eq(0)
-        m.d.comb += self.displaced_before.eq(Mux(shows, self.displaced, latest))
+        m.d.comb += [self.displaced_before.eq(Mux(shows, self.displaced, latest)), self.mapped.eq(self.disc_used)]
         return m
 
     def _read(self, m: Module, edge: Value, writes: Value, entries: Sequence[int]) -> Value:

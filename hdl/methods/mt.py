@@ -46,6 +46,7 @@ class MTMethod(TimedDatapath):
         travelled = Signal(signed(signed_width(self._most_travelled)), reset_less=True)
         total = Signal.like(travelled)
         opens = Signal()
+        self._opens = opens
         m.d.comb += [
             # The carry tells whether the low bits of the length are less than those of the age.
             length.eq(Cat(~still, (timer.age + still)[bits:])),

@@ -197,7 +197,7 @@ class QuotientVelocity(wiring.Component):
         finer = self._spec.bound.error_bits
         count = self._spec.form.timer_periods << finer
         off = int(self._spec.bound.edge_error * count)
-        greatest = count + off
+        greatest = (self._spec.form.silent_way << finer) + off
         m.d.comb += counted.eq(self.ends)
         known = Signal(reset_less=True)
         with m.If(self.divider.start):

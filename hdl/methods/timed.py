@@ -1,6 +1,6 @@
 """The datapaths of the methods that measure the time between counts share this."""
 
-from amaranth import Module, Mux, Signal, Value, signed
+from amaranth import Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 
@@ -9,6 +9,7 @@ from tachometry.hdl.methods.count_way import CountWay
 from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.gap_timer import GapTimer
 from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
+from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import only_if
 from tachometry.spec.formats.displacement import DISPLACED
 from tachometry.spec.methods.timed import TimedTachometer
@@ -24,6 +25,7 @@ class TimedDatapath(wiring.Component):
 
     def __init__(self, spec: TimedTachometer) -> None:
         self._spec = spec
+        self._opens: Value = Const(1)  # a measurement opens with this count
         self.gap_timer = GapTimer(spec.form.max_periods, on_lattice=spec.form.on_lattice)
         self.quotient_velocity = QuotientVelocity(spec)
         if not spec.form.on_lattice:
@@ -39,6 +41,7 @@ class TimedDatapath(wiring.Component):
             **only_if(spec.form.on_lattice, next_count=In(signed(spec.widths.count))),  # the next `pulse_count`
             **only_if(not spec.form.on_lattice, step_before=In(signed(2))),  # the step of the next clock
             **(dict.fromkeys(DISPLACED, In(signed(form.width))) if (form := spec.displacement) else {}),
+            **only_if(form and spec.bounds, mapped=In(1)),
         }
         super().__init__({name: member for name, member in members.items() if name != "tick"})
         # On the lattice: the sign of the last count, and whether this count is from another edge than that.
@@ -100,9 +103,12 @@ class TimedDatapath(wiring.Component):
             begun = Signal()
             with m.If(timer.overdue):
                 m.d.sync += begun.eq(1)
+            mapped: Value = Const(1)
+            if spec.displacement is not None:
+                mapped = _is_mapped(m, self.mapped, count=timer.count, opens=self._opens, ends=quotient.ends)
             m.d.comb += [
                 quotient.was_negative.eq(was_negative),
-                quotient.known.eq(~quotient.beyond_in & (begun | timer.opened)),
+                quotient.known.eq(~quotient.beyond_in & (begun | timer.opened) & mapped),
             ]
         return m
 
@@ -129,3 +135,14 @@ class TimedDatapath(wiring.Component):
             m.d.sync += was_negative.eq(negative)
         decay = Mux(quotient.decays, Mux(quotient.negative_before, -3, 3), 0)
         return Mux(quotient.ends, self._way << 1, decay), was_negative
+
+
+def _is_mapped(m: Module, mapped: Value, *, count: Value, opens: Value, ends: Value) -> Value:
+    """Return whether the map was used at both ends of a measurement, or at the last count before a silence."""
+    (used,) = delay(m, mapped)
+    opening, latest = (Signal(name=name) for name in ("opening", "latest"))
+    with m.If(count):
+        m.d.sync += latest.eq(used)
+        with m.If(opens):
+            m.d.sync += opening.eq(used)
+    return Mux(ends, used & opening, latest)

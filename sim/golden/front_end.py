@@ -145,6 +145,7 @@ class Steps:
     levels: tuple[NDArray[np.int64], ...] = ()
     # shape (n,): displacement of the edge of each step that an extra gives; empty if none does
     displaced: NDArray[np.int64] = field(default_factory=_none)
+    mapped: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, np.bool_))  # shape (n,): whether it gives one
     fine_bits: int = 0  # of these below half a count
     # displacements of the edges above and below the place at the end of ticks without a count, by their last clocks
     around: Callable[[NDArray[np.int64]], tuple[NDArray[np.int64], NDArray[np.int64]]] | None = None

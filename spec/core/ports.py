@@ -146,4 +146,6 @@ def bound_ports(spec: Core) -> Iterator[Port]:
         text += "manifest means that there is none."
         unit = f"2^{-spec.velocity.frac_bits} {spec.unit}"
         yield held(UPDATE, name, width, signed=True, unit=unit, help=text)
-    yield held(UPDATE, "bounds_valid", help="There are bounds; not yet for the first measurement.")
+    text = "There are bounds; not yet for the first measurement"
+    text += "" if spec.displacement is None else ", nor while the map of the disc is not used"
+    yield held(UPDATE, "bounds_valid", help=f"{text}.")

@@ -6,6 +6,7 @@ from fractions import Fraction
 
 # What gates give to a datapath: the displacement of the edge of a count, and that of the count before.
 DISPLACED = ("displaced", "displaced_before")
+MAPPED = "mapped"  # also, a clock earlier: whether there is one
 ENTRY_BITS = 8  # of an entry of a table, signed
 FINEST = Fraction(1, 256)  # counts: no unit of a table of edges is smaller
 
@@ -18,6 +19,7 @@ class Displacement:
     shift: int = 0
     finest: Fraction = FINEST  # counts: the unit is at least this
     entry_bits: int = ENTRY_BITS  # of an entry, signed
+    steepest: int | None = None  # greatest change of an entry from edge to edge; None: any
 
     @property
     def low(self) -> int:
@@ -38,3 +40,8 @@ class Displacement:
     def most(self) -> int:
         """Greatest |displacement| in LSBs of the distance or place."""
         return 1 << self.width - 1 + self.low
+
+    @property
+    def most_between(self) -> int:
+        """Greatest |difference| of neighbouring edges in LSBs of the distance or place."""
+        return 2 * self.most if self.steepest is None else self.steepest << self.shift + self.low

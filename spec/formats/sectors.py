@@ -29,6 +29,12 @@ class Sectors:
         return tuple(accumulate((self.slopes[edge >> self.bits] for edge in range(self.edges)), initial=0))
 
     @property
+    def displacements(self) -> tuple[int, ...]:
+        """The displacements of all edges."""
+        own, half = self.quarters or (0,), 1 << self.fine - 1
+        return tuple((value + half >> self.fine) + own[edge % len(own)] for edge, value in enumerate(self.values[:-1]))
+
+    @property
     def width(self) -> int:
         """Bits of a displacement, signed."""
         most = max(map(abs, self.values)) // (1 << self.fine) + 1 + max(map(abs, self.quarters), default=0)

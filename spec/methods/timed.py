@@ -45,6 +45,11 @@ class Quotient:
         return 0 if self.displacement is None else 2 * self.displacement.most
 
     @property
+    def silent_way(self) -> int:
+        """Greatest way between the edges about a shaft, in counts times the timer periods in a tick, by the map."""
+        return self.timer_periods + (0 if self.displacement is None else self.displacement.most_between)
+
+    @property
     def max_quotient(self) -> int:
         """Greatest |N·T|/time in counts per tick, before it is saturated."""
         if self.on_lattice and not self.one_count:

@@ -16,7 +16,7 @@ from support.nightly import nightly
 
 from tachometry.hdl.extras import disc as gates
 from tachometry.hdl.extras import sectors
-from tachometry.hdl.methods import count_way, tick_counts, track
+from tachometry.hdl.methods import count_way, quotient_velocity, tick_counts, timed, track
 from tachometry.sim import build, golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
@@ -28,6 +28,7 @@ from tachometry.spec import ParameterError, of_texts
 from tachometry.spec.core.disc import Disc
 from tachometry.spec.core.extras import disc as of_disc
 from tachometry.spec.core.extras.disc import DiscMap
+from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.formats.sectors import Sectors, sectors_of
 from tachometry.spec.registers.manifest import manifest
 
@@ -75,6 +76,11 @@ TRACKED = (
     Mapped("track", "disc=other.json disc-table=edges tick=1000clk smooth=yes max-time=5000clk", edges=60),
     Mapped("track", "disc=slow.json disc-table=sectors index=yes tick=300clk max-time=3000clk", 60, 120_000),
 )
+BOUNDED = (
+    Mapped("mt", "disc=far.json index=yes bounds=yes edge-error=0.25", edges=100),
+    Mapped("t", "disc=other.json disc-table=edges bounds=yes max-speed=100rev/s", edges=100, late=True),
+    Mapped("mt", "disc=slow.json disc-table=sectors index=yes bounds=yes", edges=100, late=True),
+)
 # Beside what shows a place of the shaft.
 _FINE = "disc=far.json index=yes tick=300clk max-time=3000clk"
 BESIDE = (
@@ -96,7 +102,7 @@ def rule(case: Case) -> None:
     assert not any(used[[bypass[clock] == 1 for clock in case.run().ticks.clock]])
 
 
-test_cores = agreeing(CASES + TRACKED + BESIDE, rule)
+test_cores = agreeing(CASES + TRACKED + BOUNDED + BESIDE, rule)
 test_first_bus, test_second_bus = map(on_a_bus, BUS)
 test_refusals = refused({"disc-table=edges": "disc_table must not be given with method m"})
 
@@ -120,7 +126,6 @@ test_refusals = refused({"disc-table=edges": "disc_table must not be given with 
         ("mt", "disc-table=sectors", "disc_table must be edges without --disc: no program writes sectors"),
         ("t", "disc=other.json disc-table=sectors", "must be edges without an index in a state of the lines"),
         ("mt", "disc=steep.json disc-table=sectors:4 index=yes", "must have more sectors than 4 of 32 edges, which"),
-        ("mt", "disc=far.json bounds=yes", "disc does not work with --bounds"),
         ("mt", "disc=far.json timer=tick", "timer must be clock with --disc"),
         ("t", "disc-table=edges teeth=60-2 sensor=pulses ppr=60 decoding=1", "does not work with --teeth"),
     ],
@@ -218,6 +223,9 @@ FAULTS = (
     (tick_counts.TickCounts, "Mux(takes, self.displaced, 0)", "0", 5),
     (track.TrackMethod, "counts.number > 1", "1", 5),
     (count_way.CountWay, "self.displaced_before << self._low", "self.displaced_before", 3),
+    (timed._is_mapped, "used & opening", "used", 8),
+    (timed._is_mapped, "delay(m, mapped)", "(mapped,)", 9),
+    (quotient_velocity.QuotientVelocity, "silent_way", "timer_periods", 8),
 )
 
 
@@ -225,7 +233,8 @@ FAULTS = (
 @pytest.mark.parametrize(("box", "text", "wrong", "case"), FAULTS)
 def test_wrong_gates_are_seen(box: Any, text: str, wrong: str, case: int) -> None:
     with mutant(box, text, wrong):
-        assert lockstep((CASES + TRACKED)[case].spec, (CASES + TRACKED)[case].trace(), Cxxrtl()).n_mismatches
+        one = (CASES + TRACKED + BOUNDED)[case]
+        assert lockstep(one.spec, one.trace(), Cxxrtl()).n_mismatches
 
 
 @pytest.mark.parametrize(
@@ -271,8 +280,8 @@ def test_a_map_of_zeros_changes_nothing(method: str) -> None:
 
 @pytest.mark.parametrize("method", ["t", "mt"])
 def test_a_map_takes_the_disc_away(method: str) -> None:
-    """Of a shaft at constant speed whose edges lie as the map says, both ways."""
-    words = "disc=far.json index=yes clock=10MHz tick=1000clk max-time=20000clk"
+    """Of a shaft at constant speed whose edges lie as the map says, both ways; bounds hold while it is used."""
+    words = "disc=far.json index=yes clock=10MHz tick=1000clk max-time=20000clk bounds=yes"
     spec = Case(method, words).spec
     unit = manifest(spec)["disc"]["counts_per_lsb"]
     at = np.arange(1, 401) + np.round(np.array(FAR)[np.arange(1, 401) % EDGES] / unit) * unit
@@ -286,10 +295,15 @@ def test_a_map_takes_the_disc_away(method: str) -> None:
         late = updates.rows((updates.clock > 210_000) & (updates.clock < 390_000))
         speed = late.velocity / 2**spec.velocity.frac_bits
         assert np.abs(speed - way).max() < 0.01
+        least, most = (late[name] / 2**spec.velocity.frac_bits for name in BOUNDS)
+        assert ((least <= way) & (most >= way) & late.bounds_valid).all()
+        assert np.median(most - least) < 0.01
+        assert not updates.bounds_valid[updates.clock < 2000].any()
         bypassed = golden.run(
             spec, PinTrace.of_lines(trace.clock, trace.n_clocks, trace.lines | {"disc_bypass": 1 + 0 * trace.a})
         )
         assert np.abs(bypassed.updates.velocity / 2**spec.velocity.frac_bits - way)[20:].max() > 0.05
+        assert not bypassed.updates.bounds_valid.any()
 
 
 def test_a_turn_aligns_a_core_without_an_index_while_the_shaft_turns() -> None:

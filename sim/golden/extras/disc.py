@@ -24,10 +24,12 @@ def displaced(extra: DiscMap, view: View) -> Steps:
     counts, form, found = spec.encoder.encoder_counts, extra.displacement(spec), _places(extra, view)
     writes, through = _writes(extra, view.trace), np.append(0, np.cumsum(steps.step))
 
+    def is_used(clock: Ints) -> NDArray[np.bool_]:
+        return (found.at("trust", clock + 1) & 1 == 1) & (view.trace.line_at("disc_bypass", clock + 1) == 0)
+
     def of_edge(passed: Ints, clock: Ints) -> Ints:
         """Return the displacement of an edge by the counts since reset below it."""
-        trust = found.at("trust", clock + 1)
-        used = np.flatnonzero((trust & 1 == 1) & (view.trace.line_at("disc_bypass", clock + 1) == 0))
+        used = np.flatnonzero(is_used(clock))
         edge = (passed + found.at("moved", clock))[used] % counts
         value = np.zeros(len(clock), np.int64)
         value[used] = _contents(extra, spec, writes, edge, clock[used]) << form.shift
@@ -44,7 +46,8 @@ def displaced(extra: DiscMap, view: View) -> Steps:
         ahead = of_edge(np.append(0, np.cumsum(steps.step[some]))[row] + ~back, last)
         return np.where(back, latest, ahead), np.where(back, ahead, latest)
 
-    return replace(steps, displaced=value, around=around, fine_bits=form.per_count.bit_length() - 2)
+    fine_bits, mapped = form.per_count.bit_length() - 2, is_used(steps.clock)
+    return replace(steps, displaced=value, mapped=mapped, around=around, fine_bits=fine_bits)
 
 
 def tables(extra: DiscMap, view: View) -> dict[str, Table]:

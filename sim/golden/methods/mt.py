@@ -33,17 +33,18 @@ class Model:
         opening, ends = opening[~first[ends]], ends[~first[ends]]
         none = np.zeros(len(ends), dtype=np.bool_)
         distance, time = self._distance(counts.size, opening, ends), period[ends] - period[opening]
-        least, most = enclosure(spec, distance, time)
+        off = counts.place[ends] - counts.place[opening]
+        least, most = enclosure(spec, distance, off, time)
         found = Measurements(
             clock=counts.clock(period[ends]),
             distance=2 * distance,
-            displaced=counts.place[ends] - counts.place[opening],
+            displaced=off,
             time=time,
             forced=none,
             beyond=none,
             least=least,
             most=most,
-            known=~none,
+            known=counts.mapped[ends] & counts.mapped[opening],
         )
         return updates(spec, counts, with_silences(spec, counts, found), ticks)
 

@@ -24,17 +24,18 @@ class Model:
         same = np.append(False, sign[1:] == sign[:-1])[: len(sign)] | spec.paper_exact | many
         none = np.zeros(len(sign), dtype=np.bool_)
         distance, time = np.where(same, sign, 0), np.where(many, 1, gap)
-        least, most = enclosure(spec, distance, time)
+        off = np.diff(counts.place, prepend=0)
+        least, most = enclosure(spec, distance, off, time)
         found = Measurements(
             clock=counts.clock(counts.period),
             distance=2 * distance,
-            displaced=np.diff(counts.place, prepend=0),
+            displaced=off,
             time=time,
             forced=none,
             beyond=many,
             least=least,
             most=most,
-            known=~many,
+            known=~many & counts.mapped & np.append(False, counts.mapped)[:-1],
         )
         opened = (gap <= spec.form.max_periods) & (np.arange(len(gap)) > 0)
         asked = with_silences(spec, counts, found[opened | many])

@@ -23,6 +23,7 @@ class Counts:
     period: Ints  # shape (n,)
     size: Ints  # shape (n,): counts of the step or of the tick; never 0
     place: Ints  # shape (n,): how far off its place the edge lies, in counts, times the timer periods in a tick
+    mapped: NDArray[np.bool_]  # shape (n,): whether that is known, or there is no map
     clock_of: Ints | None  # shape (m,): clock in which each period is seen; None: a period is a clock
     n_periods: int
 
@@ -31,11 +32,12 @@ class Counts:
         """Return the steps that the datapath counts within `n_clocks`, or the ticks that are not empty."""
         if spec.form.on_lattice:
             period = np.flatnonzero(ticks.pulse_count)
-            return cls(period, ticks.pulse_count[period], 0 * period, ticks.clock, len(ticks.clock))
+            return cls(period, ticks.pulse_count[period], 0 * period, period >= 0, ticks.clock, len(ticks.clock))
         seen = (steps.step != 0) & (steps.clock + spec.latency.tick < n_clocks)
         form, period = spec.displacement, steps.clock[seen] + spec.latency.tick
-        place = 0 * period if form is None else steps.displaced[seen] << form.low
-        return cls(period, steps.step[seen], place, None, n_clocks)
+        if form is None:
+            return cls(period, steps.step[seen], 0 * period, period >= 0, None, n_clocks)
+        return cls(period, steps.step[seen], steps.displaced[seen] << form.low, steps.mapped[seen], None, n_clocks)
 
     def clock(self, period: Ints) -> Ints:
         """Return clocks of some periods."""
@@ -45,6 +47,10 @@ class Counts:
     def gap(self) -> Ints:
         """Periods from the count before to each count; reset is taken for one in period −1."""
         return np.diff(self.period, prepend=-1)
+
+    def mapped_before(self, spec: TimedTachometer, period: Ints) -> NDArray[np.bool_]:
+        """Return whether a map, if there is one, was used at the last count before each of some periods."""
+        return np.append(spec.displacement is None, self.mapped)[np.searchsorted(self.period, period)]
 
     def silences(self, max_periods: int) -> Ints:
         """Return periods in which a 0 is forced."""
@@ -66,8 +72,8 @@ class Measurements:
     # shape (n,): the maximum time has ended it; out of range before any division
     forced: NDArray[np.bool_]
     beyond: NDArray[np.bool_]
-    # shape (n, 2): distance, in eighths of a count, and time for the least and for the greatest possible speed; time 0:
-    # that bound is absent. None if the core shows no bounds.
+    # shape (n, 2): 8 times the distance, as `displaced`, and time for the least and for the greatest possible speed;
+    # time 0: that bound is absent. None if the core shows no bounds.
     least: Ints | None
     most: Ints | None
     known: NDArray[np.bool_]  # shape (n,): whether `least` and `most` are valid
@@ -88,16 +94,17 @@ class Measurements:
         return Measurements(**columns)
 
 
-def eighths(spec: TimedTachometer, counts: Any, side: int) -> Any:
-    """Return counts in eighths, with what edges may be off by on this side, −1 or 1."""
-    return 8 * counts + side * int(8 * spec.bound.edge_error)
+def eighths(spec: TimedTachometer, way: Any, side: int) -> Any:
+    """Return 8 times a way, as `displaced`, with what edges may be off by on this side, −1 or 1."""
+    return 8 * way + side * int(8 * spec.bound.edge_error) * spec.form.timer_periods
 
 
-def enclosure(spec: TimedTachometer, distance: Ints, time: Ints) -> tuple[Ints, Ints] | tuple[None, None]:
+def enclosure(spec: TimedTachometer, distance: Ints, off: Ints, time: Ints) -> tuple[Ints, Ints] | tuple[None, None]:
     """Return `least` and `most` of distances between edges; each edge lies within a period before its count."""
     if not spec.bounds:
         return None, None
-    low, high = eighths(spec, distance, -1), eighths(spec, distance, 1)
+    way = distance * spec.form.timer_periods + off
+    low, high = eighths(spec, way, -1), eighths(spec, way, 1)
     return (
         np.stack([low, np.where(low < 0, time - 1, time + 1)], axis=1),
         np.stack([high, np.where(high > 0, time - 1, time + 1)], axis=1),
@@ -108,7 +115,8 @@ def _between(spec: TimedTachometer, back: Ints, on: Ints, time: Ints) -> tuple[I
     """Return `least` and `most` of a shaft that may have gone so many counts back or on, in just this time."""
     if not spec.bounds:
         return None, None
-    return np.stack([eighths(spec, back, -1), time], axis=1), np.stack([eighths(spec, on, 1), time], axis=1)
+    way = spec.form.silent_way
+    return np.stack([eighths(spec, back * way, -1), time], axis=1), np.stack([eighths(spec, on * way, 1), time], axis=1)
 
 
 def with_silences(spec: TimedTachometer, counts: Counts, found: Measurements) -> Measurements:
@@ -128,7 +136,8 @@ def with_silences(spec: TimedTachometer, counts: Counts, found: Measurements) ->
         least=least,
         most=most,
         # The first period after reset was not seen completely.
-        known=(np.arange(len(period)) > 0) | (period >= np.append(counts.period, counts.n_periods)[0]),
+        known=((np.arange(len(period)) > 0) | (period >= np.append(counts.period, counts.n_periods)[0]))
+        & counts.mapped_before(spec, period),
     )
     return found.with_more(silent)
 
@@ -196,7 +205,8 @@ def _decaying(spec: TimedTachometer, counts: Counts, taken: Measurements, held: 
     # The shaft is no farther back than its last edge.
     back = np.where((sign > 0) & (last_size > 0), 0, -1)
     low, high = _between(spec, back, np.where((sign < 0) & (last_size < 0), 0, 1), age)
-    return Measurements(clock, 3 * sign, 0 * sign, age, ~none, none, low, high, ~none)[nearer]
+    known = counts.mapped_before(spec, period)
+    return Measurements(clock, 3 * sign, 0 * sign, age, ~none, none, low, high, known)[nearer]
 
 
 def updates(spec: TimedTachometer, counts: Counts, taken: Measurements, ticks: Table) -> Table:
@@ -231,8 +241,6 @@ def _bounds(spec: TimedTachometer, taken: Measurements) -> dict[str, NDArray[Any
     for (name, towards), ends in zip(BOUNDS.items(), (taken.least, taken.most), strict=True):
         assert ends is not None
         distance, time = ends.T
-        exact = round_quotient(
-            distance * spec.form.timer_periods, 8 * np.maximum(time, 1), spec.velocity.native_frac_bits, towards
-        )
+        exact = round_quotient(distance, 8 * np.maximum(time, 1), spec.velocity.native_frac_bits, towards)
         found[name] = np.where(time > 0, exact, towards * spec.velocity.absent_bound)
     return found

@@ -2,10 +2,10 @@
 
 import hashlib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import groupby
+from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +68,10 @@ def _format(spec: Numbers, finest: Fraction) -> Displacement:
     return Displacement(per_count, finest=finest)
 
 
+def _steepest(entries: Sequence[int]) -> int:
+    return max(abs(one - before) for before, one in pairwise([*entries[-1:], *entries]))
+
+
 def _fits(spec: Any) -> bool:
     return spec.method in _METHODS
 
@@ -93,11 +97,13 @@ class DiscMap(Extra):
 
     def displacement(self, spec: Numbers) -> Displacement:
         if table := self.sectors(spec):
-            return replace(_format(spec, _FINEST_OF_SECTORS), entry_bits=table.width)
+            form = replace(_format(spec, _FINEST_OF_SECTORS), entry_bits=table.width)
+            return replace(form, steepest=_steepest(table.displacements))
         known = self.file.disc.displacement if self.file else ()
         worst = max(0.99 * self.writable, *map(abs, known), 0)  # counts; what a program writes may be about 1
         form = _format(spec, FINEST)
-        return replace(form, shift=max(0, math.ceil(math.log2(max(worst, 1e-9) / 127 / form.unit))))
+        form = replace(form, shift=max(0, math.ceil(math.log2(max(worst, 1e-9) / 127 / form.unit))))
+        return form if self.writable else replace(form, steepest=_steepest(self._entries(spec, form)))
 
     def sectors(self, spec: Numbers) -> Sectors | None:
         """Return the table of sectors; None: it is one of edges. ParameterError if there can be none."""
@@ -117,8 +123,11 @@ class DiscMap(Extra):
 
     def entries(self, spec: Numbers) -> tuple[int, ...]:
         """Return the table of edges after configuration."""
+        return self._entries(spec, self.displacement(spec))
+
+    def _entries(self, spec: Numbers, form: Displacement) -> tuple[int, ...]:
         known = self.file.disc.displacement if self.file else (0.0,) * spec.encoder.encoder_counts
-        return tuple(round(each / float(self.displacement(spec).unit)) for each in known)
+        return tuple(round(each / float(form.unit)) for each in known)
 
     def index_place(self, spec: Numbers) -> int | None:
         """Return the place in the turn at which the index comes; None without one in a state of the lines."""
@@ -138,7 +147,7 @@ class DiscMap(Extra):
         refusals = {
             f"must be of at most {most} counts per turn, not {own[0]}": own[0] > most,
             "does not work with --teeth": encoder.teeth is not None,
-            "does not work with --bounds": spec.bounds,
+            "does not work with --bounds": spec.bounds and spec.facts.update_by != "count",
         }
         if disc:
             refusals |= {

@@ -42,10 +42,7 @@ _OPTIONS: dict[str, dict[str, Any]] = {
             PositionCompare(places=Compare(2, 3, 0, "7clk", "both")),
         ),
     },
-    **{
-        name: {"encoder": Encoder(10, 4), "index": Index(), "bounds": False, "extras": (DiscMap(file=_MAP),)}
-        for name in MAPPED
-    },
+    **{name: {"encoder": Encoder(10, 4), "index": Index(), "extras": (DiscMap(file=_MAP),)} for name in MAPPED},
     "track": {"timing": Timing(5_000_000, 340, 20), "max_speed": Speed.parse("75rev/s"), "multiplier": "block"},
     "track, serial": {"timing": Timing(5_000_000, 1000, 20), "multiplier": "serial"},
 }
