@@ -12,6 +12,7 @@ class CoreOptions(TypedDict, total=False):
     bound_decay: bool | None
     bounds: bool | None
     cancel: bool | None
+    chip: Value | None
     clock: Value | None
     command: Value | None
     control_period: Value | None
@@ -92,6 +93,7 @@ class CoreOptions(TypedDict, total=False):
     velocity_filter: Value | None
     velocity_width: Value | None
     whole_cycles: bool | None
+    zero: Value | None
 
 class EncoderFaults(TypedDict, total=False):
     vibration: Value | None

@@ -119,7 +119,7 @@ def _add_last(texts: dict[str, str], draw: _Draw) -> None:
         texts["teeth"] = draw.choice(["60-2", "36-2-2-2", "15-2,3-2,18-2", "12-1-1-2", "24+1"])
         texts["ppr"] = str(sum(int(part.partition("-")[0]) for part in texts["teeth"].replace("+", "-").split(",")))
     texts |= _ratio(draw)
-    if draw.often(0.1) and texts["method"] in ("t", "mt", "track"):
+    if draw.often(0.1) and texts["method"] in ("t", "mt", "s", "track"):
         texts["disc-table"] = "edges"
 
 

@@ -82,7 +82,10 @@ class Tachometer(wiring.Component):
         self.position_counter = PositionCounter(spec.position_width, latency, spec.preset)
         self.controls = {name: PinRise(latency) for name in front.controls}
         self.modulo_counter = None if front.modulus is None else ModuloCounter(front.modulus, latency)
-        self.index_capture = IndexCapture(spec.position_width, latency, once=front.index_once) if spec.index else None
+        self.index_capture = None
+        if spec.index:
+            early = spec.displacement is not None
+            self.index_capture = IndexCapture(spec.position_width, latency, once=front.index_once, early=early)
         self.index_state: IndexState | None = None
         if (state := front.index_state) is not None:
             self.index_state = IndexState(state, spec.encoder.kind.after(state), latency)
@@ -298,7 +301,7 @@ class Tachometer(wiring.Component):
         for each line; `equal_a` says that a line equals its complement; `preset_rises` sets the position, and `moves`
         is high when anything but a step changes it; `next_position` is `position` of the next clock;
         `native_velocity` and others are of an update as the method makes it; `index_rises` is a clock before
-        `index_valid`, and `index_seen` also of an index that is not taken.
+        `index_valid`, and `index_seen` two clocks after Z, also of an index that is not taken.
         """
         decoder, box, counter, updates = self.decoder, self.conditioner, self.position_counter, self.datapath.updates
         moves = counter.clear if self._spec.preset is None else counter.clear | counter.load
@@ -308,7 +311,7 @@ class Tachometer(wiring.Component):
             name: getattr(decoder, name) for name in decoder.signature.members if name[:5] in ("level", "ready", "step")
         }
         if self.index_capture is not None:
-            taps |= {"index_rises": self.index_capture.rises, "index_seen": self.index_capture.seen}
+            taps |= {"index_rises": self.index_capture.rises, "index_seen": self.index_capture.first}
         taps |= {f"{name}_rises": control.rises for name, control in self.controls.items()}
         for pin in self._spec.front_end.pins:
             name = pin.port.name

@@ -54,7 +54,7 @@ class Gates(wiring.Component):
         """Return the gates of this core."""
         table = extra.sectors(spec) or extra.entries(spec)
         place, form = extra.index_place(spec), extra.displacement(spec)
-        return cls(table, place, form, writable=extra.writable, looks=spec.facts.update_by == "tick")
+        return cls(table, place, form, writable=extra.writable, looks=spec.facts.update_by != "count")
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

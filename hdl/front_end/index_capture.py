@@ -15,10 +15,11 @@ class IndexCapture(wiring.Component):
     sum of all steps through clock c. `position` has this value in that clock, unless the index sets it to 0.
 
     - `once`: An index is taken only if `arm` was high since the one before.
+    - `early`: `first` is high in clock c + 1; else a clock before `index_valid`.
     """
 
-    def __init__(self, width: int, latency: int = 2, *, once: bool = False) -> None:
-        self._latency = latency
+    def __init__(self, width: int, latency: int = 2, *, once: bool = False, early: bool = False) -> None:
+        self._late, self._early = latency - 2, early
         self._once = once
         super().__init__(
             {
@@ -33,16 +34,19 @@ class IndexCapture(wiring.Component):
             }
         )
         self.seen = Signal(name="seen") if once else self.rises
+        self.first = Signal(name="first") if early and latency > 2 else self.seen
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        level, ready = delay(m, self.level_z, self.ready, clocks=self._latency - 2)
+        level, ready = delay(m, self.level_z, self.ready, clocks=0 if self._early else self._late)
         past_z = Signal()
         m.d.sync += [
             past_z.eq(level),
-            self.seen.eq(level & ~past_z & ready),
+            self.first.eq(level & ~past_z & ready),
             self.index_valid.eq(self.rises),
         ]
+        if self.first is not self.seen:
+            m.d.comb += self.seen.eq(*delay(m, self.first, clocks=self._late))
         if self._once:
             armed = Signal()
             m.d.comb += self.rises.eq(self.seen & armed)

@@ -9,8 +9,13 @@ from tachometry.hdl.arithmetic.quotient import Quotient
 from tachometry.hdl.methods.alteration import AlterationDetector
 from tachometry.hdl.methods.datapath import datapath_members, quotients, stamped
 from tachometry.hdl.methods.interval import IntervalAccumulator
+from tachometry.hdl.methods.window_ends import WindowEnds
+from tachometry.hdl.wires.ports import follow
 from tachometry.spec import STachometer
+from tachometry.spec.formats.displacement import DISPLACED
 from tachometry.spec.formats.reciprocal import DividedReciprocal
+
+_OF_EDGES = (*DISPLACED, "step_before")
 
 
 class SMethod(wiring.Component):
@@ -22,15 +27,18 @@ class SMethod(wiring.Component):
     """
 
     def __init__(self, spec: STachometer) -> None:
+        self._spec = spec
+        off, ticks = spec.displacement, spec.timing.max_ticks
+        self.ends = None if off is None else WindowEnds(off, ticks, spec.form.kept_ticks)
         super().__init__(
             {
                 **datapath_members(spec),
                 "coming": In(1),  # `tick` is high in the next clock
                 "next_count": In(signed(spec.widths.count)),  # what `pulse_count` is then; valid with `coming`
                 "standstill": Out(1),  # of the tick, see `IntervalAccumulator`
+                **({} if self.ends is None else {name: self.ends.signature.members[name] for name in _OF_EDGES}),
             }
         )
-        self._spec = spec
         self.alteration = AlterationDetector(spec.widths.count, seldom=spec.latency.serial)
         self.interval_accumulator = IntervalAccumulator(
             max_ticks=spec.timing.max_ticks,
@@ -89,7 +97,7 @@ class SMethod(wiring.Component):
             quotient.load.eq(self.coming),
             quotient.start.eq(interval.update),
             quotient.base.eq(self.pulse_count),
-            quotient.numerator.eq(interval.numerator << self._spec.form.finer),
+            quotient.numerator.eq(self._displaced(m, interval.numerator << self._spec.form.finer)),
             quotient.tag.forced.eq(interval.forced),
             self.standstill.eq(interval.standstill),
             self.updates.valid.eq(found.valid),
@@ -105,3 +113,13 @@ class SMethod(wiring.Component):
                 m.d.sync += later.eq(1)
             m.d.comb += quotient.tag.bounds_valid.eq(later)
         return m
+
+    def _displaced(self, m: Module, numerator: Value) -> Value:
+        """Return a numerator with the displacements of the edges at both ends of the window."""
+        if (ends := self.ends) is None:
+            return numerator
+        m.submodules.ends = ends
+        follow(m, ends, self, (*_OF_EDGES, "coming", "tick"))
+        follow(m, ends, self.interval_accumulator, ("closes", "forced", "m_s"))
+        m.d.comb += ends.rises.eq(self.next_count > self.pulse_count)
+        return numerator + ends.difference

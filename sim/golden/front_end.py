@@ -147,7 +147,7 @@ class Steps:
     displaced: NDArray[np.int64] = field(default_factory=_none)
     mapped: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, np.bool_))  # shape (n,): whether it gives one
     fine_bits: int = 0  # of these below half a count
-    # displacements of the edges above and below the place at the end of ticks without a count, by their last clocks
+    # displacements of the edges above and below the place before the steps of some clocks
     around: Callable[[NDArray[np.int64]], tuple[NDArray[np.int64], NDArray[np.int64]]] | None = None
     # of each line of an extra the clocks from which its level is seen, and the levels; the first is no edge
     pins: Mapping[str, tuple[NDArray[np.int64], NDArray[np.uint8]]] = field(default_factory=dict)

@@ -50,6 +50,7 @@ class Velocity:
     most_native_frac_bits: int = MAX_NATIVE_FRAC_BITS  # most fraction bits of the velocity in counts per tick
     wished_frac_bits: int | None = None  # fraction bits that show what the method tells apart, if it differs from most
     more_rounding: float = 0  # LSB by which the method rounds, beside the unit
+    least_native_frac_bits: int = 4
 
     @property
     def width(self) -> int:
@@ -83,7 +84,7 @@ class Velocity:
     def frac_bits_range(self, unit: str) -> tuple[int, int]:
         """Return fewest and most fraction bits of the velocity in `unit`."""
         if unit == NATIVE:
-            return 4, self.most_native_frac_bits
+            return self.least_native_frac_bits, self.most_native_frac_bits
         # The greatest speed must be at least one LSB, and one count per tick at most 2^22.
         count = per_count(unit, self.asked.encoder.counts_per_rev, self.asked.timing.tick_seconds)
         return 1 - ceil_log2(count * self.max), self.most_native_frac_bits - 2 - ceil_log2(count)
@@ -98,7 +99,7 @@ class Velocity:
         """Fraction bits of the velocity in counts per tick, from which that in another unit is computed."""
         if self.asked.unit == NATIVE:
             return self.frac_bits
-        return max(4, ceil_log2(self.lsb_per_count) + 2)
+        return max(self.least_native_frac_bits, ceil_log2(self.lsb_per_count) + 2)
 
     @property
     def lsb_per_count(self) -> Fraction:

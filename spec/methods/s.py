@@ -12,8 +12,9 @@ from tachometry.spec.core.times import Times
 from tachometry.spec.core.velocity import Velocity
 from tachometry.spec.core.words import Words
 from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal
+from tachometry.spec.formats.displacement import Displacement
 from tachometry.spec.formats.reciprocal import DividedReciprocal, NarrowReciprocal, Reciprocal
-from tachometry.spec.language.option import option
+from tachometry.spec.language.option import ParameterError, option
 from tachometry.spec.language.units import plural, signed_width
 
 # Up to this many ticks 1/m_s can be looked up in a table of block RAM.
@@ -30,6 +31,7 @@ class SForm:
     velocity: Velocity
     cancel: bool  # whether alternate alterations cancel, eq. (21)
     source: str  # of the reciprocal, if there is room for it
+    displacement: Displacement | None = None  # of edges off their places
 
     @property
     def kept_ticks(self) -> int:
@@ -44,7 +46,8 @@ class SForm:
     @property
     def max_numerator(self) -> int:
         """Largest |N| of ω = b + N/(2·m_s), N = d0 + d1 (eq. 21), or ω = b + N/m_s, N = d1 (eq. 17)."""
-        return 2 * self.tick.max_count * self.numerator_per_count + self.asked.bounds * self.margin
+        off = 0 if self.displacement is None else 4 * self.displacement.most  # of two edges at both ends
+        return 2 * self.tick.max_count * self.numerator_per_count + self.asked.bounds * self.margin + off
 
     @property
     def numerator_width(self) -> int:
@@ -58,7 +61,9 @@ class SForm:
 
     @property
     def finer(self) -> int:
-        """Bits by which N is finer than the counts, for an edge error that is a fraction."""
+        """Bits by which N is finer than the counts, for an edge error that is a fraction, or displacements."""
+        if self.displacement is not None:
+            return self.displacement.per_count.bit_length() - 1
         return max(0, self.velocity.bound.error_bits - self.cancel)
 
     @property
@@ -150,12 +155,26 @@ class STachometer(TachometerSpec):
     @cached_property
     def form(self) -> SForm:
         """Numbers of the datapath."""
-        return SForm(self, self.tick, self.velocity, self.cancel, self.reciprocal_source)
+        return SForm(self, self.tick, self.velocity, self.cancel, self.reciprocal_source, self.displacement)
+
+    @cached_property
+    def velocity(self) -> Velocity:
+        # Displacements at both ends of a window of a tick add to its mean.
+        if (off := self.displacement) is None:
+            return super().velocity
+        most = self.tick.max_count - (-2 * off.most // off.per_count)
+        # An LSB is no more than the unit of displacements.
+        return Velocity(self, self.scale, self.bound, most, least_native_frac_bits=off.per_count.bit_length())
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.displacement is not None and not self.cancel:
+            raise ParameterError("cancel", "must be yes with --disc")
 
     @cached_property
     def latency(self) -> Latency:
-        # What saturates has registers of its own: before the sum, and behind it.
-        tick = 2 + 2 * (self.tick.max_count < self.tick.longest)
+        # What saturates has registers of its own: before the sum, and behind it. Displacements come as late.
+        tick = 2 + 2 * (self.tick.max_count < self.tick.longest or self.displacement is not None)
         return Latency(self, self.velocity, self.tick.room, self.form.clocks, self.form.busy, tick)
 
     @cached_property

@@ -16,7 +16,8 @@ from support.nightly import nightly
 
 from tachometry.hdl.extras import disc as gates
 from tachometry.hdl.extras import sectors
-from tachometry.hdl.methods import count_way, quotient_velocity, tick_counts, timed, track
+from tachometry.hdl.front_end import index_capture
+from tachometry.hdl.methods import count_way, quotient_velocity, tick_counts, timed, track, window_ends
 from tachometry.sim import build, golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
@@ -76,6 +77,16 @@ TRACKED = (
     Mapped("track", "disc=other.json disc-table=edges tick=1000clk smooth=yes max-time=5000clk", edges=60),
     Mapped("track", "disc=slow.json disc-table=sectors index=yes tick=300clk max-time=3000clk", 60, 120_000),
 )
+SLOW = (
+    Mapped("s", "disc=far.json index=yes", edges=100),
+    Mapped("s", "disc=other.json disc-table=edges max-time=180clk tick=90clk", edges=100, clocks=20_000),
+    Mapped(
+        "s", "disc=slow.json disc-table=sectors index=yes tick=3clk max-time=9clk max-speed=9000rev/s", 100, late=True
+    ),
+    Mapped(
+        "s", "disc=far.json index=yes tick=300clk max-time=2100clk unit=rad/s lowpass=50Hz", 100, 200_000, late=True
+    ),
+)
 BOUNDED = (
     Mapped("mt", "disc=far.json index=yes bounds=yes edge-error=0.25", edges=100),
     Mapped("t", "disc=other.json disc-table=edges bounds=yes max-speed=100rev/s", edges=100, late=True),
@@ -102,7 +113,7 @@ def rule(case: Case) -> None:
     assert not any(used[[bypass[clock] == 1 for clock in case.run().ticks.clock]])
 
 
-test_cores = agreeing(CASES + TRACKED + BOUNDED + BESIDE, rule)
+test_cores = agreeing(CASES + TRACKED + BOUNDED + SLOW + BESIDE, rule)
 test_first_bus, test_second_bus = map(on_a_bus, BUS)
 test_refusals = refused({"disc-table=edges": "disc_table must not be given with method m"})
 
@@ -111,7 +122,9 @@ test_refusals = refused({"disc-table=edges": "disc_table must not be given with 
     ("method", "words", "why"),
     [
         ("mt", "disc=far.json", ""),
-        ("s", "disc=far.json", "must not be given with method s"),
+        ("m", "disc=far.json", "must not be given with method m"),
+        ("s", "disc=far.json cancel=no", "cancel must be yes with --disc"),
+        ("s", "disc=far.json bounds=yes", "disc does not work with --bounds"),
         ("mt", "disc=none.json", "disc must be a file that can be read, not 'none.json': "),
         (
             "mt",
@@ -223,6 +236,11 @@ FAULTS = (
     (tick_counts.TickCounts, "Mux(takes, self.displaced, 0)", "0", 5),
     (track.TrackMethod, "counts.number > 1", "1", 5),
     (count_way.CountWay, "self.displaced_before << self._low", "self.displaced_before", 3),
+    (window_ends.WindowEnds, "Mux(self.forced, kept, end)", "end", 12),
+    (window_ends.WindowEnds, "== self._moved_on", "== self._moved_on + 1", 12),
+    (window_ends.WindowEnds, "self.step_before[0], self.step_before[1], was", "0, 0, was", 11),
+    (window_ends.WindowEnds, "self.rises, below, above", "self.rises, above, below", 11),
+    (index_capture.IndexCapture, "0 if self._early else self._late", "self._late", 13),
     (timed._is_mapped, "used & opening", "used", 8),
     (timed._is_mapped, "delay(m, mapped)", "(mapped,)", 9),
     (quotient_velocity.QuotientVelocity, "silent_way", "timer_periods", 8),
@@ -233,7 +251,7 @@ FAULTS = (
 @pytest.mark.parametrize(("box", "text", "wrong", "case"), FAULTS)
 def test_wrong_gates_are_seen(box: Any, text: str, wrong: str, case: int) -> None:
     with mutant(box, text, wrong):
-        one = (CASES + TRACKED + BOUNDED)[case]
+        one = (CASES + TRACKED + BOUNDED + SLOW)[case]
         assert lockstep(one.spec, one.trace(), Cxxrtl()).n_mismatches
 
 

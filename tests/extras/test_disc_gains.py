@@ -27,16 +27,23 @@ MT = {"min-time": "20us", "max-time": "10ms"}
     [
         ("track", "constant:50rad/s:600ms", 0.3, OFF_CENTRE, 850),
         ("mt", "constant:50rad/s:300ms", 0.15, REAL, 2.5),
+        ("s", "constant:50rad/s:300ms", 0.15, REAL, 1.5),
         pytest.param("track", "constant:217rad/s:400ms", 0.1, OFF_CENTRE, 2370, marks=nightly),
         pytest.param("track", "ramp:0:100rad/s:400ms", 0.1, OFF_CENTRE, 27, marks=nightly),
         pytest.param("mt", "sine:50rad/s:5Hz:400ms", 0.15, REAL, 2.5, marks=nightly),
         pytest.param("mt", "constant:217rad/s:300ms", 0.1, REAL, 1.6, marks=nightly),
+        *(pytest.param("s", motion, 0.15, REAL, gain, marks=nightly) for motion, gain in (
+            ("constant:5rad/s:600ms", 2.5),
+            ("constant:217rad/s:300ms", 1.07),
+            ("sine:50rad/s:5Hz:400ms", 1.6),
+            ("sine:3rad/s:2Hz:1s", 2.0),
+        )),
     ],
-)
+)  # fmt: skip
 def test_a_map_makes_the_velocity_better(
     method: str, motion: str, start: float, disc: dict[str, Any], gain: float, tmp_path: Path
 ) -> None:
-    more = MT if method == "mt" else {"max-time": "100ms"}
+    more = {"mt": MT, "s": {"max-time": "10ms"}}.get(method, {"max-time": "100ms"})
     coasting = VirtualEncoder(500, index=True, jitter=0.05, seed=1013, **disc).record(
         parse_motion("ramp:150rad/s:60rad/s:2500ms")
     )

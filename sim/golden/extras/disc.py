@@ -39,11 +39,15 @@ def displaced(extra: DiscMap, view: View) -> Steps:
     some = steps.step != 0
 
     def around(last: Ints) -> tuple[Ints, Ints]:
-        """Return those of the edges above and below: that of the latest count as it was then, and the next one."""
+        """Return those of the edges above and below: that of the latest count as it was then, and the next one, also if
+        it is passed in this clock.
+        """
         row = np.searchsorted(steps.clock[some], last)
         back = np.append(False, steps.step[some] < 0)[row]
         latest = np.append(0, value[some])[row]
         ahead = of_edge(np.append(0, np.cumsum(steps.step[some]))[row] + ~back, last)
+        at = np.searchsorted(steps.clock, last)
+        ahead = np.where(passes := np.isin(last, steps.clock[some]), np.append(value, 0)[at * passes], ahead)
         return np.where(back, latest, ahead), np.where(back, ahead, latest)
 
     fine_bits, mapped = form.per_count.bit_length() - 2, is_used(steps.clock)

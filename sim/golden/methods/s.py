@@ -52,6 +52,16 @@ def windows(
     return closing[order], m_s[order], forced[order]
 
 
+def _off(m_e: NDArray[np.int64], above: NDArray[np.int64], below: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return twice by how much the middle of each tick is off, from the edges about the places at the ends of ticks.
+
+    A tick of more counts than the one before is as far off as its first and its last edge, others as far as the edges
+    around these.
+    """
+    above_was, below_was, m_was = (np.append(0, each)[:-1] for each in (above, below, m_e))
+    return np.where(m_e > m_was, above_was + below, below_was + above)
+
+
 class Model:
     """Computes the S method."""
 
@@ -72,12 +82,20 @@ class Model:
             # Eq. (17): Σ_{j=0}^{m_s−1} m_e(i−j), over m_s.
             numerator = total[at + 1] - total[at - m_s + 1]
 
+        finer = 1
+        if spec.displacement is not None and steps is not None and steps.around is not None:
+            finer, off = (
+                spec.displacement.per_count,
+                np.append(0, _off(m_e, *steps.around(ticks.clock - spec.latency.tick + 1))),
+            )
+            numerator = numerator * finer + off[at] - off[at - m_s]
+
         def quotient(counts: int, towards: int) -> NDArray[np.int64]:
             whole = 2 if spec.cancel else 1
             # In eighths of a count, which edges may be off by.
             more = int(8 * counts * (1 + spec.bound.edge_error))
             return round_quotient(
-                8 * numerator + whole * more, 8 * whole * m_s, spec.velocity.native_frac_bits, towards
+                8 * numerator + whole * more, 8 * whole * finer * m_s, spec.velocity.native_frac_bits, towards
             )
 
         columns = {"velocity": quotient(0, 0), "interval": m_s, "forced": forced}

@@ -4,7 +4,6 @@ import hashlib
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any
@@ -22,11 +21,10 @@ from tachometry.spec.language.units import format_time
 
 MOST_EDGES = 1 << 14  # eight block RAMs of ECP5
 MOST_IN_SECTORS = 1 << 18
-_FINEST_OF_SECTORS = FINEST / 16
 _LEAST_SECTORS, _SECTORS, _MOST_SECTORS = 4, 32, 256
 SLIPS_BITS = 8  # of the number of slips, which stays at its end
 UNKNOWN, SEEN, DOUBTFUL, SURE = range(4)  # trust in the place; bit 0: the map is used
-_METHODS = ("t", "mt", "track")
+_METHODS = ("t", "mt", "s", "track")
 _DISC = """Map of the disc that tachometry calibrate has written. Each count is then placed where its edge lies. The \
 map is used from the first index on. Without --index, or with --index-at edge, DISC_TURN must say where it lies."""
 _TABLE = """Table of the map. edges has 8 bits for each edge, which a program may write; it is empty without --disc. \
@@ -63,7 +61,8 @@ def _parse_table(what: str, text: str) -> str:
     raise ParameterError(what, f"must be {form}, not {text}")
 
 
-def _format(spec: Numbers, finest: Fraction) -> Displacement:
+def _format(spec: Numbers, sectors: bool = False) -> Displacement:
+    finest = FINEST / (16 if sectors and spec.facts.update_by != "alteration" else 1)
     per_count = spec.timing.tick_cycles if spec.facts.update_by == "count" else int(1 / finest)
     return Displacement(per_count, finest=finest)
 
@@ -97,11 +96,11 @@ class DiscMap(Extra):
 
     def displacement(self, spec: Numbers) -> Displacement:
         if table := self.sectors(spec):
-            form = replace(_format(spec, _FINEST_OF_SECTORS), entry_bits=table.width)
+            form = replace(_format(spec, sectors=True), entry_bits=table.width)
             return replace(form, steepest=_steepest(table.displacements))
         known = self.file.disc.displacement if self.file else ()
         worst = max(0.99 * self.writable, *map(abs, known), 0)  # counts; what a program writes may be about 1
-        form = _format(spec, FINEST)
+        form = _format(spec)
         form = replace(form, shift=max(0, math.ceil(math.log2(max(worst, 1e-9) / 127 / form.unit))))
         return form if self.writable else replace(form, steepest=_steepest(self._entries(spec, form)))
 
@@ -115,8 +114,8 @@ class DiscMap(Extra):
                 raise ValueError("must be edges without --disc: no program writes sectors")
             if self.index_place(spec) is None:
                 raise ValueError("must be edges without an index in a state of the lines")
-            known, unit = self.file.disc.displacement, _format(spec, _FINEST_OF_SECTORS).unit
-            quarters = spec.facts.update_by == "count" and len(known) % 4 == 0  # `track` learns them
+            known, unit = self.file.disc.displacement, _format(spec, sectors=True).unit
+            quarters = spec.facts.update_by != "tick" and len(known) % 4 == 0  # `track` learns them
             return sectors_of(known, int(number or _SECTORS), float(unit), quarters)
         except ValueError as error:
             raise ParameterError("disc_table", str(error)) from error

@@ -14,7 +14,7 @@ APART = {
     frozenset({("paper-exact", "yes"), ("adaptive", "25%")}),
     frozenset({("paper-exact", "yes"), ("whole-cycles", "yes")}),
     frozenset({("timer", "tick"), ("whole-cycles", "yes")}),
-    *(frozenset({("disc-table", "edges"), other}) for other in (("timer", "tick"), ("bounds", "yes edge-error 0.3"))),
+    *(frozenset({("disc-table", "edges"), other}) for other in (("timer", "tick"), ("cancel", "no"))),
     frozenset({("adaptive", "25%"), ("max-time", "2")}),
     frozenset({("adaptive", "25%"), ("max-time", "3")}),
     frozenset({("adaptive", "25%"), ("lowpass", "20kHz")}),
@@ -43,19 +43,23 @@ APART = {
 }
 
 
+OF_S = {frozenset({("disc-table", "edges"), ("bounds", value)}) for value in ("yes", "yes edge-error 0.3")}
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_pairs_are_counted(method: str) -> None:
     """Of every two options that are declared, all their values, but for those that are known to be apart."""
     factors_ = [(name, value) for name, values in factors(method).items() for value in values]
     wanted = {frozenset(pair) for pair in combinations(factors_, 2) if pair[0][0] != pair[1][0]}
     met = {frozenset(pair) for row in rows(method) for pair in combinations(row.items(), 2)}
-    assert met == wanted - APART
-    assert len(met) == len(wanted) - len(wanted & APART) > 300
+    known = APART | (OF_S if method == "s" else set())
+    assert met == wanted - known
+    assert len(met) == len(wanted) - len(wanted & known) > 300
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_what_cannot_be_together_is_known(method: str) -> None:
-    assert apart(method) <= APART
+    assert apart(method) <= APART | (OF_S if method == "s" else set())
 
 
 def test_the_extremes_are_there() -> None:
@@ -85,7 +89,7 @@ def test_every_option_is_a_factor(method: str) -> None:
     never = {"rairan": {"external-tick"}, "track": {"tick", "bounds"}}
     lines = {"pole-pairs", "teeth", "ratio"}  # tests/hdl/front_end has the wheel, tests/spec/core the ratio
     lines |= {"bits", "sample-age", "encoder-clock", "line-delay", "crc", "gray", "repeat"}  # tests/hdl/core has reads
-    lines |= {"disc"} if method in ("t", "mt", "track") else {"disc", "disc-table"}  # tests/extras has maps
+    lines |= {"disc"} if method in ("t", "mt", "s", "track") else {"disc", "disc-table"}  # tests/extras has maps
     assert without == {"ppr", "lines", "cpr", "clock", "dt", "pwm", "lsb"} | lines | never.get(method, set())
     assert "yes index-reset" in found["index"]
     assert ("yes edge-error 0.3" in found.get("bounds", ())) == METHODS[method].facts.bounds
