@@ -9,6 +9,7 @@ import click
 
 from tachometry.cli.options.option import Group, option, plain_options, refuse_without
 from tachometry.spec import CoreSpec
+from tachometry.spec.core.sensors import READ
 from tachometry.spec.language.units import parse_frequency
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
@@ -22,9 +23,9 @@ _OPTIONS = [
         {
             "--a CHANNEL": "Channel of line A: its name, or its number from 0. With --axes one for each "
             "axis, with commas between, also for --b and --z; without them a0, a1 and so on, "
-            "b0, z0.",
-            "--b CHANNEL": "Channel of line B. [default of --a and --b: the channels named A and B, else the first "
-            "two]",
+            "b0, z0. With --sensor ssi or biss the encoder's clock (MA).",
+            "--b CHANNEL": "Channel of line B. With --sensor ssi or biss the encoder's data (SLO). [default of "
+            "--a and --b: the channels named A and B, else the first two]",
             "--c CHANNEL": "Channel of line C of halls. [default: c with --sensor hall]",
             "--z CHANNEL": "Channel of line Z, the index. [default: z with --index, else none]",
             "--tick-in CHANNEL": "Channel of the external tick. [default: tick_in with --external-tick, else none]",
@@ -76,6 +77,7 @@ def _read(
         from tachometry.sim.captures.other_sensors import fitted
         from tachometry.sim.captures.read import read_capture, with_last_tick
         from tachometry.sim.captures.time_unit import parse_time_unit
+        from tachometry.sim.studies.captured_reads import of_frames
 
         alone, axes = spec.tachometer, spec.axes
         sensor = alone.encoder.sensor
@@ -100,7 +102,7 @@ def _read(
         if wrap is not None:
             raise OptionError("wrap", "must not be given without --count or --angle")
         for line, text_of_line in (("b", b), ("c", c)):
-            if text_of_line is not None and line not in alone.encoder.kind.lines:
+            if text_of_line is not None and line not in (alone.encoder.kind.lines or "b"):
                 raise OptionError(line, f"must not be given together with --sensor {sensor}")
         line_a, line_b = (_of_axis(line, text, axis, axes) for line, text in (("a", a), ("b", b)))
         index = _of_axis("z", z, axis, axes) if z is not None or "z" in alone.front_end.lines else None
@@ -109,7 +111,9 @@ def _read(
         second = SAME if sensor == "pulses" else line_b
         third = (c or "c") if sensor == "hall" else None
         named = {"c": third, "z": index, "tick_in": tick} | {f"{n}_n": f"{n}_n" for n in alone.front_end.complemented}
-        recording = read_capture(capture, line_a, second, rate, text=text, **named)
+        recording = read_capture(capture, line_a, line_b if sensor in READ else second, rate, text=text, **named)
+        if sensor in READ:
+            return of_frames(recording, alone)
         return with_last_tick(fitted(recording, alone.encoder), spec)
 
     if others.get("capture", ...) is None:
