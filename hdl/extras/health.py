@@ -1,6 +1,6 @@
 """Gates of `spec.core.extras.health`."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -11,11 +11,14 @@ from amaranth.lib.wiring import In, Member, Out
 from tachometry.hdl.arithmetic.idle import Idle, idle_of
 from tachometry.hdl.front_end.open_circuit import OpenCircuit
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
+from tachometry.hdl.wires.ports import by_name
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.health import (
     FAULT_WIDTH,
     FAULTS_WIDTH,
     OPEN,
+    READ_COUNT_WIDTH,
+    READ_COUNTS,
     READ_FAULT_WIDTH,
     READ_FAULTS,
     Fault,
@@ -39,14 +42,21 @@ def _keep(m: Module, box: "Gates | ReadGates", code: Value) -> None:
 class ReadGates(wiring.Component):
     """Faults of an encoder that is read: `read_fault` has one in each clock in which it is not 0, see `Gates`."""
 
-    def __init__(self) -> None:
+    def __init__(self, counts: Sequence[str]) -> None:
+        self._counts = counts
         outputs = {"seen": Out(1), "health": Out(READ_FAULT_WIDTH), "faults": Out(FAULTS_WIDTH), "fault": Out(1)}
+        outputs |= dict.fromkeys(counts, Out(READ_COUNT_WIDTH))
         super().__init__({"read_fault": In(READ_FAULT_BITS), "clear": In(1), **outputs})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         m.d.comb += self.seen.eq(self.read_fault.any())
         _keep(m, self, self.read_fault + READ_FAULTS)
+        for name, count in by_name(self, self._counts).items():
+            with m.If(self.read_fault.matches(*READ_COUNTS[name]) & ~count.all()):
+                m.d.sync += count.eq(count + 1)
+            with m.If(self.clear):
+                m.d.sync += count.eq(0)
         return m
 
 
@@ -108,7 +118,7 @@ class Gates(wiring.Component):
     def of(cls, extra: Health, spec: TachometerSpec) -> "Gates | ReadGates":
         """Return the gates of this core."""
         if spec.encoder.sampled is not None:
-            return ReadGates()
+            return ReadGates(extra.read_counts(spec))
         front, turn = spec.front_end, None
         if front.index_watched:
             presets = spec.preset is not None

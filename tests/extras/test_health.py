@@ -38,6 +38,7 @@ CASES = (
         late=True,
     ),
 )
+READ = Case("m", "sensor=sampled ppr=512 bits=9 tick=8clk max-time=80clk max-speed=3000rpm health=yes", edges=60)
 BUS = Case("m", "ppr=2 health=yes health-edges=3 health-errors=0 differential=3 index=yes index-at=edge", swings=True)
 
 
@@ -101,6 +102,7 @@ def rule(case: Case) -> None:
 
 test_cores = agreeing(CASES, rule)
 test_bus = on_a_bus(BUS)
+test_reads_on_a_bus = on_a_bus(READ)
 test_verilog = in_icarus(CASES[3])
 test_refusals = refused(
     {

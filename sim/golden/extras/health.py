@@ -12,7 +12,15 @@ from tachometry.sim.golden.sorted_lookup import places
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
-from tachometry.spec.core.extras.health import FAULTS_WIDTH, OPEN, READ_FAULTS, Fault, Health
+from tachometry.spec.core.extras.health import (
+    FAULTS_WIDTH,
+    OPEN,
+    READ_COUNT_WIDTH,
+    READ_COUNTS,
+    READ_FAULTS,
+    Fault,
+    Health,
+)
 from tachometry.spec.language.port import INDEX
 
 Ints = NDArray[np.int64]
@@ -102,6 +110,10 @@ def shown(
     code, error = np.append(faults["code"], 0), np.append(faults["error"], 0)
     health = np.where(end > first, code[np.where(end > first, first, -1)], 0)
     columns = {"health": health, "faults": np.minimum(end - first, (1 << FAULTS_WIDTH) - 1), "fault": health != 0}
+    for name in extra.read_counts(spec):
+        counted = np.isin(faults["code"] - READ_FAULTS, READ_COUNTS[name])
+        number = np.diff(np.append(0, np.cumsum(counted))[np.stack([first, end])], axis=0)[0]
+        columns[name] = np.minimum(number, (1 << READ_COUNT_WIDTH) - 1)
     return columns | (
         {"index_error": np.where(latest >= first, error[latest], 0)} if spec.front_end.index_watched else {}
     )

@@ -9,7 +9,7 @@ from typing import Any
 from tachometry.spec.core.extras.extra import Event, Extra
 from tachometry.spec.core.front_end import Pin
 from tachometry.spec.core.numbers import Numbers
-from tachometry.spec.core.reads import JUMP, NO_ANSWER, WRONG_CHECK
+from tachometry.spec.core.reads import ERROR_BIT, JUMP, NO_ANSWER, WRONG_CHECK
 from tachometry.spec.core.timing import parse_filter
 from tachometry.spec.language.option import ParameterError, check_options, option, parse_flag
 from tachometry.spec.language.port import TICK, Port, held, pin
@@ -38,6 +38,12 @@ class Fault(IntEnum):
 FAULT_WIDTH, READ_FAULT_WIDTH = 4, 5  # bits of a code, of edges and of reads
 READ_FAULTS = Fault.NO_ANSWER - NO_ANSWER  # codes of reads are more by this than what is wrong with them
 FAULTS_WIDTH = 8  # bits of the number of faults, which stays at its end
+READ_COUNT_WIDTH = 16  # bits of the numbers of reads that were not taken, which stay at their end
+READ_COUNTS = {"frame_errors": (NO_ANSWER, WRONG_CHECK, ERROR_BIT), "jumps": (JUMP,)}  # the reasons that each counts
+_COUNTED = {
+    "frame_errors": "Reads without an answer, with a wrong frame or with the error bit, since they were cleared",
+    "jumps": "Reads that were further away than --max-speed allows, since they were cleared",
+}
 FAULT_TEXTS = {
     Fault.A_STANDS: "line a stands while b has edges: broken or shorted",
     Fault.B_STANDS: "line b stands while a has edges: broken or shorted",
@@ -143,6 +149,10 @@ class Health(Extra):
         absent |= {Fault.INDEX_MISSED} if spec.front_end.index_state is None else set()
         return tuple(fault for fault in Fault if fault < Fault.NO_ANSWER and fault not in absent)
 
+    def read_counts(self, spec: Numbers) -> tuple[str, ...]:
+        """Return which reads are counted, by the names of the ports."""
+        return tuple(READ_COUNTS)[: 1 + (spec.reach is not None)] if spec.encoder.sampled else ()
+
     def ports(self, spec: Numbers) -> Iterable[Port]:
         codes = "; ".join(f"{code}: {FAULT_TEXTS[code]}" for code in self.faults(spec))
         now = "It also changes between ticks; a capture shows the present value."
@@ -150,6 +160,8 @@ class Health(Extra):
         yield held(TICK, "health", READ_FAULT_WIDTH if spec.encoder.sampled else FAULT_WIDTH, help=help)
         yield held(TICK, "faults", FAULTS_WIDTH, help="Faults of the encoder since they were cleared; it stays at 255.")
         yield held(TICK, "fault", help="There has been a fault of the encoder: health is not 0.")
+        for name in self.read_counts(spec):
+            yield held(TICK, name, READ_COUNT_WIDTH, unit="reads", help=f"{_COUNTED[name]}; it stays at 65535.")
         if spec.front_end.index_watched:
             text = "Counts by which the latest wrong turn from index to index went too far forward: lost, or extra."
             yield held(TICK, "index_error", spec.position_width, signed=True, unit="counts", help=text)

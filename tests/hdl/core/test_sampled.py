@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from amaranth import Cat, Module
 from support.nightly import nightly, only
+from support.simulate import clock_by_clock
 from support.verilog import smoke
 
+from tachometry.hdl.extras.health import ReadGates
 from tachometry.hdl.front_end import sampled_position
 from tachometry.hdl.methods.track_machine import TrackMachine
 from tachometry.sim import golden
@@ -129,7 +131,25 @@ def test_health_names_the_first_fault(read: tuple[int, int, int], code: Fault) -
     run = both(spec, [(20, 100, 0, 1), (60, *read), (100, 100, 0, 1), (140, 200, 0, 0), (180, 100, 0, 1)], 240)
     assert run.ticks.health[:5].tolist() == [0, code, code, code, code]
     assert run.ticks.faults[:5].tolist() == [0, 1, 1, 2, 2]
+    jumps = int(code == Fault.JUMP)
+    assert run.ticks.jumps[:5].tolist() == [0, jumps, jumps, jumps, jumps]
+    assert run.ticks.frame_errors[:5].tolist() == [0, 1 - jumps, 1 - jumps, 2 - jumps, 2 - jumps]
     assert run.errors.tolist() == [60, 140]
+
+
+def test_numbers_of_reads_stay_at_their_end_until_they_are_cleared() -> None:
+    """A jump, code 5, is not a frame error, a warning, code 4, is neither."""
+    names = ["frame_errors", "jumps"]
+    inputs = [{"read_fault": code, "clear": 0} for code in (*[3] * 65_534, 4, 4, 5, 5, 1, 2)]
+    seen = clock_by_clock(ReadGates(names), [*inputs, {"clear": 1}, {"clear": 0}, {}, {}], names)
+    assert [tuple(seen[-at].values()) for at in (10, 8, 6, 4, 3, 1)] == [
+        (65_534, 0),
+        (65_534, 0),
+        (65_534, 2),
+        (65_535, 2),
+        (0, 0),
+        (2, 0),
+    ]
 
 
 def test_tracking_begins_anew_after_two_jumps_that_agree() -> None:
