@@ -7,6 +7,7 @@ from tachometry.sim.studies.plan import Plans
 from tachometry.sim.theory.performance import REAL_DISC
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control import AnySpec
+from tachometry.spec.core.extras.disc import DiscMap
 from tachometry.spec.formats.velocity_output import NATIVE
 from tachometry.spec.language.field import WORD
 from tachometry.spec.language.units import parse_frequency, plural, short_time
@@ -96,16 +97,18 @@ def measured(spec: TachometerSpec, plans: Plans, late: str = "") -> list[tuple[s
     return [
         ("range", f"{speed_text(spec, low, 4)} to {speed_text(spec, high)}{below}"),
         ("worst error", f"{error} at a constant {at}, measured in {time}, with a real disc"),
-        ("real disc", f"{_REAL}; an ideal one has {speed_text(spec, ideal, 3)} there"),
+        ("real disc", f"{_real(spec)}; an ideal one has {speed_text(spec, ideal, 3)} there"),
         ("delay", _delay(spec, plans, late)),
         *((name, text.format(speed=speed_text(spec, high))) for name, text in plans.of_extras),
     ]
 
 
-_REAL = (
-    f"{100 * REAL_DISC['jitter']:g} % jitter, edges off by {REAL_DISC['nonuniformity']:g} of their pitch, phase by "
-    f"{REAL_DISC['phase_error_deg']:g} degrees"
-)
+def _real(spec: TachometerSpec) -> str:
+    mapped = DiscMap.of(spec.extras)
+    if mapped is not None and (off := mapped.edges_off(spec)) is not None:
+        return f"that of the map, which leaves {off:.2g} counts RMS"
+    uneven, phase = REAL_DISC["nonuniformity"], REAL_DISC["phase_error_deg"]
+    return f"{100 * REAL_DISC['jitter']:g} % jitter, edges off by {uneven:g} of their pitch, phase by {phase:g} degrees"
 
 
 def _delay(spec: TachometerSpec, plans: Plans, late: str) -> str:

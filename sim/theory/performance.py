@@ -23,6 +23,7 @@ from tachometry.spec import (
     TrackTachometer,
     TTachometer,
 )
+from tachometry.spec.core.extras.disc import DiscMap
 
 # An interval of just `max_ticks` is to be no longer for the rounding of a double.
 _SLACK = 1e-9
@@ -238,12 +239,20 @@ PERFORMANCES: dict[str, Callable[[Any, Floats], Performance]] = {
 }
 
 
+def edges_off(spec: TachometerSpec) -> float | None:
+    """Return counts RMS by which counts come off their places in spite of a map of the disc; None: it has no map."""
+    found = DiscMap.of(spec.extras)
+    return None if found is None else found.edges_off(spec)
+
+
 def disc_counts(spec: TachometerSpec) -> float:
     """Return by how many counts the distance of two edges of a real disc may be wrong.
 
-    Random parts count three standard deviations. The phase of B matters where edges of both lines are counted, and not
-    where windows last whole cycles.
+    Random parts count three standard deviations; a map of the disc leaves these alone. The phase of B matters where
+    edges of both lines are counted, and not where windows last whole cycles.
     """
+    if (off := edges_off(spec)) is not None:
+        return _DEVIATIONS * math.sqrt(2) * off
     decoding = spec.encoder.decoding
     both = decoding == 4 and not (isinstance(spec, MTTachometer) and spec.whole_cycles)
     quarters = 2 * REAL_DISC["nonuniformity"] + _DEVIATIONS * math.sqrt(2) * REAL_DISC["jitter"]
@@ -264,7 +273,8 @@ def disc_error(spec: TachometerSpec, speed: Floats, found: Performance) -> Float
     counts, off = float(spec.encoder.counts_per_rev), disc_counts(spec)
     pitch = 2 * math.pi / counts
     if isinstance(spec, TrackTachometer):
-        spread = math.hypot(REAL_DISC["nonuniformity"] / math.sqrt(3), REAL_DISC["jitter"]) * spec.encoder.decoding / 4
+        real = math.hypot(REAL_DISC["nonuniformity"] / math.sqrt(3), REAL_DISC["jitter"]) * spec.encoder.decoding / 4
+        spread = real if (mapped := edges_off(spec)) is None else mapped
         tick_seconds, memory = float(spec.timing.tick_seconds), float(spec.form.memory_seconds)
         return _DEVIATIONS * tracking.errors(speed, spread, counts, tick_seconds, memory)[0]
     if isinstance(spec, TTachometer | MTTachometer):

@@ -27,6 +27,7 @@ class Disc:
     speeds_rad_per_s: tuple[float, float]  # the least and the greatest
     turns: float  # that were used
     one_speed: bool  # whether ripple of the torque may be in the displacements
+    reverse: bool = False  # whether forward is that of --reverse
 
     def __post_init__(self) -> None:
         if len(self.displacement) != self.counts_per_rev:
@@ -53,7 +54,7 @@ class Disc:
     def parse(text: str) -> "Disc":
         """Read the file; ValueError if it is not one of these."""
         try:
-            found = json.loads(text)
+            found = {"reverse": False} | json.loads(text)
             values = {about.name: found[about.name] for about in fields(Disc)}
             tuples = {name: tuple(map(float, values[name])) for name in ("displacement", "speeds_rad_per_s")}
         except (ValueError, TypeError, KeyError, RecursionError):

@@ -25,6 +25,7 @@ from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.sim.golden.methods import track as twin
 from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.sim.studies.lockstep import lockstep
+from tachometry.sim.studies.plan import plan_at
 from tachometry.spec import ParameterError, of_texts
 from tachometry.spec.core.disc import Disc
 from tachometry.spec.core.extras import disc as of_disc
@@ -134,12 +135,18 @@ test_refusals = refused({"disc-table=edges": "disc_table must not be given with 
         ("mt", "disc=other.json index=yes", "must have an index: type tachometry calibrate with --index"),
         ("mt", "disc=far.json index=yes index-at=A=0,B=1", "must have the index at 3, as --index-at, not 2"),
         ("mt", "disc-table=edges ppr=4097", "disc_table must be of at most 16384 counts per turn, not 16388"),
-        ("mt", "disc-table=sectors:3", "disc_table must be none, edges or sectors:N, N from 4 to 256, not sectors:3"),
-        ("mt", "disc-table=edge", "disc_table must be none, edges or sectors:N, N from 4 to 256, not edge"),
+        ("mt", "disc-table=sectors:3", "disc_table must be auto, edges or sectors:N, N from 4 to 256, not sectors:3"),
+        (
+            "mt",
+            "disc=far.json disc-table=none",
+            "disc_table must be auto, edges or sectors:N, N from 4 to 256, not none",
+        ),
+        ("mt", "disc-table=auto", "disc_table must be edges without --disc"),
         ("mt", "disc-table=sectors", "disc_table must be edges without --disc: no program writes sectors"),
         ("t", "disc=other.json disc-table=sectors", "must be edges without an index in a state of the lines"),
         ("mt", "disc=steep.json disc-table=sectors:4 index=yes", "must have more sectors than 4 of 32 edges, which"),
         ("mt", "disc=far.json timer=tick", "timer must be clock with --disc"),
+        ("mt", "disc=far.json reverse=yes index=yes", "disc must be measured with --reverse, as the core counts"),
         ("t", "disc-table=edges teeth=60-2 sensor=pulses ppr=60 decoding=1", "does not work with --teeth"),
     ],
 )
@@ -356,6 +363,17 @@ def test_the_place_of_the_index_is_where_a_shaft_finds_it(state: str, reverse: s
     trace = PinTrace.of(encoder.record(parse_motion("constant:50rad/s:300ms")).recording, spec).completed(spec)
     found = {*(golden.run(spec, trace).index.index_position % 4).tolist()}
     assert found == {DiscMap.of(spec.extras).index_place(spec)}  # type: ignore[union-attr]
+
+
+def test_a_plan_has_the_error_that_a_map_leaves() -> None:
+    errors = []
+    for method, words in (("mt", "tick=20clk"), ("mt", "disc=far.json"), ("mt", "disc=far.json disc-table=sectors:4")):
+        spec = Case(method, f"{words} index=yes").spec
+        errors.append(float(plan_at(spec, 50.0).disc[0]))
+        mapped = DiscMap.of(spec.extras)
+        assert not mapped or mapped.edges_off(spec) == pytest.approx(np.hypot(0.051, 0.148 * (":" in words)), rel=0.1)
+    assert errors[0] > 2 * errors[1]
+    assert errors[2] > errors[0]  # lines are of no use for a disc that has uneven lines alone
 
 
 def test_the_manifest_has_the_table() -> None:

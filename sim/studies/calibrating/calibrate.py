@@ -59,7 +59,7 @@ def calibrate(
     fit = fit_disc(runs, n, one_speed=one_speed, bar=bar)
     (least, greatest), table = (round(speed, 3) for speed in fit.speeds), _rounded(fit.displacement)
     known = (n, table, encoder.decoding, place, round(fit.error, _DIGITS), round(fit.jitter, _DIGITS))
-    disc = Disc(*known, (least, greatest), fit.turns, fit.ripple is None)
+    disc = Disc(*known, (least, greatest), fit.turns, fit.ripple is None, encoder.reverse)
     change, reasons, turn = None, fit.reasons, None
     if against is not None:
         disc, shift, change, wrong = _compared(disc, against)

@@ -55,9 +55,9 @@ def parse_disc(what: str, text: str) -> DiscFile:
 def _parse_table(what: str, text: str) -> str:
     form, _, number = text.partition(":")
     many = number.isascii() and number.isdigit() and len(number) < 4 and _LEAST_SECTORS <= int(number) <= _MOST_SECTORS
-    if text in ("none", "edges", "sectors") or (form == "sectors" and many):
+    if text in ("auto", "edges", "sectors") or (form == "sectors" and many):
         return text
-    form = f"none, edges or sectors:N, N from {_LEAST_SECTORS} to {_MOST_SECTORS}"
+    form = f"auto, edges or sectors:N, N from {_LEAST_SECTORS} to {_MOST_SECTORS}"
     raise ParameterError(what, f"must be {form}, not {text}")
 
 
@@ -85,8 +85,8 @@ class DiscMap(Extra):
         None, _DISC, name=name, metavar="FILE", shown="none", parse=parse_disc, fits=_fits, tests=(), tacit=True
     )
     table: str = option(
-        "none", _TABLE, name="disc-table", metavar="FORM", parse=_parse_table, fits=_fits, tests=("", "edges"),
-        tacit=True, adds=True,
+        "auto", _TABLE, name="disc-table", metavar="FORM", shown="edges", parse=_parse_table, fits=_fits,
+        tests=("", "edges"), tacit=True, adds=True,
     )  # fmt: skip
 
     @property
@@ -136,6 +136,15 @@ class DiscMap(Extra):
             place = 0
         return None if front.index_state is None else (-place if encoder.reverse else place) % 4
 
+    def edges_off(self, spec: Numbers) -> float | None:
+        """Return counts RMS by which counts come off their places in spite of the map; None: no map is known."""
+        if self.file is None:
+            return None
+        disc, lines, unit = self.file.disc, self.sectors(spec), float(self.displacement(spec).unit)
+        table = lines.displacements if lines else self.entries(spec)
+        left = math.dist([unit * each for each in table], disc.displacement) / math.sqrt(len(table))
+        return math.hypot(left, disc.error, disc.jitter)
+
     def missing(self) -> Mapping[str, str]:
         return {"axes": "does not work with --axes", "loop": "does not work with --loop"}
 
@@ -145,6 +154,7 @@ class DiscMap(Extra):
         most = MOST_IN_SECTORS if self.table.startswith("sectors") else MOST_EDGES
         refusals = {
             f"must be of at most {most} counts per turn, not {own[0]}": own[0] > most,
+            "must be edges without --disc": disc is None and self.table == "auto",
             "does not work with --teeth": encoder.teeth is not None,
             "does not work with --bounds": spec.bounds and spec.facts.update_by != "count",
         }
@@ -152,6 +162,9 @@ class DiscMap(Extra):
             refusals |= {
                 f"must be the map of this encoder, {own[0]} counts a turn with x{own[1]} decoding, not of "
                 f"{disc.counts_per_rev} with x{disc.decoding}": (disc.counts_per_rev, disc.decoding) != own,
+                f"must be measured {'with' if encoder.reverse else 'without'} --reverse, as the core counts": (
+                    disc.reverse != encoder.reverse
+                ),
                 "must have an index: type tachometry calibrate with --index": place is not None
                 and disc.index_place is None,
                 f"must have the index at {place}, as --index-at, not {disc.index_place}: see tachometry calibrate": (

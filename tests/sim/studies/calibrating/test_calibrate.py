@@ -63,6 +63,7 @@ def test_edges_are_counted_from_the_index(texts: dict[str, str], more: dict[str,
     assert one.reasons == []
     turned = 4 if "reverse" in more else 0  # its index is at position -2, which is place 2 of another period
     assert off(one, np.roll(true(**more), turned)) < 0.01
+    assert one.disc.reverse == ("reverse" in texts)
     assert one.disc.index_place == {"A=0,B=1": 3, "edge": 1}.get(texts.get("index-at", ""), 2)
 
 
