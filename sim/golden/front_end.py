@@ -3,6 +3,7 @@
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,6 +152,19 @@ class Steps:
     around: Callable[[NDArray[np.int64]], tuple[NDArray[np.int64], NDArray[np.int64]]] | None = None
     # of each line of an extra the clocks from which its level is seen, and the levels; the first is no edge
     pins: Mapping[str, tuple[NDArray[np.int64], NDArray[np.uint8]]] = field(default_factory=dict)
+
+    def then(self, more: "Steps") -> "Steps":
+        """Return the steps of both, as `since` has them."""
+        names = ("clock", "step", "errors", "swallowed", "displaced", "mapped")
+        columns: dict[str, Any] = {name: np.append(getattr(self, name), getattr(more, name)) for name in names}
+        return replace(self, **columns)
+
+    def since(self, clock: int) -> "Steps":
+        """Return the steps from a clock on, of which extras and the index are left out."""
+        step, error, glitch = (np.searchsorted(at, clock) for at in (self.clock, self.errors, self.swallowed))
+        none, map_ = self.index[:0], {name: getattr(self, name)[step:] for name in ("displaced", "mapped")}
+        rest = Steps(self.clock[step:], self.step[step:], self.errors[error:], none, self.swallowed[glitch:])
+        return replace(rest, **map_, fine_bits=self.fine_bits)
 
     def asked(
         self, spec: TachometerSpec, presets: NDArray[np.int64], values: NDArray[np.int64], arms: NDArray[np.int64]

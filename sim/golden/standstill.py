@@ -7,12 +7,12 @@ from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 
 
-def with_standstill(spec: TachometerSpec, ticks: Table, nominal: NDArray[np.int64]) -> Table:
+def with_standstill(spec: TachometerSpec, ticks: Table, nominal: NDArray[np.int64], silent: int = 1) -> Table:
     """Return ticks with whether the shaft rests; `nominal` says how many nominal ticks each is long.
 
-    It does if the ticks in a row that counted nothing, this one included, are together long enough. The tick before the
-    first one counts as empty.
+    It does if the ticks in a row that counted nothing, this one included, are together long enough. `silent` of them
+    came before the first one.
     """
     through = np.cumsum(nominal)
-    counted = np.maximum.accumulate(np.where(ticks.pulse_count != 0, through, -1))
+    counted = np.maximum.accumulate(np.where(ticks.pulse_count != 0, through, -silent))
     return ticks.having(standstill=through - counted >= spec.times.standstill_after_ticks)

@@ -221,6 +221,20 @@ class PinTrace(_Lines):
             self.clock[inside], n_clocks, {name: line[inside] for name, line in self.lines.items()}
         )
 
+    def part(self, begin: int, end: int) -> "PinTrace":
+        """Return the trace from one clock to before another."""
+        row = slice(int(np.searchsorted(self.clock, begin, side="right")) - 1, int(np.searchsorted(self.clock, end)))
+        clock = np.maximum(self.clock[row] - begin, 0)
+        return PinTrace.of_lines(clock, end - begin, {name: line[row] for name, line in self.lines.items()})
+
+    def then(self, more: "PinTrace") -> "PinTrace":
+        """Return this trace and another one behind it."""
+        clock = np.append(self.clock, self.n_clocks + more.clock)
+        lines = {name: np.append(line, more.lines[name]) for name, line in self.lines.items()}
+        changed = np.append(True, np.any([line[1:] != line[:-1] for line in lines.values()], axis=0))
+        lines = {name: line[changed] for name, line in lines.items()}
+        return PinTrace.of_lines(clock[changed], self.n_clocks + more.n_clocks, lines)
+
     def at(self, clock: NDArray[np.int64]) -> dict[str, NDArray[np.uint8]]:
         """Return the levels of all lines in these clocks."""
         held = np.searchsorted(self.clock, clock, side="right") - 1

@@ -52,6 +52,11 @@ class Table:
         """Return the rows of an index array, a mask or a slice."""
         return Table(self.clock[chosen], {name: column[chosen] for name, column in self.columns.items()})
 
+    def then(self, more: Table) -> Table:
+        """Return the rows of both."""
+        columns = {name: np.concatenate([column, more[name]]) for name, column in self.columns.items()}
+        return Table(np.concatenate([self.clock, more.clock]), columns)
+
     def having(self, **columns: NDArray[Any]) -> Table:
         """Return the same table with these columns added or replaced; `clock` replaces the clocks."""
         clock = columns.pop("clock", self.clock)

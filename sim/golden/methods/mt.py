@@ -3,26 +3,17 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.golden.front_end import Steps
-from tachometry.sim.golden.methods.timed import Counts, Ints, Measurements, enclosure, updates, with_silences
+from tachometry.sim.golden.methods.timed import Counts, Ints, Measurements, TimedModel, enclosure, with_silences
 from tachometry.sim.golden.sorted_lookup import chain, next_place, not_before
-from tachometry.sim.signals.run import Table
-from tachometry.spec import MTTachometer
 
 
-class Model:
+class Model(TimedModel):
     """Computes the M/T method."""
 
-    def __init__(self, spec: MTTachometer) -> None:
-        self._spec = spec
-
-    def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
-        """Return all updates below `n_clocks` clocks, with the velocity in counts per tick as the datapath has it."""
-        spec = self._spec
-        counts = Counts.of(spec, ticks, steps, n_clocks)
-        n, period = len(counts.period), counts.period
+    def taken(self, counts: Counts, since: int) -> Measurements:
+        spec, n, period = self._spec, len(counts.period), counts.period
         # The first count after reset or a silence only opens.
-        first = (counts.gap > spec.form.max_periods) | (np.arange(n) == 0)
+        first = (counts.gap > spec.form.max_periods) | (np.arange(n) < counts.fresh)
         closing = not_before(period, period + spec.form.min_periods + 1)
         if spec.whole_cycles:
             closing = self._whole(counts, closing)
@@ -45,8 +36,10 @@ class Model:
             least=least,
             most=most,
             known=counts.mapped[ends] & counts.mapped[opening],
+            opening=opening,
         )
-        return updates(spec, counts, with_silences(spec, counts, found), ticks)
+        found = with_silences(spec, counts, found)
+        return found[found.clock >= since]
 
     def _whole(self, counts: Counts, later: Ints) -> Ints:
         """Return the count that closes the window of each opening one; `later`: the first one later than T_c.

@@ -10,19 +10,24 @@ from tachometry.spec import STachometer
 from tachometry.spec.core.ports import BOUNDS
 
 
-def alterations(m_e: NDArray[np.int64]) -> NDArray[np.bool_]:
+def alterations(m_e: NDArray[np.int64], before: tuple[int, int] = (0, 0)) -> NDArray[np.bool_]:
     """Return pulse alterations of Tsuji 2009, Sec. V-A.
 
     alt(i) = m_e(i) ≠ m_e(i−1) and m_e(i) ≠ b, b = the pulse number of the last tick without an alteration, and 0 before
-    the first tick.
+    the first tick. `before` has b and the pulse number of the tick before.
 
     While the number changes in every tick, only a tick that equals b does not alter, which leaves b as it is. So b is
     the pulse number of the last tick that equals its predecessor, and nothing has to be followed tick by tick.
     """
-    numbers = np.concatenate([[0], m_e])  # m_e(−1) = b = 0
-    changes = np.concatenate([[False], numbers[1:] != numbers[:-1]])
-    steady = np.maximum.accumulate(np.where(changes, 0, np.arange(len(numbers))))
-    return (changes[1:] & (numbers[1:] != numbers[steady[:-1]])).astype(bool)
+    numbers = np.append(before, m_e)
+    altered: NDArray[np.bool_] = (numbers[2:] != numbers[1:-1]) & (numbers[2:] != _steady(numbers)[1:-1])
+    return altered
+
+
+def _steady(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the last of the numbers up to each that equals its predecessor, or the first."""
+    changes = np.diff(numbers, prepend=numbers[:1]) != 0
+    return numbers[np.maximum.accumulate(np.where(changes, 0, np.arange(len(numbers))))]
 
 
 def windows(
@@ -67,13 +72,20 @@ class Model:
 
     def __init__(self, spec: STachometer) -> None:
         self._spec = spec
+        self._numbers = np.zeros(1, dtype=np.int64)  # those of ticks since the window opened, at first m_e(−1) = 0
+        self._steady = self._n = 0  # b of `alterations`; updates
 
     def updates(self, ticks: Table, steps: Steps | None, n_clocks: int) -> Table:
-        """Return all updates below `n_clocks` clocks, with the velocity in counts per tick as the datapath has it."""
-        spec, m_e = self._spec, ticks.pulse_count
-        i, m_s, forced = windows(alterations(m_e), spec.timing.max_ticks)
-        at = i + 1  # m_e(−1) = 0 comes first
-        numbers = np.concatenate([[0], m_e])
+        """Return the updates of the next ticks, with the velocity in counts per tick as the datapath has it."""
+        spec, m_e, most, before = self._spec, ticks.pulse_count, self._spec.timing.max_ticks, len(self._numbers)
+        latest = self._steady, int(self._numbers[-1])
+        altered = np.append(np.zeros(before - 1, dtype=np.bool_), alterations(m_e, latest))
+        i, m_s, forced = windows(altered, most)
+        at = i + 1  # the number with which the first window opens comes first
+        numbers = np.append(self._numbers, m_e)
+        self._steady = int(_steady(np.append(latest, m_e))[-1])
+        opening = np.append(0, at - forced * (most // 2))[-1]
+        self._numbers = numbers[opening:]
         total = np.concatenate([[0], np.cumsum(numbers)])  # total[k] = sum of the first k numbers
         if spec.cancel:
             # Eq. (21), doubled: m_e(i−m_s) + 2·Σ_{j=1}^{m_s−1} m_e(i−j) + m_e(i), over 2·m_s.
@@ -101,5 +113,6 @@ class Model:
         columns = {"velocity": quotient(0, 0), "interval": m_s, "forced": forced}
         if spec.bounds:
             columns |= {name: quotient(one, one) for name, one in BOUNDS.items()}
-            columns["bounds_valid"] = np.arange(len(i)) > 0
-        return Table(ticks.clock[i] + spec.latency.datapath, columns)
+            columns["bounds_valid"] = np.arange(self._n, self._n + len(i)) > 0
+        self._n += len(i)
+        return Table(ticks.clock[at - before] + spec.latency.datapath, columns)

@@ -2,23 +2,15 @@
 
 import numpy as np
 
-from tachometry.sim.golden.front_end import Steps
-from tachometry.sim.golden.methods.timed import Counts, Measurements, enclosure, updates, with_silences
+from tachometry.sim.golden.methods.timed import Counts, Measurements, TimedModel, enclosure, with_silences
 from tachometry.sim.golden.sorted_lookup import chain, next_place, not_before
-from tachometry.sim.signals.run import Table
-from tachometry.spec import TTachometer
 
 
-class Model:
+class Model(TimedModel):
     """Computes the T method."""
 
-    def __init__(self, spec: TTachometer) -> None:
-        self._spec = spec
-
-    def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
-        """Return all updates below `n_clocks` clocks, with the velocity in counts per tick as the datapath has it."""
+    def taken(self, counts: Counts, since: int) -> Measurements:
         spec = self._spec
-        counts = Counts.of(spec, ticks, steps, n_clocks)
         sign, gap = np.sign(counts.size), counts.gap
         many = np.abs(counts.size) > 1
         same = np.append(False, sign[1:] == sign[:-1])[: len(sign)] | spec.paper_exact | many
@@ -36,11 +28,12 @@ class Model:
             least=least,
             most=most,
             known=~many & counts.mapped & np.append(False, counts.mapped)[:-1],
+            opening=np.maximum(np.arange(len(gap)) - 1, 0),
         )
         opened = (gap <= spec.form.max_periods) & (np.arange(len(gap)) > 0)
         asked = with_silences(spec, counts, found[opened | many])
+        asked = asked[asked.clock >= since]
         # What comes while the divider is at work is not measured; but a 0 is always forced.
         following = not_before(asked.clock, asked.clock + spec.form.division_clocks)
         next_zero = next_place(np.flatnonzero(asked.forced), len(following))
-        taken = asked[chain(np.minimum(following, next_zero))]
-        return updates(spec, counts, taken, ticks)
+        return asked[chain(np.minimum(following, next_zero))]

@@ -1,6 +1,6 @@
 """The golden models of T and M/T share this: counts and their times, silences, and the operands of the divider."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,8 @@ class Counts:
     mapped: NDArray[np.bool_]  # shape (n,): whether that is known, or there is no map
     clock_of: Ints | None  # shape (m,): clock in which each period is seen; None: a period is a clock
     n_periods: int
+    before: int = -1  # period of the count before the first; reset is taken for one in period −1
+    fresh: bool = True  # whether the first count is the first after reset
 
     @classmethod
     def of(cls, spec: TimedTachometer, ticks: Table, steps: Steps, n_clocks: int) -> "Counts":
@@ -45,8 +47,8 @@ class Counts:
 
     @property
     def gap(self) -> Ints:
-        """Periods from the count before to each count; reset is taken for one in period −1."""
-        return np.diff(self.period, prepend=-1)
+        """Periods from the count before to each count."""
+        return np.diff(self.period, prepend=self.before)
 
     def mapped_before(self, spec: TimedTachometer, period: Ints) -> NDArray[np.bool_]:
         """Return whether a map, if there is one, was used at the last count before each of some periods."""
@@ -54,7 +56,7 @@ class Counts:
 
     def silences(self, max_periods: int) -> Ints:
         """Return periods in which a 0 is forced."""
-        begin = np.append(-1, self.period)
+        begin = np.append(self.before, self.period)
         end = np.append(self.period, self.n_periods)
         long = np.flatnonzero(end - begin > max_periods)
         nth, row = spans(np.ones_like(long), 1 + (end[long] - begin[long] - 1) // max_periods)
@@ -77,6 +79,7 @@ class Measurements:
     least: Ints | None
     most: Ints | None
     known: NDArray[np.bool_]  # shape (n,): whether `least` and `most` are valid
+    opening: Ints  # shape (n,): the count that opened it; of a silence, the one after it
 
     def __getitem__(self, rows: Any) -> "Measurements":
         columns: dict[str, Any] = {
@@ -136,8 +139,9 @@ def with_silences(spec: TimedTachometer, counts: Counts, found: Measurements) ->
         least=least,
         most=most,
         # The first period after reset was not seen completely.
-        known=((np.arange(len(period)) > 0) | (period >= np.append(counts.period, counts.n_periods)[0]))
+        known=((np.arange(len(period)) >= counts.fresh) | (period >= np.append(counts.period, counts.n_periods)[0]))
         & counts.mapped_before(spec, period),
+        opening=np.searchsorted(counts.period, period),
     )
     return found.with_more(silent)
 
@@ -206,7 +210,7 @@ def _decaying(spec: TimedTachometer, counts: Counts, taken: Measurements, held: 
     back = np.where((sign > 0) & (last_size > 0), 0, -1)
     low, high = _between(spec, back, np.where((sign < 0) & (last_size < 0), 0, 1), age)
     known = counts.mapped_before(spec, period)
-    return Measurements(clock, 3 * sign, 0 * sign, age, ~none, none, low, high, known)[nearer]
+    return Measurements(clock, 3 * sign, 0 * sign, age, ~none, none, low, high, known, 0 * sign)[nearer]
 
 
 def updates(spec: TimedTachometer, counts: Counts, taken: Measurements, ticks: Table) -> Table:
@@ -244,3 +248,54 @@ def _bounds(spec: TimedTachometer, taken: Measurements) -> dict[str, NDArray[Any
         exact = round_quotient(distance, 8 * np.maximum(time, 1), spec.velocity.native_frac_bits, towards)
         found[name] = np.where(time > 0, exact, towards * spec.velocity.absent_bound)
     return found
+
+
+class TimedModel:
+    """Computes a method with a divider.
+
+    Between two calls it keeps counts and ticks from the last measurement on that can show nothing more of those before
+    it, and measures them anew.
+    """
+
+    def __init__(self, spec: Any) -> None:
+        self._spec = spec
+        self._since = self._n_clocks = 0  # clock of that measurement; clocks of all calls
+        self._known = -1  # clock of the last step
+        self._before, self._fresh = -1, True  # see `Counts`
+        self._kept: tuple[Table, Steps] | None = None
+
+    def taken(self, counts: Counts, since: int) -> Measurements:
+        """Return what the divider takes from a clock on, in which it has taken a measurement or the core begins."""
+        raise NotImplementedError
+
+    def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
+        """Return the next updates below `n_clocks` clocks, with the velocity in counts per tick as the datapath has it.
+
+        `steps` may have some that are known already.
+        """
+        spec, begin = self._spec, self._n_clocks
+        if self._kept is not None:
+            ticks, steps = self._kept[0].then(ticks), self._kept[1].then(steps.since(self._known + 1))
+        self._known = int(np.append(self._known, steps.clock)[-1])
+        counts = replace(Counts.of(spec, ticks, steps, n_clocks), before=self._before, fresh=self._fresh)
+        taken = self.taken(counts, self._since)
+        found = updates(spec, counts, taken, ticks)
+        self._keep(counts, taken, ticks, steps, n_clocks)
+        return found.rows(slice(*np.searchsorted(found.clock, (begin, n_clocks))))
+
+    def _keep(self, counts: Counts, taken: Measurements, ticks: Table, steps: Steps, n_clocks: int) -> None:
+        """Keep what the next call needs."""
+        spec, self._n_clocks = self._spec, n_clocks
+        last = int(np.searchsorted(taken.clock, n_clocks - spec.latency.datapath, side="right")) - 1
+        if last >= 1:
+            self._since, self._fresh = int(taken.clock[last]), False
+            row, first = int(taken.opening[last]), int(np.searchsorted(ticks.clock, self._since))
+            begin = first if spec.form.on_lattice else self._since
+            if taken.forced[last]:
+                self._before = begin - spec.form.max_periods
+            else:
+                self._before, begin = int(np.append(self._before, counts.period)[row]), int(counts.period[row])
+            if spec.form.on_lattice:
+                self._before, first = self._before - begin, begin
+            ticks, steps = ticks.rows(slice(first, None)), steps.since(begin - spec.latency.tick)
+        self._kept = ticks, steps

@@ -164,38 +164,42 @@ class Model:
 
     def __init__(self, spec: TrackTachometer) -> None:
         self._spec = spec
+        sampled = spec.encoder.sampled is not None
+        begin = rows if sampled else compiled(tuple(constants_of(spec.form, spec.program.ahead))) or rows
+        self._shown = begin(spec.form, spec.program.ahead)
+        self._settled = None if spec.settling is None else Settled(spec.settling)
+        # The last clock of the ticks before, the position there, the tick of the last count, and the next tick.
+        self._end, self._reached, self._latest, self._next = -1, 0, -spec.timing.max_ticks, 0
 
     def updates(self, ticks: Table, steps: Steps, n_clocks: int) -> Table:
-        """Return all updates below `n_clocks` clocks, with the velocity in counts per tick as the datapath has it."""
+        """Return the updates of the next ticks, with the velocity in counts per tick as the datapath has it."""
         spec = self._spec
-        begin_rows = spec.encoder.sampled is None and compiled(tuple(constants_of(spec.form, spec.program.ahead)))
-        shown = (begin_rows or rows)(spec.form, spec.program.ahead)
         fine_bits = spec.position_fine_bits
         unused, shift = 64 - spec.position_width - fine_bits, spec.form.moved_shift - fine_bits
         n, most = len(ticks), spec.timing.max_ticks
-        settled = None if spec.settling is None else Settled(spec.settling)
         names = ["velocity", "interval", "forced", "acceleration", "velocity_std", "position_fine", "standstill"]
         names += SMOOTH if spec.smooth else ()
         flags = ("forced", "standstill")
         columns = {name: np.empty(n, dtype=bool if name in flags else np.int64) for name in names}
-        begin, reached, latest = -1, 0, -most
         for first in range(0, n, _PIECE):
             piece = slice(first, first + _PIECE)
             last = ticks.clock[piece] - spec.latency.tick
             if spec.encoder.sampled is None:
-                windows = Windows.of(steps, last, spec.form.most_number, begin, reached)
+                windows = Windows.of(steps, last, spec.form.most_number, self._end, self._reached)
             else:
                 assert isinstance(spec.form, SampledTracking)
                 windows = Windows.of_reads(ticks.rows(piece), spec.form)
-            begin, reached = int(last[-1]), reached + int(windows.moved.sum())
-            velocity, place, velocity_std, acceleration, standstill, smooth, delay = shown(windows).T
+            self._end, self._reached = int(last[-1]), self._reached + int(windows.moved.sum())
+            velocity, place, velocity_std, acceleration, standstill, smooth, delay = self._shown(windows).T
             place, counted = (place + (1 << shift - 1)) >> shift, windows.number > 0
-            if settled is not None:
-                place = np.array(settled.places(velocity.tolist(), counted.tolist(), place.tolist()), dtype=np.int64)
+            if self._settled is not None:
+                place = np.array(
+                    self._settled.places(velocity.tolist(), counted.tolist(), place.tolist()), dtype=np.int64
+                )
             fine = (ticks.position[piece] << fine_bits) + place
-            number = np.arange(first, first + len(last))
-            before = np.maximum.accumulate(np.append(latest, np.where(counted, number, latest)))
-            latest = int(before[-1])
+            number = np.arange(self._next, self._next + len(last))
+            before = np.maximum.accumulate(np.append(self._latest, np.where(counted, number, self._latest)))
+            self._next, self._latest = self._next + len(last), int(before[-1])
             interval = np.minimum(number - before[:-1], most)
             if spec.encoder.sampled is not None:
                 interval, standstill = ticks.elapsed[piece], standstill * ~ticks.forgets[piece]

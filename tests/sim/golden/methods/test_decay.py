@@ -125,7 +125,7 @@ def test_just_the_maximum_speed_is_in_range() -> None:
     spec = make_spec(max_speed=Speed(Fraction(1), "rev/s"), frac_bits=8)
     assert spec.tick.max_count == 1
     for sign in (1, -1):
-        updates = updates_of(spec, {5: sign, 45: sign, 84: sign, 125: sign}, 130)
+        updates = updates_of(spec, {5: sign, 45: sign, 84: sign, 125: sign}, 170)
         assert updates.velocity[:3].tolist() == [256 * sign, 256 * sign, int(rounded(Fraction(40, 41) * sign, 8) * 256)]
         assert updates["out_of_range"][:3].tolist() == [False, True, False]
 
