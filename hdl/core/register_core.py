@@ -91,8 +91,8 @@ class RegisterCore(wiring.Component):
         if "preset" in core.controls:
             m.d.comb += core.position_counter.value.eq(bank.preset_value)
         if modulus is not None:
-            counts, parts = modulus.as_integer_ratio()
-            total = core.position_modulo + (bank.modulo_offset if parts == 1 else 0)
+            counts, _ = modulus.as_integer_ratio()
+            total = core.position_modulo + (bank.modulo_offset if self._map.spec.front_end.shifted_modulus else 0)
             latest = Signal.like(self.position_modulo)
             kept = Signal.like(self.position_modulo)
             m.d.comb += [

@@ -31,7 +31,7 @@ class SampledTachometer(Tachometer):
 
     @property
     def settable(self) -> tuple[wiring.Component, ...]:
-        return tuple(self.extras.values())
+        return (self.reader, *self.extras.values())
 
     def _place_front(self, m: Module) -> None:
         m.submodules.reader = self.reader
@@ -49,6 +49,8 @@ class SampledTachometer(Tachometer):
         fault = Mux(reader.sample_ok, fault, wrong)
         m.d.comb += self.read_fault.eq(Mux(reader.sample_valid, fault, 0))
         drive(m, reader, {"last": self.sampling_clock.last})
+        if self._spec.front_end.modulus is not None:
+            m.d.comb += self.position_modulo.eq(reader.position)
         shown = ("tick", "pulse_count", "overflow", "position", "position_valid", "decode_error")
         follow(m, self, reader, shown)
         names = ("coming", "next_count", "number", "times", "phase", "forgets", "silent", "elapsed", "length")

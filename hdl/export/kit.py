@@ -116,6 +116,7 @@ def _bench(tacho: TachometerSpec) -> dict[str, object]:
     hold = max(_hold(tacho), min(2 * (tacho.filter_clocks + 8), tacho.filter_clocks + 300), tacho.blanking_clocks)
     turns = _turns(hold)
     levels, expected = _turned(encoder, turns)
+    expected -= encoder.zero or 0
     lines = ("a", "b") if encoder.sampled is None else ("sample_valid",)
     low = {line: f"1'b{int(line in encoder.inverted)}" for line in lines}
     if encoder.sensor == "step-dir":

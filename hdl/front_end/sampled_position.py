@@ -5,7 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.saturate import saturate
-from tachometry.hdl.wires.ports import by_name
+from tachometry.hdl.wires.ports import by_name, only_if
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.sampled import Reach
 
@@ -16,7 +16,7 @@ class SampledPosition(wiring.Component):
     Latency: `tick` is high two clocks after the window's last clock, as in `PulseCounter`; a read in that last clock
     still belongs to the window. All outputs but `coming`, `next_count` and `decode_error` change with `tick` alone.
 
-    The lower bits of the position are the read; the upper ones count how often that wraps.
+    The lower bits of the position are the read; the upper ones count how often that wraps. `zero` is subtracted.
     """
 
     def __init__(self, spec: TachometerSpec) -> None:
@@ -26,10 +26,12 @@ class SampledPosition(wiring.Component):
         self._spec, self._sampled = spec, sampled
         self._most_age = sampled.most_age(longest)
         count = signed(spec.widths.count)
+        self._zeroed = spec.encoder.zero is not None
         super().__init__(
             {
                 **{port.name: In(port.width) for port in sampled.ports(longest)},
                 "last": In(1),  # high in the last clock of a window
+                **only_if(self._zeroed, zero=In(signed(spec.position_width), init=spec.encoder.zero or 0)),
                 "tick": Out(1),
                 "pulse_count": Out(count),  # counts since the read before; 0 without a read, or without one before
                 "overflow": Out(1),  # it was saturated
@@ -118,8 +120,14 @@ class SampledPosition(wiring.Component):
             moved.eq(Mux(known, off[:width], 0)),
             self.position_valid.eq(self.silent != most_ticks),
             self.phase.eq(self.sample_before),
-            self.position.eq(Cat(self.sample_before, self.turns)),
         ]
+        whole = Cat(self.sample_before, self.turns)
+        if self._zeroed:
+            zero = Signal.like(self.zero, name="zero_before")
+            with m.If(self.coming):
+                m.d.sync += zero.eq(self.zero)
+            whole -= zero
+        m.d.comb += self.position.eq(whole)
         held, overflow = saturate(m, moved, self._spec.widths.max_pulse_count)
         m.d.comb += self.next_count.eq(held)
         waited = self.silent + self.position_valid

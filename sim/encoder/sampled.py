@@ -75,7 +75,7 @@ class SampledEncoder(VirtualEncoder):
             more = {name: np.append(0, values) for name, values in lines.items()}
         recording = Recording(at / timing.clock_hz, none, none, motion.duration, more=more)
         read = (-place if self.reverse else place)[~wrong]
-        read = read - (read[:1] & -1 << sampled.width).sum()
+        read = read - (read[:1] & -1 << sampled.width).sum() - (self.core.encoder.zero or 0)
         return ReadEncoding(self, motion, recording, 0, 0, read_time=time[~wrong], read=read)
 
     def _disturbed(self, turn: NDArray[np.float64], n: int, counts: int) -> Ints:

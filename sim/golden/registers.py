@@ -1,7 +1,7 @@
 """Golden registers answer accesses from what the core shows."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -119,9 +119,14 @@ class GoldenBank:
     def _ask(self, accesses: Sequence[Access]) -> None:
         """Find what the core shows if a program sets the position, lets the index through, and writes offsets."""
         spec = self._map.spec
-        if not spec.front_end.controls and spec.front_end.modulus is None:
+        if not spec.front_end.controls and spec.front_end.modulus is None and spec.encoder.zero is None:
             return
         written_at = self._written(accesses)
+        if (reads := self._pins.reads) is not None:
+            zero = self._held("zero", spec.encoder.zero or 0, self._tables[TICK].clock - 1)
+            self._steps = replace(self._pins, reads=replace(reads, zero=zero))
+            self._tables = golden.tables(spec, self._trace, self._steps)
+            return
         ahead = spec.latency.tick - 1
         clocks = {
             name: np.union1d(pins, np.array([at for at, _ in written_at[f"{name}_now"]], dtype=np.int64) - ahead)
@@ -130,7 +135,7 @@ class GoldenBank:
         values = self._held("preset_value", spec.preset or 0, clocks["preset"] + ahead)
         self._steps = self._pins.asked(spec, clocks["preset"], values, clocks["home"])
         self._tables = golden.tables(spec, self._trace, self._steps)
-        if (modulus := spec.front_end.modulus) is not None and modulus.denominator == 1:
+        if (modulus := spec.front_end.shifted_modulus) is not None:
             ticks = self._tables[TICK]
             moved = (ticks.position_modulo + self._held("modulo_offset", 0, ticks.clock)) % int(modulus)
             self._tables[TICK] = ticks.having(position_modulo=moved)
@@ -139,7 +144,7 @@ class GoldenBank:
     def _written(self, accesses: Sequence[Access]) -> dict[str, list[tuple[int, int]]]:
         """Return the clocks of writes of what moves the position, by ports, and what the ports were then."""
         found: dict[str, list[tuple[int, int]]] = {
-            name: [] for name in ("preset_now", "home_now", "preset_value", "modulo_offset")
+            name: [] for name in ("preset_now", "home_now", "preset_value", "modulo_offset", "zero")
         }
         self._writes = found
         settings = initial(self._map)

@@ -27,6 +27,7 @@ class Reads:
     # shape (m,): clocks of all that is wrong with reads, and what, see `spec.core.reads`
     fault_clock: NDArray[np.int64]
     fault: NDArray[np.int64]
+    zero: NDArray[np.int64]  # shape (1,) or that of ticks: what is subtracted from the position
 
     @classmethod
     def of(cls, spec: TachometerSpec, trace: PinTrace) -> "Reads":
@@ -62,7 +63,8 @@ class Reads:
         fault = np.where(jumps, JUMP, np.where(taken, WARNING * warning, NO_ANSWER))
         fault = np.where(reason == 0, fault, reason)
         seen = fault > 0
-        return cls(clock[taken], sample[taken], age[taken], clock[~taken], anew[taken], clock[seen], fault[seen])
+        zero = np.array([spec.encoder.zero or 0])
+        return cls(clock[taken], sample[taken], age[taken], clock[~taken], anew[taken], clock[seen], fault[seen], zero)
 
 
 def _jumps(
@@ -104,7 +106,7 @@ def ticks_of(spec: TachometerSpec, reads: Reads, last: NDArray[np.int64]) -> Tab
     moved = np.where(known, way, 0)
     begun = np.maximum.accumulate(np.where(has & ~known, number, 0))  # the tick of the read that is absolute
     total = np.cumsum(moved)
-    position = np.where(through > 0, sample[begun] + total - total[begun], 0)
+    position = np.where(through > 0, sample[begun] + total - total[begun], 0) - reads.zero
     limit, wrap = spec.widths.max_pulse_count, 1 << spec.position_width - 1
     columns = {
         "pulse_count": np.clip(moved, -limit, limit),
@@ -119,4 +121,6 @@ def ticks_of(spec: TachometerSpec, reads: Reads, last: NDArray[np.int64]) -> Tab
         "elapsed": np.minimum(before + 1, most),
         "length": np.diff(last, prepend=-1),
     }
+    if spec.front_end.modulus is not None:
+        columns["position_modulo"] = position % int(spec.front_end.modulus)
     return Table(last + spec.latency.tick, columns)

@@ -43,10 +43,16 @@ def _check_sampled(spec: Core) -> None:
     """Refuse what needs edges."""
     if not spec.facts.takes_reads:
         raise ParameterError("method", f"must be track or m with --sensor sampled, not {spec.method}", "needs edges")
-    absent = {"filter_clocks": 0, "blanking_clocks": 0, "index": None, "preset": None, "position_modulo": None}
-    for name, none in absent.items():
+    for name, none in {"filter_clocks": 0, "blanking_clocks": 0, "index": None, "preset": None}.items():
         if getattr(spec, name) != none:
-            raise ParameterError(name, "must be left out with --sensor sampled: it is for edges")
+            more = "type --zero, or write register ZERO" if name == "preset" else "it is for edges"
+            raise ParameterError(name, f"must be left out with --sensor sampled: {more}")
+    half = 1 << spec.position_width - 1
+    if not -half <= (spec.encoder.zero or 0) < half:
+        raise ParameterError("zero", f"must be from {-half} to {half - 1}, a position, not {spec.encoder.zero}")
+    if (counts := spec.front_end.modulus) and (counts.denominator > 1 or counts.numerator.bit_count() > 1):
+        rest = f"must be a power of two for an encoder that is read, not {float(counts):.9g}"
+        raise ParameterError("position_modulo", rest)
     refuse(spec.extras, "sampled")
     if (reads := spec.reads) is not None:
         least = reads.least_tick

@@ -25,6 +25,7 @@ _MASTERS = (*_SERIAL, "spi", "tformat")
 _OF_SENSORS = {
     "bits": tuple(READ),
     "sample_age": ("sampled",),
+    "zero": tuple(READ),
     "chip": ("spi",),
     "encoder_clock": _MASTERS,
     "line_delay": _MASTERS,
@@ -199,6 +200,13 @@ class Encoder:
         None,
         "Age of each sampled position, in clocks. It is the time since the shaft was there; without it, "
         "input sample_age has it.",
+        metavar="N",
+        parse=parse_whole,
+        **_READ,
+    )
+    zero: int | None = option(
+        None,
+        "Position of an encoder that is read, in LSB, which is 0. On a bus register ZERO begins with it.",
         metavar="N",
         parse=parse_whole,
         **_READ,

@@ -117,6 +117,12 @@ class FrontEnd:
         return Fraction(self.asked.encoder.counts_per_rev if of == "rev" else int(of)) / int(parts or 1)
 
     @property
+    def shifted_modulus(self) -> Fraction | None:
+        """The modulus, if a program may shift the place within it."""
+        modulus = self.modulus
+        return modulus if modulus and modulus.denominator == 1 and self.asked.encoder.sampled is None else None
+
+    @property
     def index_state(self) -> Levels | None:
         """Levels of the lines in which the index is taken; None: it is where Z rises, or there is none."""
         if self.asked.index is None:

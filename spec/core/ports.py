@@ -61,6 +61,7 @@ def _more_ports(spec: Core) -> Iterator[Port]:
     if modulus := spec.front_end.modulus:
         text = f"Counts up to this period modulo {modulus}, from 0 on, since reset or since an index that resets. "
         text += "It also changes between ticks. A preset does not change it."
+        text = f"The position modulo {modulus}, from 0 on." if spec.encoder.sampled else text
         yield held(TICK, "position_modulo", (ceil(modulus) - 1).bit_length(), unit="counts", help=text)
     if spec.external_tick:
         text = "One clock. Together with tick: the external tick was missing, and the core made one. Alone: an "

@@ -263,7 +263,11 @@ class RegisterMap:
         if spec.preset is not None:
             help = "Position that the input preset, or CONTROL.preset, sets."
             yield from position_words("PRESET", help, "preset_value", spec.position_width, spec.preset)
-        if (modulus := spec.front_end.modulus) is not None and modulus.denominator == 1:
+        if spec.encoder.zero is not None:
+            help = "Position of the encoder that is 0, from the next tick on. To make the position N, write ZERO + "
+            help += "POSITION - N."
+            yield from position_words("ZERO", help, "zero", spec.position_width, spec.encoder.zero)
+        if (modulus := spec.front_end.shifted_modulus) is not None:
             help = "Counts by which position_modulo is ahead of counts since reset, or since an index that resets."
             most = int(modulus) - 1
             more: dict[str, Any] = {"unit": "counts", "bits": most.bit_length(), "least": 0, "most": most}

@@ -40,11 +40,12 @@ CASES = {
         "reverse": "yes",
         "health": "yes",
     },
+    "m zero": {"bits": "2+10", "zero": "-700", "position-modulo": "rev/4", "reverse": "yes"},
     "m fixed": {"bits": "12", "sample-age": "7", "position-width": "48", "lowpass": "20kHz", "age": "yes"},
     "track": SLOW,
     "track fine": SLOW
     | {"bits": "16+24", "multiplier": "block", "smooth": "yes", "external-tick": "yes"}
-    | {"position-width": "48", "period": "64"},
+    | {"position-width": "48", "period": "64", "zero": "1000000007"},
     "track coarse": SLOW | {"bits": "5", "unit": "rpm", "sample-age": "100", "reverse": "yes", "max-memory": "5ms"},
     "track period": SLOW | {"multiplier": "serial", "tick": "1000clk", "max-time": "10000clk", "period": "128"},
 }
@@ -75,7 +76,7 @@ def both(spec: TachometerSpec, reads: list[tuple[int, int, int, int]], n_clocks:
 
 
 # A core of track is compiled for this.
-@pytest.mark.parametrize("case", only([*[*CASES][:3], "track fine"], CASES))
+@pytest.mark.parametrize("case", only([*[*CASES][:4], "track fine"], CASES))
 def test_gates_and_golden_model_agree_on_every_read(case: str) -> None:
     spec = core(case)
     few = case.startswith("track")
@@ -85,6 +86,14 @@ def test_gates_and_golden_model_agree_on_every_read(case: str) -> None:
     assert len(run.errors) > 1
     assert {0, 1} == {*run.ticks.position_valid.tolist()}
     assert len({*run.ticks.position.tolist()}) > 50
+
+
+def test_zero_is_subtracted_from_the_position() -> None:
+    spec = of_texts("m", BASE | {"bits": "2+9", "zero": "1000", "position-modulo": "512", "position-width": "16"})
+    run = both(spec, [(20, 2040, 0, 1), (60, 5, 0, 1), (100, 900, 0, 1)], 200)
+    assert run.ticks.position[:3].tolist() == [1040, 1053, 1948]
+    assert run.ticks.position_modulo[:3].tolist() == [16, 29, 412]
+    assert run.ticks.pulse_count[:3].tolist() == [0, 13, 256]
 
 
 def test_the_first_read_is_absolute_and_later_ones_wrap() -> None:
@@ -271,8 +280,6 @@ def test_a_core_is_made_again_from_its_options() -> None:
         ("m", {"bits": "25"}, "bits must be bits of turns and of a turn, as 12\\+17"),
         ("m", {"ppr": "3"}, "ppr must be left out with --sensor sampled, not 3: type --bits"),
         ("m", {"index": "yes"}, "index must be left out with --sensor sampled: it is for edges"),
-        ("m", {"preset": "0"}, "preset must be left out with --sensor sampled: it is for edges"),
-        ("m", {"position-modulo": "rev"}, "position_modulo must be left out with --sensor sampled: it is for edges"),
         ("m", {"blanking": "3"}, "blanking_clocks must be left out with --sensor sampled: it is for edges"),
         ("m", {"filter": "3"}, "filter_clocks must be left out with --sensor sampled: it is for edges"),
         ("m", {"sample-age": "81"}, "sample_age must be from 0 to 80 clocks, two ticks, not 81"),
@@ -283,6 +290,9 @@ def test_a_core_is_made_again_from_its_options() -> None:
             "bits must be given with --sensor sampled or ssi or biss or spi or tformat, not hall",
         ),
         ("m", {"decoding": "4"}, "decoding must be 1 for sampled, not 4"),
+        ("m", {"zero": "3000000000"}, "zero must be from -2147483648 to 2147483647, a position, not 3000000000"),
+        ("m", {"position-modulo": "rev/3"}, "position_modulo must be a power of two for an encoder that is read"),
+        ("m", {"preset": "5"}, "preset must be left out with --sensor sampled: type --zero, or write register ZERO"),
         ("m", {"period": "64"}, "period must not be given with method m"),
         ("track", SLOW | {"period": "4"}, "period must be a power of two from 8 to 131072 LSB, a turn, not 4"),
         ("track", SLOW | {"period": "100"}, "period must be a power of two from 8 to 131072 LSB, a turn, not 100"),

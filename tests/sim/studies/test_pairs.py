@@ -88,7 +88,17 @@ def test_every_option_is_a_factor(method: str) -> None:
     without = {about.name for about in common_options() if not about.needs} - set(found)
     never = {"rairan": {"external-tick"}, "track": {"tick", "bounds"}}
     lines = {"pole-pairs", "teeth", "ratio"}  # tests/hdl/front_end has the wheel, tests/spec/core the ratio
-    lines |= {"bits", "sample-age", "encoder-clock", "line-delay", "crc", "gray", "repeat"}  # tests/hdl/core has reads
+    lines |= {
+        "bits",
+        "sample-age",
+        "zero",
+        "chip",
+        "encoder-clock",
+        "line-delay",
+        "crc",
+        "gray",
+        "repeat",
+    }  # tests/hdl/core has reads
     lines |= {"disc"} if method in ("t", "mt", "s", "track") else {"disc", "disc-table"}  # tests/extras has maps
     assert without == {"ppr", "lines", "cpr", "clock", "dt", "pwm", "lsb"} | lines | never.get(method, set())
     assert "yes index-reset" in found["index"]

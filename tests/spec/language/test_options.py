@@ -107,7 +107,7 @@ def test_every_option_does_what_it_says() -> None:
     )
     assert {about.name for about in (*common_options(), *own_options("s"))} - {
         "dt",
-        *("bits", "sample-age", "chip", "encoder-clock", "line-delay", "crc", "gray", "repeat"),
+        *("bits", "sample-age", "zero", "chip", "encoder-clock", "line-delay", "crc", "gray", "repeat"),
         "frac-bits",
         "lines",
         "cpr",
