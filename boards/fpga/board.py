@@ -42,6 +42,7 @@ class Board:
     leds: int  # LEDs that are used, at most
     flow: Flow | None  # what makes a bitstream; None: the vendor's tools, from an archive
     loader: tuple[str, ...]  # what openFPGALoader must be told of the board
+    edges: int = 8192  # words that `EdgeRecorder` has in its memories
     bitstream: str = ""  # suffix of the bitstream that the vendor's tools make
 
     @property

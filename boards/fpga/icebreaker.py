@@ -24,6 +24,7 @@ ICEBREAKER = Board(
     attributes={"IO_STANDARD": "SB_LVCMOS"},
     pull_up={"PULLUP": 1},
     leds=2,
+    edges=4096,
     flow=ice40_up("--up5k", "--package", "sg48"),
     # Its jumpers are such that the FPGA reads the flash memory; its own memory cannot be written.
     loader=("-b", "ice40_generic", "-f"),

@@ -26,6 +26,7 @@ if TYPE_CHECKING:  # Amaranth is slow to import, and --help does not need it
     from tachometry.boards.fpga.build import Built
 
 _SERIAL = ("uart", "spi")  # buses that leave the FPGA over a few pins
+_EDGES = "edges"
 
 
 def _bus(name: str, baud: int | None, spec: TachometerSpec | LoopSpec) -> Bus:
@@ -63,11 +64,12 @@ Examples:
 @option(
     "Files",
     "--bus",
-    type=click.Choice(_SERIAL, case_sensitive=False),
+    type=click.Choice((*_SERIAL, _EDGES), case_sensitive=False),
     default=_SERIAL[0],
     help="Registers on a serial bus. "
     + "; ".join(f"{name}: {BUSES[name].help}" for name in _SERIAL)
-    + ". A UART is on the USB of the board, where the board has one.",
+    + f". A UART is on the USB of the board, where the board has one. {_EDGES}: no core, but a bitstream that records "
+    "edges for `tachometry calibrate`.",
 )
 @BAUD
 def build(
@@ -91,13 +93,15 @@ def build(
     """
     begun = time.monotonic()
     check_module_name(name)
-    on = _bus(bus, baud, spec)
+    on = _bus(_SERIAL[0] if bus == _EDGES else bus, baud, spec)
     demo_map(spec)  # what cannot have registers is refused at once
     from tachometry.boards.fpga import build as builder
 
     builder.check_tools(board)
     suffixes = suffix, *_ = (".zip" if board.flow is None else board.flow.suffix, ".json", ".v")
     folder = default_folder(board) if directory is None else directory
+    if bus == _EDGES:
+        return _recorder(board, spec.tachometer, folder / f"{name}{suffix}", begun)
     with Outputs({kind: folder / f"{name}{kind}" for kind in suffixes}) as outputs:
         from tachometry.boards.fpga.top import component, described
         from tachometry.cli.reports.terminal import activity
@@ -117,6 +121,20 @@ def build(
         click.echo(click.format_filename(folder / f"{name}{kind}"))
     click.echo()
     print_build(spec.tachometer, board, built, time.monotonic() - begun)
+    return 0
+
+
+def _recorder(board: Board, spec: TachometerSpec, path: Path, begun: float) -> int:
+    """Build the recorder of edges."""
+    from tachometry.boards.fpga.build import build as built_of
+    from tachometry.boards.fpga.edge_recorder import recorder_of
+    from tachometry.cli.reports.terminal import activity
+
+    with Outputs({path.suffix: path}) as outputs, activity() as say:
+        built = built_of(recorder_of(board), board, say)
+        outputs[path.suffix].write_bytes(built.content)
+    click.echo(click.format_filename(path) + "\n")
+    print_build(spec, board, built, time.monotonic() - begun)
     return 0
 
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import chain
 from pathlib import Path
 
 import click
+import numpy as np
 
+from tachometry.boards.host.edges import read_edges
+from tachometry.boards.monitor.serial_port import SerialPort
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.capture import CAPTURE_OPTIONS
 from tachometry.cli.options.core import CAPTURED_OPTIONS
@@ -17,6 +21,9 @@ from tachometry.sim.signals.recording import Recording
 from tachometry.sim.studies.calibrating.calibrate import calibrate as calibration_of
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.disc import Disc
+from tachometry.spec.registers.edges import BAUD
+
+_TIMES = 15  # recordings of a board
 
 
 @click.command(
@@ -25,7 +32,8 @@ from tachometry.spec.core.disc import Disc
 Examples:
   tachometry calibrate coast.sr --ppr 500 --index -o disc.json --plot disc.png
   tachometry calibrate coast1.csv coast2.csv --ppr 500
-  tachometry calibrate later.sr --ppr 500 --index --against disc.json""",
+  tachometry calibrate later.sr --ppr 500 --index --against disc.json
+  tachometry calibrate /dev/ttyUSB1 --port --ppr 500 --index -o disc.json""",
 )
 @click.argument("capture", type=FilePath(), nargs=-1, required=True, metavar="CAPTURE…")
 @CAPTURED_OPTIONS
@@ -43,6 +51,13 @@ Examples:
     metavar="FILE",
     help="Check that it is the encoder of this map. Without --index, edges are then counted as there.",
 )
+@option(
+    "Map",
+    "--port",
+    is_flag=True,
+    help="Record from a board at the serial port CAPTURE. Its bitstream is from `tachometry build --bus edges`; it "
+    "records 15 times while the shaft coasts.",
+)
 @output("-o", "--output", "table", suffixes=(".json",), help="Write the map of the disc.")
 @output("--plot", suffixes=(".png", ".pdf", ".svg"), help="Draw the disc as it is, and with the map.")
 def calibrate(
@@ -51,6 +66,7 @@ def calibrate(
     read: Callable[[Path, TachometerSpec], Recording],
     one_speed: bool,
     against: Path | None,
+    port: bool,
     **targets: Path | None,
 ) -> int:
     """Measure the disc of an encoder from captures of its lines.
@@ -66,7 +82,8 @@ def calibrate(
     known = None if against is None else _read_disc(against)
     inputs = [*capture, *([against] if against else [])]
     outputs = Outputs({"-o": targets["table"], "--plot": targets["plot"]}, inputs)
-    recordings = ((str(path), read(path, spec)) for path in capture)
+    one = (lambda path: _of_board(str(path), spec)) if port else (lambda path: [(str(path), read(path, spec))])
+    recordings = chain.from_iterable(map(one, capture))
     with outputs:
         found = calibration_of(recordings, spec, one_speed=one_speed, against=known, bar=progress_bar)
         if found.reasons:
@@ -80,6 +97,17 @@ def calibrate(
             save_disc(path, found)
     print_calibration(found, spec)
     return 0
+
+
+def _of_board(name: str, spec: TachometerSpec) -> Iterator[tuple[str, Recording]]:
+    """Yield recordings of a board, by names."""
+    with SerialPort(name, BAUD) as port:
+        for number in range(_TIMES):
+            click.echo(f"recording {number + 1} of {_TIMES}: let the shaft coast", err=True)
+            clock_hz, edges = read_edges(port)
+            gap, levels = np.array(edges).T
+            time, (a, b, z) = np.cumsum(gap) / clock_hz, ((levels >> line & 1).astype(np.uint8) for line in range(3))
+            yield f"recording {number + 1}", Recording(time, a, b, float(time[-1]), z if spec.index else None)
 
 
 def _read_disc(path: Path) -> Disc:

@@ -11,7 +11,7 @@ from tachometry.sim.signals.recording import Recording, packed
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.sensors import packed_levels
 
-LEAST_TURNS = 5  # of a run
+LEAST_TURNS = 4  # of a run
 
 
 @dataclass(frozen=True)

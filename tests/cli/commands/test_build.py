@@ -216,3 +216,8 @@ def test_what_was_there_stays_until_the_new_is_whole(fake: FakeTools, capsys: py
     shutil.rmtree("rig")
     assert run("build", "icebreaker", "--ppr", "9", "-o", "rig") == 0
     assert before.keys() == {path.name for path in Path("rig").iterdir()}
+
+
+def test_a_recorder_of_edges_is_a_bitstream_alone(fake: FakeTools, tmp_path: Path) -> None:
+    assert run("build", "icebreaker", *CORE, "--bus", "edges", "-o", tmp_path / "out") == 0
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["tachometer.bin"]

@@ -15,6 +15,7 @@ from tachometry.sim.captures.sigrok import write_sr
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.spec.core.disc import Disc
+from tachometry.spec.registers.edges import header
 
 PAGE = docs.page("guides/disc.md")
 COMMANDS = [shlex.split(line) for line in re.findall(r"^tachometry (.*)", PAGE, re.MULTILINE)]
@@ -83,3 +84,35 @@ def test_a_disc_without_faults_gains_nothing(tmp_path: Path, capsys: pytest.Capt
     save(tmp_path / "even.sr", "ramp:150rad/s:60rad/s:3s", EVEN)
     assert run("calibrate", tmp_path / "even.sr", "--ppr", "24", "--index") == 0
     assert "the disc is better than the map: there is nothing to gain" in capsys.readouterr().out
+
+
+class Board:
+    """A serial port of a board that records a bit more than four turns of a shaft, at another speed each time."""
+
+    def __init__(self, name: str, baud: int) -> None:
+        self.asked, self.bytes = 0, b""
+
+    __enter__ = __exit__ = lambda self, *_: self
+
+    def write(self, data: bytes, /) -> None:
+        speed, self.asked = 150 - 6 * self.asked, self.asked + 1
+        made = replace(ENCODER, start_angle_rad=self.asked, jitter=0.03).record(
+            parse_motion(f"ramp:{speed}rad/s:{speed - 4}rad/s:{30 / speed}s")
+        )
+        trace = made.recording.place(12_000_000)
+        gap, level = np.diff(trace.clock, prepend=0), trace.a + 2 * trace.b + 4 * trace.lines["z"]
+        words = b"".join(int(one << 3 | two).to_bytes(3, "little") for one, two in zip(gap, level, strict=True))
+        self.bytes = header(12_000_000, len(gap)) + words
+
+    def read(self, size: int, /) -> bytes:
+        found, self.bytes = self.bytes[:size], self.bytes[size:]
+        return found
+
+
+def test_a_board_is_a_capture_at_many_speeds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tachometry.cli.commands.calibrate.SerialPort", Board)
+    assert run("calibrate", "/dev/ttyUSB1", "--port", "--ppr", "24", "--index", "-o", tmp_path / "disc.json") == 0
+    disc = Disc.parse((tmp_path / "disc.json").read_text())
+    offset = ENCODER.disc.offset
+    assert disc.turns > 10
+    assert min(np.std(disc.displacement - np.roll(offset - offset.mean(), by)) for by in range(96)) < 0.02

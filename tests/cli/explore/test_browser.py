@@ -141,7 +141,7 @@ def test_curves_and_motions_and_captures(page: Page, tmp_path: Path) -> None:
     expect(page.locator("#deviation")).to_be_hidden()
     page.locator("summary", has_text="The disc").click()
     page.get_by_role("button", name="Measure the disc").click()
-    expect(page.locator("#disc-error")).to_contain_text("captures must have more than 5 turns of 96 counts")
+    expect(page.locator("#disc-error")).to_contain_text("captures must have more than 4 turns of 96 counts")
     coast = tmp_path / "coast.sr"
     recording = VirtualEncoder(24, eccentricity=0.25).record(parse_motion("ramp:150rad/s:60rad/s:3s")).recording
     write_sr(coast, recording.place(2_000_000), 2_000_000)
