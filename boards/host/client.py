@@ -99,6 +99,13 @@ class Client:
             self.write("DISC_DATA", self.registers.with_fields("DISC_DATA", entry & 255, {"write": 1}))
         return all(self._has_entry(*each) for each in enumerate(entries))
 
+    def turn_disc(self, by: int) -> None:
+        """Move the place in the turn of a core without an index on by counts, and let it use its map; see
+        `tachometry calibrate --align`. It raises KeyError if the core has no DISC_TURN, ValueError if it is no count of
+        a turn.
+        """
+        self.write("DISC_TURN", self.registers.with_fields("DISC_TURN", 0, {"by": by, "now": 1}))
+
     def _has_entry(self, edge: int, entry: int) -> bool:
         self.write("DISC_ADDRESS", edge)
         self._word(self.registers.captured[0]["name"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from itertools import chain
 from pathlib import Path
@@ -9,7 +10,10 @@ from pathlib import Path
 import click
 import numpy as np
 
+from tachometry.boards.host.client import Client
 from tachometry.boards.host.edges import read_edges
+from tachometry.boards.host.link import Link
+from tachometry.boards.host.registers import HostRegisters
 from tachometry.boards.monitor.serial_port import SerialPort
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.capture import CAPTURE_OPTIONS
@@ -58,6 +62,15 @@ Examples:
     help="Record from a board at the serial port CAPTURE. Its bitstream is from `tachometry build --bus edges`; it "
     "records 15 times while the shaft coasts.",
 )
+@option(
+    "Map",
+    "--align",
+    type=FilePath(),
+    metavar="PORT",
+    help="Align the core without an index at this serial port. It needs --against, and a capture that begins with the "
+    "reset of the core, whose --manifest `tachometry build` wrote.",
+)
+@option("Map", "--manifest", type=FilePath(), metavar="FILE", help="Manifest of the board of --align.")
 @output("-o", "--output", "table", suffixes=(".json",), help="Write the map of the disc.")
 @output("--plot", suffixes=(".png", ".pdf", ".svg"), help="Draw the disc as it is, and with the map.")
 def calibrate(
@@ -96,7 +109,18 @@ def calibrate(
 
             save_disc(path, found)
     print_calibration(found, spec)
+    if targets["align"]:
+        _align(targets["align"], targets["manifest"], found.turn)
     return 0
+
+
+def _align(port: Path, manifest: Path | None, turn: int | None) -> None:
+    if turn is None or manifest is None:
+        raise ValueError("--align must be given with --manifest and --against, and without --index")
+    described = json.loads(manifest.read_text(encoding="utf-8"))
+    with SerialPort(str(port), described["baud"]) as line:
+        link = Link(line, HostRegisters(described))
+        Client(link.read, link.write, described).turn_disc(turn)
 
 
 def _of_board(name: str, spec: TachometerSpec) -> Iterator[tuple[str, Recording]]:

@@ -1,21 +1,28 @@
 """`tachometry calibrate` from a capture to the files, as docs/guides/disc.md has it, and nothing where it refuses."""
 
+import json
 import re
 import shlex
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 from matplotlib.image import imread
 from support import docs
 from support.command import run
+from support.serial import encode_answer
 
 from tachometry.sim.captures.sigrok import write_sr
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.spec import of_texts
 from tachometry.spec.core.disc import Disc
+from tachometry.spec.registers import frames
 from tachometry.spec.registers.edges import header
+from tachometry.spec.registers.manifest import manifest
+from tachometry.spec.registers.map import RegisterMap
 
 PAGE = docs.page("guides/disc.md")
 COMMANDS = [shlex.split(line) for line in re.findall(r"^tachometry (.*)", PAGE, re.MULTILINE)]
@@ -71,12 +78,46 @@ def test_a_map_and_a_picture_are_written_or_neither(
     assert re.search(r"^since --against +0\.00\d\d counts RMS", capsys.readouterr().out, re.MULTILINE)
 
 
-def test_the_number_that_aligns_a_core_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+class Core:
+    """A serial port of a core that confirms what is written, and answers with its numbers."""
+
+    described: ClassVar[dict[str, Any]] = {}
+    written: ClassVar[list[tuple[str, int]]] = []
+
+    def __init__(self, name: str, baud: int) -> None:
+        self.bytes = b""
+        assert (name, baud) == ("/dev/ttyUSB1", 115_200)
+
+    __enter__ = __exit__ = lambda self, *_: self
+
+    def write(self, data: bytes, /) -> None:
+        request, registers = frames.decode_request(data), self.described["registers"]
+        name = {one["offset"]: one["name"] for one in registers["map"]}[4 * request.address]
+        reads = request.type is frames.Type.READ
+        if not reads:
+            self.written.append((name, request.value))
+        self.bytes += encode_answer(request, frames.Answer((registers[name.lower()],) if reads else (), False))
+
+    def read(self, size: int, /) -> bytes:
+        found, self.bytes = self.bytes, b""
+        return found
+
+
+def test_the_number_that_aligns_a_core_is_printed_and_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     save(tmp_path / "coast.sr", "ramp:150rad/s:60rad/s:3s")
     words = ["calibrate", tmp_path / "coast.sr", "--ppr", "24"]
     assert run(*words, "--index", "-o", tmp_path / "disc.json") == 0
-    assert run(*words, "--against", tmp_path / "disc.json") == 0
     begins = int(ENCODER.disc.quarter(np.zeros(1))[0]) % 96
+    spec = of_texts("mt", {"ppr": "24", "disc-table": "edges"})
+    Core.described |= manifest(spec) | {"registers": RegisterMap(spec).described(), "baud": 115_200}
+    (tmp_path / "core.json").write_text(json.dumps(Core.described))
+    monkeypatch.setattr("tachometry.cli.commands.calibrate.SerialPort", Core)
+    aligns = [*words, "--against", tmp_path / "disc.json", "--align", "/dev/ttyUSB1"]
+    assert run(*aligns) == 2
+    assert run(*aligns, "--manifest", tmp_path / "core.json") == 0
+    assert Core.written == [("DISC_TURN", begins | 1 << 8)]
     assert f"DISC_TURN             {begins}, if the core was reset as the capture began" in capsys.readouterr().out
 
 
