@@ -382,6 +382,10 @@ def test_the_manifest_has_the_table() -> None:
     table = bytes(round(each / entry["counts_per_lsb"]) % 256 for each in FAR)
     assert (entry["entries"], entry["index_place"]) == (EDGES, 2)
     assert entry["sha256"] == sha256(table).hexdigest()
+    fast = "disc=far.json index=yes clock=48MHz tick=20us max-time=9ms"
+    for form in (Case("mt", fast).spec.displacement, Case("mt", f"{fast} disc-table=sectors:9").spec.displacement):
+        assert form is not None
+        assert form.low == 2  # bits of a distance that are free for what is added to round
     for words, worst in (("disc=far.json", max(map(abs, FAR))), ("disc-table=edges", 0.99)):  # no bit is idle
         tracked = Case("track", f"{words} index=yes tick=1000clk max-time=5000clk").spec
         assert 64 <= worst / manifest(tracked)["disc"]["counts_per_lsb"] < 128

@@ -62,7 +62,8 @@ def _parse_table(what: str, text: str) -> str:
 
 
 def _format(spec: Numbers, sectors: bool = False) -> Displacement:
-    finest = FINEST / (16 if sectors and spec.facts.update_by != "alteration" else 1)
+    # `track` averages over many counts. Before the divider of T and M/T finer distances would need an adder more.
+    finest = FINEST / (16 if sectors and spec.facts.update_by == "tick" else 1)
     per_count = spec.timing.tick_cycles if spec.facts.update_by == "count" else int(1 / finest)
     return Displacement(per_count, finest=finest)
 
