@@ -18,8 +18,6 @@ from tachometry.spec.registers.manifest import manifest
 def core_rows(spec: TachometerSpec, bus: Bus | None = None) -> list[tuple[str, str]]:
     """Return the configuration of a core, what it measures, and its registers on a bus."""
     registers = [] if bus is None else [registers_row(spec, bus)]
-    if spec.encoder.sampled is not None:  # plans are of discs
-        return [*configuration(spec), *registers]
     plans = Plans.of(spec)
     return [*configuration(spec), *measured(spec, plans), *advice(plans), *registers]
 
@@ -94,10 +92,12 @@ def measured(spec: TachometerSpec, plans: Plans, late: str = "") -> list[tuple[s
     ideal = float(worst.resolution[0]) + rounding
     error = speed_text(spec, ideal + float(worst.disc[0]), 3)
     at, time = speed_text(spec, float(worst.speed[0]), 4), short_time(float(worst.measurement_time[0]))
+    real = [("real disc", f"{_real(spec)}; an ideal one has {speed_text(spec, ideal, 3)} there")]
+    of = "with a real disc" if (sampled := spec.encoder.sampled) is None else "from the rounding of positions alone"
     return [
         ("range", f"{speed_text(spec, low, 4)} to {speed_text(spec, high)}{below}"),
-        ("worst error", f"{error} at a constant {at}, measured in {time}, with a real disc"),
-        ("real disc", f"{_real(spec)}; an ideal one has {speed_text(spec, ideal, 3)} there"),
+        ("worst error", f"{error} at a constant {at}, measured in {time}, {of}"),
+        *(real if sampled is None else []),
         ("delay", _delay(spec, plans, late)),
         *((name, text.format(speed=speed_text(spec, high))) for name, text in plans.of_extras),
     ]

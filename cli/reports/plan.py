@@ -44,7 +44,7 @@ def print_plan(core: CoreSpec, plans: Plans, unit: str, bus: Bus | None, size: E
     print_table(heads, rows, left=(len(heads) - 1,))
     remark = f"{spec.words.remark} " if spec.words.remark else ""
     console.print(
-        f"\n{remark}error/V is Q_V and the rounding together, with an ideal disc."
+        f"\n{remark}error/V is Q_V and the rounding together, with an ideal encoder."
         + ("\nTimes are those of the nominal tick; an external one may be longer." if spec.external_tick else ""),
         soft_wrap=True,
     )

@@ -73,8 +73,6 @@ def plan_at(spec: TachometerSpec, speed: ArrayLike | None = None) -> Plan:
 
     A method that has none there has NaN for times and resolution.
     """
-    if spec.encoder.sampled is not None:
-        raise ParameterError("sensor", "must not be sampled for a plan, which is for edges")
     speed = np.atleast_1d(np.asarray(default_range(spec) if speed is None else speed, dtype=np.float64))
     tick_seconds = float(spec.timing.tick_seconds)
     found = PERFORMANCES.get(spec.method, unknown)(spec, speed)
@@ -93,10 +91,12 @@ def default_range(spec: TachometerSpec) -> tuple[float, float]:
     """Return least and greatest speed, in rad/s, that a plan is of interest for.
 
     From one count in the maximum time to `max_speed`; without it, as everything recurs in each multiple of ω_u, to ten
-    of them. Never beyond one count per clock, nor beyond what filter and blanking let through, over a decade at least.
+    of them, and of positions that are read to the greatest. Never beyond one count per clock, nor what filter and
+    blanking let through, over a decade at least.
     """
     unit = spec.scale.unit_velocity
-    high = _UNITS * unit if spec.max_speed is None else spec.max_speed.rad_per_s
+    usual = _UNITS * unit if spec.encoder.sampled is None else math.inf
+    high = usual if spec.max_speed is None else spec.max_speed.rad_per_s
     high = min(high, spec.velocity.greatest_speed)
     if spec.filter_clocks and spec.encoder.sensor == "quadrature":  # a level lasts half a period of its line
         high = min(high, unit * spec.timing.tick_cycles * spec.encoder.decoding / 2 / spec.filter_clocks)

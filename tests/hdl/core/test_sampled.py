@@ -22,7 +22,6 @@ from tachometry.sim.engines.pysim import PySim
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run
 from tachometry.sim.studies.lockstep import lockstep
-from tachometry.sim.studies.plan import Plans
 from tachometry.spec import ParameterError, TachometerSpec, TrackTachometer, of_options, of_texts
 from tachometry.spec.core.extras.health import Fault
 from tachometry.spec.formats.tracking import PLACE_BITS
@@ -302,11 +301,6 @@ def test_a_core_is_made_again_from_its_options() -> None:
 def test_what_has_no_meaning_is_refused(method: str, more: dict[str, str], message: str) -> None:
     with pytest.raises(ParameterError, match=f"^{message}"):
         of_texts(method, BASE | {"max-time": "100us"} | more if method == "auto" else BASE | more)
-
-
-def test_a_plan_is_for_edges() -> None:
-    with pytest.raises(ParameterError, match=r"^sensor must not be sampled for a plan"):
-        _ = Plans.of(core("m")).table
 
 
 def test_bits_must_be_given() -> None:

@@ -1,6 +1,7 @@
 """Plans of all methods keep their promises, measured on the golden models with the virtual encoder."""
 
 from fractions import Fraction
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,9 @@ from support.nightly import only
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.sampled import encoder_of
 from tachometry.sim.encoder.virtual import VirtualEncoder
+from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.plan import CELLS, Plans, plan_at
 from tachometry.sim.theory.performance import REAL_DISC
 from tachometry.spec import METHODS, Encoder, Speed, TachometerSpec, Timing, of_texts
@@ -117,6 +120,19 @@ def test_no_golden_model_is_worse_than_told(method: str, own: dict[str, str], ov
         settled = updates.velocity[updates.clock > 0.3 * spec.timing.clock_hz]
         seen.append(np.abs(settled * spec.velocity.rad_per_s_per_lsb - speed).max())
     assert told / over < max(seen) < told
+
+
+@pytest.mark.parametrize("bits", only(["20"], ["12", "17", "20"]))
+def test_no_positions_are_worse_than_told(bits: str) -> None:
+    texts = {"sensor": "sampled", "bits": bits, "clock": "20MHz", "tick": "100us", "max-time": "100ms"}
+    for method, ratio in product(("track", "m"), (0.008, 0.1, 1.4, 77.7)):
+        spec = of_texts(method, texts)
+        speed = ratio * spec.scale.unit_velocity
+        trace = PinTrace.of(encoder_of(spec).record(parse_motion(f"constant:{speed}rad/s:2s")).recording, spec)
+        updates, plan = golden.run(spec, trace).updates, plan_at(spec, speed)
+        settled = updates.velocity[updates.clock > 1.5 * spec.timing.clock_hz] * spec.velocity.rad_per_s_per_lsb
+        told = plan.resolution[0] + spec.velocity.rad_per_s_per_lsb
+        assert 0.01 * told < np.abs(settled - speed).max() < told, (method, ratio)
 
 
 def test_the_disc_is_that_of_compare() -> None:
