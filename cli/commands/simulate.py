@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import click
@@ -13,7 +14,7 @@ from tachometry.cli.options.core import core_options
 from tachometry.cli.options.engine import ENGINE_OPTIONS
 from tachometry.cli.options.motion import FORMS, MOTION_OPTIONS, Recorder, shown_in_unit_of
 from tachometry.cli.options.option import GroupedCommand
-from tachometry.cli.options.outputs import OUTPUT_OPTIONS, outputs_of, write_outputs
+from tachometry.cli.options.outputs import OUTPUT_OPTIONS, WHOLE, outputs_of, write_outputs, write_tables
 from tachometry.cli.reports.run import print_simulation
 from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim.encoder.virtual import Encoding
@@ -77,7 +78,9 @@ def run_core(
 ) -> int:
     """Simulate a core, write the outputs, and print the results; return the exit status."""
     with outputs:
-        running = replace(running, vcd=outputs.get("--vcd"), bar=progress_bar)
+        whole = any(outputs.get(what) is not None for what in WHOLE)
+        sink = partial(write_tables, spec, outputs)
+        running = replace(running, vcd=outputs.get("--vcd"), bar=progress_bar, whole=whole, sink=sink)
         simulation = simulation_of(spec, source, recordings, truths, running)
         kept = write_outputs(simulation, outputs)
     return print_simulation(simulation, kept)

@@ -7,7 +7,8 @@ from typing import Any
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.option import Group, output
 from tachometry.sim.captures.sigrok import write_sr
-from tachometry.sim.signals.tables import write_counts, write_events, write_trace
+from tachometry.sim.signals.run import Run
+from tachometry.sim.signals.tables import Tally, write_counts, write_events, write_trace
 from tachometry.sim.studies.simulation import Simulation
 from tachometry.spec import CoreSpec
 
@@ -54,6 +55,9 @@ OUTPUT_OPTIONS = Group(_OPTIONS, _read)
 """Handed over as `targets`, a dictionary of option to path; a `.gtkw` comes with `--vcd`."""
 
 
+WHOLE = ("--vcd", "--plot", "--save-capture")  # what needs all rows or pins at once
+
+
 def outputs_of(spec: CoreSpec, targets: Mapping[str, Path], inputs: Sequence[Path]) -> Outputs:
     """Return the outputs of a simulation of this core, see `Outputs`."""
     outputs = Outputs(targets, inputs)
@@ -62,18 +66,22 @@ def outputs_of(spec: CoreSpec, targets: Mapping[str, Path], inputs: Sequence[Pat
     return outputs
 
 
+def write_tables(spec: CoreSpec, outputs: Outputs, run: Run, tally: Tally | None) -> None:
+    """Write the rows of a run, or of the next piece of one, see `write_trace`."""
+    if path := outputs.get("--trace"):
+        write_trace(path, spec, run, tally)
+    if path := outputs.get("--counts"):
+        write_counts(path, run, tally)
+    if path := outputs.get("--events"):
+        write_events(path, run, tally)
+
+
 def write_outputs(simulation: Simulation, outputs: Outputs) -> list[Path]:
-    """Write the outputs of a simulation, but the waveform, which is there already.
+    """Write what needs a whole simulation, but the waveform, which is there already.
 
     Those of an interrupted one leave the outputs as they were, and are returned: they lie beside them, as `t.part.csv`.
     """
     spec, run, place = simulation.spec, simulation.lockstep.actual, outputs.get
-    if path := place("--trace"):
-        write_trace(path, spec, run)
-    if path := place("--counts"):
-        write_counts(path, run)
-    if path := place("--events"):
-        write_events(path, run)
     if path := place("--save-capture"):
         write_sr(path, simulation.lockstep.trace, spec.timing.clock_hz)
     if path := place("--plot"):

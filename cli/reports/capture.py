@@ -17,10 +17,10 @@ def capture_rows(axis: Axis) -> list[_Row]:
         return []
     lines, captured, *notes = source_rows(source)
     rows = [lines, captured]
-    velocity, unit = axis.spec.scale.shown_unit.of(axis.held.velocity_rad_s), axis.spec.scale.shown_unit.name
-    if len(velocity):
-        least, mean, most = velocity.min(), velocity.mean(), velocity.max()
-        rows.append(("speed", f"min {least:.6g}, mean {mean:.6g}, max {most:.6g} {unit}, as held at every tick"))
+    tally, unit = axis.tally, axis.spec.scale.shown_unit
+    if tally.n_held:
+        least, mean, most = (unit.of(speed) for speed in (tally.least, tally.total / tally.n_held, tally.most))
+        rows.append(("speed", f"min {least:.6g}, mean {mean:.6g}, max {most:.6g} {unit.name}, as held at every tick"))
     return rows + notes
 
 

@@ -13,7 +13,7 @@ from tachometry.cli.reports.standard_streams import INTERRUPTED, printable
 from tachometry.cli.reports.terminal import print_rows, stdout_console
 from tachometry.sim.studies.simulation import Axis, Simulation
 from tachometry.spec import AxesSpec, CoreSpec
-from tachometry.spec.language.port import MISSED, WIDE
+from tachometry.spec.language.port import MISSED, TICK, UPDATE, WIDE
 from tachometry.spec.language.units import format_time, plural
 
 _Row = tuple[str, str]  # a name and its value
@@ -26,7 +26,7 @@ def print_simulation(simulation: Simulation, kept: Sequence[Path] = ()) -> int:
     """
     lockstep, spec, axes = simulation.lockstep, simulation.spec, simulation.axes
     run = lockstep.actual
-    time, n_ticks = format_time(spec.tick.seconds(run.n_clocks)), len(run.ticks) // len(axes)
+    time, n_ticks = format_time(spec.tick.seconds(run.n_clocks)), simulation.tally.rows[TICK] // len(axes)
     simulated = ("simulated", f"{run.n_clocks} clocks ({time}), {n_ticks} ticks")
     rows, warnings = _summary(spec, axes, ("mismatches", str(lockstep.n_mismatches)))
     print_rows([*choice(spec.tachometer), ("engine", simulation.engine), simulated, *rows])
@@ -49,8 +49,8 @@ def _summary(spec: CoreSpec, axes: Sequence[Axis], mismatches: _Row) -> tuple[li
     """Return rows of the table of a core, and warnings."""
     if spec.axes is None:
         (axis,) = axes
-        new = axis.run.updates
-        updates = "updates", f"{len(new.clock)} ({np.count_nonzero(new.forced)} of them forced)"
+        forced = axis.tally.not_zero[UPDATE, "forced"]
+        updates = "updates", f"{axis.tally.rows[UPDATE]} ({forced} of them forced)"
         return [*capture_rows(axis), updates, mismatches, *_rows(axis)], _warnings(axis)
     warnings = [_merged_looks(spec, number, axis.n_merged) for number, axis in enumerate(axes) if axis.n_merged]
     warnings += [f"axis {number}: {warning}" for number, axis in enumerate(axes) for warning in _of_capture(axis)]
@@ -139,15 +139,15 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
     rows += filter(None, (extra.row(spec, run) for extra in spec.extras))
     if spec.external_tick:
         rows.append(("tick errors", f"{len(run.tick_errors)} (external tick too early or missing)"))
-    if n_overflows := int(np.count_nonzero(run.ticks.overflow)):
+    if n_overflows := axis.tally.not_zero[TICK, "overflow"]:
         rows.append(("overflow", f"{n_overflows} ticks: faster than --max-speed, velocity saturated"))
-    if n_saturated := int(np.count_nonzero(run.updates.get("velocity_overflow"))):
+    if n_saturated := axis.tally.not_zero[UPDATE, "velocity_overflow"]:
         rows.append(("velocity overflow", f"{n_saturated} updates: beyond --velocity-width, saturated"))
     return rows + _errors(axis) + [("note", note) for note in spec.words.notes]
 
 
 def _flagged(axis: Axis) -> str:
-    flagged, truth = len(axis.run.errors), axis.truth
+    flagged, truth = axis.tally.rows["decode_error"], axis.truth
     if truth is None:
         return str(flagged)
     if axis.spec.encoder.sampled is not None:
@@ -188,18 +188,17 @@ def _line(axis: Axis) -> str:
 
 def _verdict(simulation: Simulation, warned: bool) -> Text:
     """Return the last line: whether hardware and golden model agree, and what that says nothing of."""
-    run, n_mismatches = simulation.lockstep.actual, simulation.lockstep.n_mismatches
+    tally, n_mismatches = simulation.tally, simulation.lockstep.n_mismatches
     if n_mismatches:
         return Text(f"FAIL: hardware and golden model differ in {n_mismatches} values", style="bold red")
     captured = any(axis.truth is None for axis in simulation.axes)
-    n_values = sum(len(table) * (1 + len(table.columns)) for table in run.tables.values())
-    of = f" ({plural(n_values, 'value')}); wiring and --ppr are not checked" if captured else ""
+    of = f" ({plural(tally.n_values, 'value')}); wiring and --ppr are not checked" if captured else ""
     only = "; neither was compared with the shaft: see the warning" if warned else ""
     verdict, style = ("INTERRUPTED", "bold yellow") if simulation.interrupted else ("PASS", "bold green")
     if not any(len(axis.recording.time) > 1 for axis in simulation.axes):
         verdict, style = "NO EDGE", "bold yellow"
     return Text(
-        f"{verdict}: hardware and golden model agree in every bit of {len(run.updates.clock)} updates "
-        f"and {len(run.ticks.clock)} ticks{of}{only}",
+        f"{verdict}: hardware and golden model agree in every bit of {tally.rows[UPDATE]} updates "
+        f"and {tally.rows[TICK]} ticks{of}{only}",
         style=style,
     )

@@ -6,7 +6,7 @@ Memory grows with edges, ticks and updates, never with clocks.
 import ctypes
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,7 +24,7 @@ from tachometry.sim.engines.engine import NO_WATCH, Interrupted, Watch, driven_p
 from tachometry.sim.engines.probes import WORD, Watched
 from tachometry.sim.engines.waveform import Waveform
 from tachometry.sim.signals.axes import Trace
-from tachometry.sim.signals.recording import packed
+from tachometry.sim.signals.recording import PinTrace, packed
 from tachometry.sim.signals.run import Run, observed
 from tachometry.spec import CoreSpec, Port
 from tachometry.spec.control import AnySpec
@@ -147,6 +147,24 @@ class CompiledEngine(ABC):
             raise Interrupted(run) from interrupt
         return run
 
+    def in_pieces(self, spec: CoreSpec, pieces: Iterator[PinTrace], n_clocks: int, watch: Watch) -> Iterator[Run]:
+        """Simulate pieces of a trace of about `n_clocks` clocks; yield the rows of each, on the clock of all.
+
+        Interrupted has the rows of a piece. No waveform is written.
+        """
+        play: Play | None = None
+        for pins in pieces:
+            if play is None:
+                design = Design(spec, driven_pins(spec, pins), effort=effort_of(spec.method, n_clocks))
+                play = Play(self.kept(design), design, pins, (0, 0), self.every_clock)
+            else:
+                play.go_on(pins)
+            try:
+                play.to_the_end(None, watch.progress)
+            except KeyboardInterrupt as raised:
+                raise Interrupted(observed(spec, play.done, play.rows())) from raised
+            yield observed(spec, play.done, play.rows())
+
 
 class Play:
     """Plays a trace on a compiled design."""
@@ -154,48 +172,60 @@ class Play:
     def __init__(self, library: Path, design: Design, trace: Trace, window: tuple[int, int], every_clock: bool) -> None:
         self._library = ctypes.CDLL(str(library))
         self._library.tachometer_new.restype = ctypes.c_void_p
-        self._trace = trace
+        self._library.tachometer_delete.argtypes = (ctypes.c_void_p,)
+        self._design = design
         self.window = window
         self._every_clock = every_clock
-        self.done = self.skipped = 0  # clocks
-        self._found: list[NDArray[np.int64]] = []
+        self.done = 0  # clocks
         self._columns = 1 + len(design.outputs)
         self._n_words = design.n_words
         self._rows = np.empty((_CAPACITY, self._columns), dtype=np.int64)
         self._shown = np.empty((_CAPACITY if design.n_words else 0, 1 + design.n_words), dtype=np.int64)
-        self._at = np.ascontiguousarray(trace.clock, dtype=np.int64)
-        self._level = design.levels(trace)
+        self._model = ctypes.c_void_p(self._library.tachometer_new())
+        self._job = self._new_job()
+        self.go_on(trace)
+
+    def __del__(self) -> None:
+        self._library.tachometer_delete(self._model)
+
+    def go_on(self, trace: Trace) -> None:
+        """Take the next trace, which follows the one that is done."""
+        self._end = self.done + trace.n_clocks
+        self._found: list[NDArray[np.int64]] = []
+        self._at = np.ascontiguousarray(trace.clock + self.done, dtype=np.int64)
+        self._level = self._design.levels(trace)
+        job = self._job
+        job.at, job.level, job.n_changes, job.next = self._at.ctypes.data, self._level.ctypes.data, len(self._at), 0
+
+    @property
+    def skipped(self) -> int:
+        """Clocks that were skipped."""
+        return int(self._job.skipped)
 
     def rows(self) -> NDArray[np.int64]:
-        """Clock and outputs in every clock with a strobe that is done."""
+        """Clock and outputs in every clock of the trace with a strobe that is done."""
         rows = np.concatenate([np.empty((0, self._columns), dtype=np.int64), *self._found])
         return rows[rows[:, 0] < self.done]
 
     def to_the_end(self, waveform: Waveform | None, progress: Callable[[int], None] | None) -> None:
         """Run all clocks; `done` and `rows` are of what has been run, also after an interrupt."""
-        job = self._job()
-        model = ctypes.c_void_p(self._library.tachometer_new())
-        try:
-            clocks = _FIRST_CALL
-            while self.done < self._trace.n_clocks:
-                job.end = min(self.done + clocks, self._trace.n_clocks)
-                job.n_rows = job.n_shown = 0
-                begun = time.perf_counter()
-                self._library.tachometer_run(model, ctypes.byref(job))
-                self._found.append(self._rows[: job.n_rows].copy())
-                if waveform is not None:
-                    for clock, *words in self._shown[: job.n_shown].tolist():
-                        waveform.sample(clock, sum(word << WORD * k for k, word in enumerate(words)))
-                took = time.perf_counter() - begun
-                clocks = max(_FIRST_CALL, int((job.clock - self.done) * min(_CALL / max(took, 1e-6), 4)))
-                self.done = job.clock
-                if progress is not None:
-                    progress(self.done)
-        finally:
-            self.skipped = job.skipped
-            self._library.tachometer_delete(model)
+        job, clocks = self._job, _FIRST_CALL
+        while self.done < self._end:
+            job.end = min(self.done + clocks, self._end)
+            job.n_rows = job.n_shown = 0
+            begun = time.perf_counter()
+            self._library.tachometer_run(self._model, ctypes.byref(job))
+            self._found.append(self._rows[: job.n_rows].copy())
+            if waveform is not None:
+                for clock, *words in self._shown[: job.n_shown].tolist():
+                    waveform.sample(clock, sum(word << WORD * k for k, word in enumerate(words)))
+            took = time.perf_counter() - begun
+            clocks = max(_FIRST_CALL, int((job.clock - self.done) * min(_CALL / max(took, 1e-6), 4)))
+            self.done = job.clock
+            if progress is not None:
+                progress(self.done)
 
-    def _job(self) -> Any:
+    def _new_job(self) -> Any:
         long, pointer = ctypes.c_int64, ctypes.c_void_p
 
         class Job(ctypes.Structure):
@@ -220,9 +250,6 @@ class Play:
             )
 
         return Job(
-            at=self._at.ctypes.data,
-            level=self._level.ctypes.data,
-            n_changes=len(self._at),
             rows=self._rows.ctypes.data,
             capacity=_CAPACITY,
             shown=self._shown.ctypes.data,

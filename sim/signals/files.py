@@ -32,11 +32,14 @@ def replacing(path: Path) -> Iterator[Path]:
         raise
 
 
-def write_csv(path: Path, header: Sequence[str], rows: Iterable[Iterable[object]]) -> None:
-    """Write a CSV; numbers are the shortest that read back as the same, equal on every machine, None is empty."""
-    with path.open("w", encoding="utf-8", newline="") as file:
+def write_csv(path: Path, header: Sequence[str], rows: Iterable[Iterable[object]], *, more: bool = False) -> None:
+    """Write a CSV, or `more` rows of one; numbers are the shortest that read back as the same, equal on every machine,
+    None is empty.
+    """
+    with path.open("a" if more else "w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
+        if not more:
+            writer.writerow(header)
         writer.writerows(rows)
 
 

@@ -25,6 +25,7 @@ LINES = ("a", "b", "c", "z", "tick_in")
 # What a computer's memory holds: an edge and a tick take some 300 bytes each on their way to a report.
 MAX_EDGES = 10_000_000
 MAX_TICKS = 10_000_000
+MOST_IN_PIECES = 10**11  # ticks of a run of which some are held at once: it would take days
 
 
 _QUADRATURE = np.array([0, 1, 3, 2], dtype=np.uint8)
@@ -196,15 +197,15 @@ class PinTrace(_Lines):
             raise ValueError("clocks of a pin trace must begin at 0 and must increase")
 
     @classmethod
-    def of(cls, recording: Recording, spec: TachometerSpec) -> "PinTrace":
+    def of(cls, recording: Recording, spec: TachometerSpec, *, whole: bool = True) -> "PinTrace":
         """Return what the pins of a core see of a recording: with nominal external ticks if the core takes them and
         there are none, and with probes that are always armed and a stream that is always ready.
 
         It raises ValueError if there are too many clocks to be told apart, more than `MAX_TICKS` ticks, or more than
-        the memory that is free can hold.
+        the memory that is free can hold; if what is run is not held as a `whole`, for more than `MOST_IN_PIECES` ticks.
         """
-        check_ticks(recording.duration, spec)
-        n_ticks = recording.duration / float(spec.timing.tick_seconds)
+        check_ticks(recording.duration, spec, MAX_TICKS if whole else MOST_IN_PIECES)
+        n_ticks = whole * recording.duration / float(spec.timing.tick_seconds)
         check_memory(bytes_of(spec, n_ticks, len(recording.time)), "what is run", "shorten it, or take longer ticks")
         return recording.place(spec.timing.clock_hz).completed(spec)
 

@@ -5,8 +5,9 @@ A run is what the ports say: a table for every strobe, with a column for every p
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -159,3 +160,46 @@ def compare(expected: Run, actual: Run) -> tuple[int, list[Mismatch]]:
                 first.append(Mismatch(signal, row, was, got, clock))
                 count += len(differ) + surplus
     return count, first
+
+
+class Comparison:
+    """Compares two runs that come in pieces, as `compare` does; rows that one of them lacks wait for it."""
+
+    def __init__(self) -> None:
+        self.n_mismatches = 0
+        self.first: list[Mismatch] = []
+        self._waiting: tuple[dict[str, Table], dict[str, Table]] = {}, {}  # rows expected, and actual rows
+        self._done = Counter[str]()  # rows
+
+    def expect(self, run: Run) -> None:
+        """Take the next rows of the run that is expected."""
+        self._take(0, run)
+
+    def add(self, run: Run) -> None:
+        """Take the next actual rows, and compare those that both have."""
+        self._take(1, run)
+        self._compare({name: min(len(side[name]) for side in self._waiting) for name in run.tables})
+
+    def end(self, n_clocks: int) -> None:
+        """Compare the rows that wait, up to a clock."""
+        for side in self._waiting:
+            side.update({name: table.rows(table.clock < n_clocks) for name, table in side.items()})
+        self._compare({name: max(len(side[name]) for side in self._waiting) for name in self._waiting[0]})
+
+    def _take(self, side: int, run: Run) -> None:
+        waiting = self._waiting[side]
+        waiting |= {name: waiting[name].then(table) if name in waiting else table for name, table in run.tables.items()}
+
+    def _compare(self, n_rows: Mapping[str, int]) -> None:
+        parts = [Run(0, {name: side[name].rows(slice(n)) for name, n in n_rows.items()}) for side in self._waiting]
+        count, first = compare(*parts)
+        known = {mismatch.signal for mismatch in self.first}
+        self.first += [
+            replace(mismatch, row=mismatch.row + self._done[mismatch.signal.rpartition(".")[0]])
+            for mismatch in first
+            if mismatch.signal not in known
+        ]
+        self.n_mismatches += count
+        self._done.update(n_rows)
+        for side in self._waiting:
+            side.update({name: side[name].rows(slice(n, None)) for name, n in n_rows.items()})

@@ -1,5 +1,7 @@
 """A run becomes tables here: updates, ticks, and the held velocity with its error."""
 
+import math
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from operator import itemgetter
@@ -14,6 +16,8 @@ from tachometry.sim.signals.files import rows_of, write_csv
 from tachometry.sim.signals.run import Run, Table
 from tachometry.spec import CoreSpec, TachometerSpec
 from tachometry.spec.language.port import TICK, UPDATE
+
+TrueSpeed = Callable[[NDArray[np.float64]], NDArray[np.float64]]  # rad/s at times in seconds
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,64 @@ class VelocityError:
     max: float
 
 
+class Tally:
+    """Numbers of a run that may come in pieces: rows, what is not 0, and the held velocity with its error."""
+
+    def __init__(self, spec: TachometerSpec) -> None:
+        self._spec = spec
+        self.rows = Counter[str]()  # of each strobe
+        self.not_zero = Counter[tuple[str, str]]()  # rows of a strobe in which a column is not 0
+        self.begin = self.n_values = self.n_ticks_before = 0  # clock of the last piece; ticks before those of `window`
+        self.window: Run | None = None  # the last piece, and some rows before it
+        self.n_held = 0
+        self.least, self.most, self.total = math.inf, -math.inf, 0.0  # rad/s, of the held velocity
+        self._squares = self._errors = self._worst = 0.0
+
+    def add(self, run: Run, true_speed: TrueSpeed | None = None) -> HeldVelocity:
+        """Take the next rows, and return the velocity that is held in them."""
+        self.count(run)
+        if (old := self.window) is not None:
+            self.begin = old.n_clocks
+            first = self.begin - self._spec.latency.tick_to_velocity
+            first = max(int(np.searchsorted(old.ticks.clock, first)) - 1, 0)
+            self.n_ticks_before += first
+            before = {TICK: old.ticks.rows(slice(first, None)), UPDATE: old.updates.rows(slice(-1, None))}
+            run = Run(run.n_clocks, run.tables | {name: rows.then(run.tables[name]) for name, rows in before.items()})
+        self.window, held = run, held_velocity(self._spec, run)
+        new = held.time >= self.begin / self._spec.timing.clock_hz
+        held = HeldVelocity(held.time[new], held.velocity_rad_s[new])
+        self._hold(held, true_speed)
+        return held
+
+    def count(self, run: Run) -> None:
+        """Count rows, and what is not 0 in them."""
+        for strobe, table in run.tables.items():
+            self.rows[strobe] += len(table)
+            self.n_values += len(table) * (1 + len(table.columns))
+            self.not_zero.update({(strobe, name): int(np.count_nonzero(table[name])) for name in table.columns})
+
+    def _hold(self, held: HeldVelocity, true_speed: TrueSpeed | None) -> None:
+        velocity = held.velocity_rad_s
+        self.n_held += len(velocity)
+        self.least, self.most = (
+            end(velocity, initial=past) for end, past in ((np.min, self.least), (np.max, self.most))
+        )
+        self.total += float(np.sum(velocity))
+        if true_speed is not None:
+            error = velocity - true_speed(held.time)
+            self._squares, self._errors = (
+                self._squares + float(np.sum(error * error)),
+                self._errors + float(np.sum(error)),
+            )
+            self._worst = float(np.max(np.abs(error), initial=self._worst))
+
+    @property
+    def error(self) -> VelocityError | None:
+        """Statistics of the held velocity against the true speed; None without an update."""
+        n = self.n_held
+        return VelocityError(math.sqrt(self._squares / n), self._errors / n, self._worst) if n else None
+
+
 def held_velocity(spec: TachometerSpec, run: Run) -> HeldVelocity:
     """Return velocity at the end of every tick; empty if there was no update."""
     cycles, late = spec.timing.tick_cycles, spec.latency.tick_to_velocity
@@ -56,9 +118,7 @@ def held_from(clock: NDArray[np.int64], updates: Table, spec: TachometerSpec) ->
     return HeldVelocity(clock.astype(np.float64) / spec.timing.clock_hz, velocity)
 
 
-def velocity_error(
-    held: HeldVelocity, true_speed: Callable[[NDArray[np.float64]], NDArray[np.float64]]
-) -> VelocityError | None:
+def velocity_error(held: HeldVelocity, true_speed: TrueSpeed) -> VelocityError | None:
     """Return statistics of a held velocity against the true speed (rad/s) at times (s); None if it is empty."""
     if not len(held.time):
         return None
@@ -68,14 +128,19 @@ def velocity_error(
     )
 
 
-def write_trace(path: Path, spec: CoreSpec, run: Run) -> None:
+def write_trace(path: Path, spec: CoreSpec, run: Run, tally: Tally | None = None) -> None:
     """Write a CSV with a row per update: when it came, which tick closed its window, and what all its ports say.
 
     The velocity stands there as the raw number and in the unit of the core (in rad/s, if that is counts per tick); all
-    else is raw, by the names of the ports. With many axes, the axis comes first.
+    else is raw, by the names of the ports. With many axes, the axis comes first. With a `tally`, which has the pieces
+    up to this run, the rows go behind those of the pieces before, as in the other functions here.
     """
+    if tally is not None and tally.window is not None:
+        run = Run(run.n_clocks, run.tables | {TICK: tally.window.ticks})
     columns = _columns(spec, run)
-    write_csv(path, tuple(columns), rows_of(list(columns.values())))
+    if tally is not None:
+        columns["tick"] += tally.n_ticks_before
+    write_csv(path, tuple(columns), rows_of(list(columns.values())), more=tally is not None and tally.begin > 0)
 
 
 def _columns(spec: CoreSpec, run: Run) -> dict[str, NDArray[Any]]:
@@ -104,7 +169,7 @@ def _of_updates(spec: TachometerSpec, run: Run, tick_to_velocity: int) -> dict[s
     }
 
 
-def write_counts(path: Path, run: Run) -> None:
+def write_counts(path: Path, run: Run, tally: Tally | None = None) -> None:
     """Write a CSV with a row per tick: its number, then what all ports say that are held by the tick.
 
     With many axes, every axis has a row with the same number.
@@ -113,11 +178,13 @@ def write_counts(path: Path, run: Run) -> None:
     axis = run.ticks.get("axis")
     for one in np.unique(axis):
         number[axis == one] = np.arange(np.count_nonzero(axis == one))
+    number += 0 if tally is None else tally.rows[TICK] - len(run.ticks)
     columns = {"tick": number, **run.ticks.columns}
-    write_csv(path, tuple(columns), rows_of([column.astype(np.int64) for column in columns.values()]))
+    rows = rows_of([column.astype(np.int64) for column in columns.values()])
+    write_csv(path, tuple(columns), rows, more=tally is not None and tally.begin > 0)
 
 
-def write_events(path: Path, run: Run) -> None:
+def write_events(path: Path, run: Run, tally: Tally | None = None) -> None:
     """Write a CSV with a row for every strobe that is neither a tick nor an update: index, errors.
 
     A row has the clock, the name of the strobe, and what the ports say that are held by it; other cells are empty.
@@ -131,4 +198,4 @@ def write_events(path: Path, run: Run) -> None:
         ]
         rows += [(clock, event, *values) for clock, *values in zip(table.clock.tolist(), *cells, strict=True)]
     rows.sort(key=itemgetter(0))
-    write_csv(path, ("clock", "event", *columns), rows)
+    write_csv(path, ("clock", "event", *columns), rows, more=tally is not None and tally.begin > 0)

@@ -1,22 +1,25 @@
 """A core is simulated on encoder signals: what the hardware says, the golden model, and the shaft itself."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from tachometry.sim.encoder.virtual import Encoding
-from tachometry.sim.engines.engine import Watch
+from tachometry.sim.engines.engine import Interrupted, Watch
 from tachometry.sim.engines.pick import pick
 from tachometry.sim.engines.waveform import Curve, add_curves
+from tachometry.sim.golden.pieces import Golden, in_pieces
 from tachometry.sim.signals.arrays import Ints
 from tachometry.sim.signals.axes import AxesTrace, Trace, of_axis
 from tachometry.sim.signals.progress import Bar, no_bar
 from tachometry.sim.signals.recording import PinTrace, Recording, packed
-from tachometry.sim.signals.run import Run
-from tachometry.sim.signals.tables import HeldVelocity, VelocityError, held_from, held_velocity, velocity_error
+from tachometry.sim.signals.run import Comparison, Run
+from tachometry.sim.signals.tables import HeldVelocity, Tally, VelocityError, held_from, held_velocity, velocity_error
+from tachometry.sim.signals.temporary import held_back
 from tachometry.sim.studies.lockstep import Lockstep, lockstep
 from tachometry.spec import AxesSpec, CoreSpec, TachometerSpec
 from tachometry.spec.language.option import ParameterError
@@ -25,6 +28,7 @@ from tachometry.spec.methods.axis import WARM_UP
 
 Window = Callable[[CoreSpec, int], tuple[int, int]]
 Pulses = Callable[[TachometerSpec], dict[str, Ints]]
+PIECE = 1 << 17  # ticks of a run that are held at once
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,9 @@ class Running:
     pulses: Pulses = lambda _: {}  # gives clocks in which other inputs than those of the encoder rise, by their names
     vcd: Path | None = None
     bar: Bar = no_bar
+    whole: bool = True  # whether all rows are needed at once; else a core that can be is run in pieces
+    # takes the rows of the run, or of each of its pieces with the numbers up to it
+    sink: Callable[[Run, Tally | None], object] = lambda *_: None
 
 
 @dataclass(frozen=True)
@@ -43,7 +50,8 @@ class Axis:
     """Holds what an axis has made of its encoder."""
 
     spec: TachometerSpec  # of a core of this axis alone
-    run: Run  # its rows
+    run: Run  # its rows; of a run in pieces, the last ones
+    tally: Tally  # numbers of all of them
     recording: Recording
     truth: Encoding | None  # what the shaft truly did, if it is known; with it `counts_in` and `error`
     n_merged: int  # edges that came too soon after another to be told apart
@@ -86,7 +94,8 @@ class Simulation:
     spec: CoreSpec
     engine: str  # what has run the hardware
     wanted: int  # clocks that it was to run; after Ctrl-C it has run fewer
-    lockstep: Lockstep
+    lockstep: Lockstep  # of a run in pieces, the last rows
+    tally: Tally  # numbers of all rows of the core
     axes: tuple[Axis, ...]
 
     @property
@@ -105,6 +114,25 @@ def _pulsed(spec: CoreSpec, source: str, trace: PinTrace, pulses: Pulses) -> Pin
     return trace
 
 
+def _fewest(spec: CoreSpec) -> int:
+    """Return the clocks after which there is something to report."""
+    return spec.tick.longest + spec.latency.tick
+
+
+def _placed(spec: CoreSpec, source: str, recordings: Sequence[Recording], pulses: Pulses, *, whole: bool) -> Trace:
+    """Return what the pins of a core see; ValueError if it does not last a tick, or has too many to be held `whole`."""
+    if spec.axes is not None:
+        trace: Trace = AxesTrace.placed(recordings, spec)
+    else:
+        trace = _pulsed(spec, source, PinTrace.of(recordings[0], spec, whole=whole), pulses)
+    if trace.n_clocks < (fewest := _fewest(spec)):
+        raise ValueError(
+            f"{source} must last at least {fewest} clocks of --clock ({format_time(spec.tick.seconds(fewest))}), "
+            f"a tick and its latency, not {trace.n_clocks}"
+        )
+    return trace
+
+
 def simulate(
     spec: CoreSpec,
     source: str,
@@ -119,25 +147,63 @@ def simulate(
 
     It raises ValueError if the recordings do not last a tick, or have too many.
     """
-    trace: Trace = PinTrace.of(recordings[0], spec) if spec.axes is None else AxesTrace.placed(recordings, spec)
-    if isinstance(trace, PinTrace):
-        trace = _pulsed(spec, source, trace, running.pulses)
-    fewest = spec.tick.longest + spec.latency.tick  # after which there is something to report
-    if trace.n_clocks < fewest:
-        raise ValueError(
-            f"{source} must last at least {fewest} clocks of --clock ({format_time(spec.tick.seconds(fewest))}), "
-            f"a tick and its latency, not {trace.n_clocks}"
-        )
-    shown, chosen, vcd = running.window(spec, trace.n_clocks), pick(running.engine), running.vcd
+    chosen = pick(running.engine)
+    engine = getattr(chosen, "in_pieces", None)
+    whole = running.whole or engine is None or not in_pieces(spec.tachometer)
+    trace = _placed(spec, source, recordings, running.pulses, whole=whole)
+    shown, vcd = running.window(spec, trace.n_clocks), running.vcd
     with running.bar("simulating", trace.n_clocks, "clocks", rate=True) as progress:
-        found = lockstep(spec, trace, chosen, watch=Watch(vcd, shown, progress), fewest=fewest)
+        watch, tally, pieces = Watch(vcd, shown, progress), Tally(spec.tachometer), None
+        if isinstance(trace, PinTrace) and not whole:
+            pieces, speed = tally, truths[0].true_speed if truths else None
+            found = _in_pieces(
+                spec.tachometer, trace, engine, watch, lambda run: (tally.add(run, speed), running.sink(run, tally))
+            )
+        else:
+            found = lockstep(spec, trace, chosen, watch=watch, fewest=_fewest(spec))
+            tally.count(found.actual)
+            running.sink(found.actual, None)
     missing = " (there is no C++ compiler)" if (running.engine, chosen.name) == ("auto", "pysim") else ""
     known = [None] * len(recordings) if truths is None else truths
     each = enumerate(zip(recordings, known, strict=True))
-    axes = tuple(_axis(spec, found.actual, number, *of) for number, of in each)
+    axes = tuple(_axis(spec, found.actual, pieces, number, *of) for number, of in each)
     if vcd is not None:
         add_curves(vcd, spec.timing.clock_hz, (shown[0], min(shown[1], found.actual.n_clocks)), _curves(axes))
-    return Simulation(spec, chosen.name + missing, trace.n_clocks, found, axes)
+    return Simulation(spec, chosen.name + missing, trace.n_clocks, found, tally, axes)
+
+
+def _in_pieces(
+    spec: TachometerSpec, trace: PinTrace, engine: Any, watch: Watch, take: Callable[[Run], object]
+) -> Lockstep:
+    """Run a trace as `lockstep` does, but some ticks at a time, of which `take` is given the rows.
+
+    `engine` is `CompiledEngine.in_pieces`.
+    """
+    model, comparison, size = Golden(spec), Comparison(), PIECE * spec.timing.tick_cycles
+    last = Run(0, {})
+
+    def pieces() -> Iterator[PinTrace]:
+        for begin in range(0, trace.n_clocks, size):
+            pins = trace.part(begin, min(begin + size, trace.n_clocks))
+            with held_back():
+                comparison.expect(model.run(pins))
+            yield pins
+
+    def add(run: Run) -> Run:
+        with held_back():
+            comparison.add(run)
+            take(run)
+        return run if len(run.ticks) else Run(run.n_clocks, last.tables)
+
+    try:
+        for run in engine(spec, pieces(), trace.n_clocks, watch):
+            last = add(run)
+    except KeyboardInterrupt as early:
+        last = add(early.run) if isinstance(early, Interrupted) else last
+        if last.n_clocks < _fewest(spec):
+            raise
+    comparison.end(last.n_clocks)
+    return Lockstep(trace, last, last, comparison.n_mismatches, comparison.first)
 
 
 def _curves(axes: Sequence[Axis]) -> dict[str, Curve]:
@@ -152,24 +218,30 @@ def _curves(axes: Sequence[Axis]) -> dict[str, Curve]:
     return found
 
 
-def _axis(core: CoreSpec, run: Run, number: int, recording: Recording, truth: Encoding | None) -> Axis:
-    """Return the results of an axis."""
+def _axis(
+    core: CoreSpec, run: Run, tally: Tally | None, number: int, recording: Recording, truth: Encoding | None
+) -> Axis:
+    """Return the results of an axis; `tally` is that of a run in pieces, of which `run` has the last rows."""
     if core.axes is not None:
         return _axis_of_many(core, run, number, recording, truth)
     spec = core
-    counts_in = error = None
-    held = held_velocity(spec, run)
+    counts_in = None
+    if tally is None:
+        tally = Tally(spec)
+        held = tally.add(run, None if truth is None else truth.true_speed)
+    else:
+        held = held_velocity(spec, run)
     if truth is not None:
         # Up to the pin sample that the last tick can hold.
         clock = int(run.ticks.clock[-1]) - spec.latency.tick - spec.latency.pin_to_count
         sampled = _sampled(max(clock, 0), spec.timing.clock_hz)
         counts_in = int(truth.true_position(sampled, spec.encoder.decoding))
-        error = velocity_error(held, truth.true_speed)
     # What sets the position does not undo what has been counted.
     moves = spec.front_end.moves_position and spec.encoder.sampled is None
     counts_out = int(run.ticks.pulse_count.sum() if moves else run.ticks.position[-1])
     n_merged = recording.n_merged(spec.timing.clock_hz, run.n_clocks)
-    return Axis(spec, run, recording, truth, n_merged, counts_in, counts_out, held, error)
+    error = None if truth is None else tally.error
+    return Axis(spec, run, tally, recording, truth, n_merged, counts_in, counts_out, held, error)
 
 
 def _sampled(clock: int, clock_hz: int) -> float:
@@ -184,6 +256,8 @@ def _sampled(clock: int, clock_hz: int) -> float:
 
 def _axis_of_many(spec: AxesSpec, run: Run, axis: int, recording: Recording, truth: Encoding | None) -> Axis:
     own, alone, counts_in, error = of_axis(spec, run, axis), spec.tachometer, None, None
+    tally = Tally(alone)
+    tally.count(own)
     held = held_from(own.ticks.clock, own.updates, alone)
     if truth is not None and len(own.ticks):
         # From the first look at the axis to the last one of the last tick.
@@ -196,4 +270,4 @@ def _axis_of_many(spec: AxesSpec, run: Run, axis: int, recording: Recording, tru
     if len(own.ticks):
         counts_out = int(own.ticks.pulse_count.sum() if alone.front_end.index_resets else own.ticks.position[-1])
     n_merged = recording.n_merged(spec.timing.clock_hz // spec.slots, run.n_clocks // spec.slots)
-    return Axis(alone, own, recording, truth, n_merged, counts_in, counts_out, held, error)
+    return Axis(alone, own, tally, recording, truth, n_merged, counts_in, counts_out, held, error)

@@ -96,10 +96,8 @@ class Model:
 
         finer = 1
         if spec.displacement is not None and steps is not None and steps.around is not None:
-            finer, off = (
-                spec.displacement.per_count,
-                np.append(0, _off(m_e, *steps.around(ticks.clock - spec.latency.tick + 1))),
-            )
+            finer = spec.displacement.per_count
+            off = np.append(0, _off(m_e, *steps.around(ticks.clock - spec.latency.tick + 1)))
             numerator = numerator * finer + off[at] - off[at - m_s]
 
         def quotient(counts: int, towards: int) -> NDArray[np.int64]:

@@ -8,7 +8,7 @@ import pytest
 from tachometry.cli.main import main
 from tachometry.sim.signals import memory
 
-CORE = ["--method", "m", "--ppr", "1", "--clock", "1MHz", "--tick", "20us"]
+CORE = ["--method", "m", "--ppr", "1", "--clock", "1MHz", "--tick", "20us", "--age"]
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ def test_the_least_of_all_limits_is_free(free: Path) -> None:
 @pytest.mark.parametrize(
     ("motion", "refused"),
     [
-        ("constant:1rad/s:6s", "what is run needs some 0.18 GiB of memory, and 0.098 GiB are free: shorten it, or "),
+        ("constant:1rad/s:6s", "what is run needs some 0.19 GiB of memory, and 0.098 GiB are free: shorten it, or "),
         ("constant:1e7rad/s:200ms", "--motion needs some 0.13 GiB of memory, and 0.098 GiB are free: shorten it, or "),
     ],
 )

@@ -1,0 +1,40 @@
+"""A run in pieces of some ticks writes and prints what the whole does, to the last byte."""
+
+from pathlib import Path
+
+import pytest
+from support.nightly import only
+
+from tachometry.cli.main import main
+from tachometry.sim.studies import simulation
+
+CORE = "--ppr 500 --clock 1MHz --tick"
+METHODS = {
+    "m": f"{CORE} 100us",
+    "s": f"{CORE} 100us --max-time 2ms --filter 3us --unit rpm",
+    "t": f"{CORE} 100us --max-time 2ms --decoding 1",
+    "mt": f"{CORE} 100us --max-time 2ms --bounds",
+    "track": f"{CORE} 300us --max-time 3ms",
+}
+MOTION = "--jitter 0.1 --illegal 0.01 --motion ramp:0:90rad/s:20ms+stop:9ms+constant:-40rad/s:9.99ms"
+
+
+def outputs(words: str, folder: Path, capsys: pytest.CaptureFixture[str], *more: str) -> dict[str, bytes]:
+    """Return what a command prints and writes."""
+    folder.mkdir()
+    tables = [f"--{name}={folder / name}.csv" for name in ("trace", "counts", "events")]
+    with pytest.raises(SystemExit, match=r"^0$"):
+        main([*words.split(), *tables, *more])
+    return {path.name: path.read_bytes() for path in folder.glob("*.csv")} | {"out": capsys.readouterr().out.encode()}
+
+
+@pytest.mark.parametrize("method", only(["s", "t"], METHODS))
+def test_pieces_are_the_whole(
+    method: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = f"simulate --method {method} {METHODS[method]} {MOTION} --engine cxxrtl"
+    whole = outputs(words, tmp_path / "whole", capsys, f"--save-capture={tmp_path / 'x.sr'}")
+    monkeypatch.setattr(simulation, "PIECE", 7)
+    assert outputs(words, tmp_path / "pieces", capsys) == whole
+    assert b"PASS" in whole["out"]
+    assert len(whole["trace.csv"]) > 1000
