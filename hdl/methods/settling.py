@@ -40,9 +40,13 @@ class SettlingPlace(wiring.Component):
             slow.eq(size <= mark),
             ahead.eq(near ^ back.replicate(len(near))),
             stays.eq(self.forced & (waits | ((ahead >= half - (half >> 2)) & (slow | (limit < half))))),
-            now.eq(Mux(self.forced, limit >> slow, half)),
+            now.eq(Mux(slow, limit >> 1, limit)),
             self.settled.eq(Mux(stays & (ahead > now), (now ^ back.replicate(len(near))).as_signed(), self.between)),
         ]
         with m.If(self.taken):
-            m.d.sync += [waits.eq(stays), limit.eq(now), mark.eq(Mux(self.forced, mark >> slow, size >> 1))]
+            m.d.sync += waits.eq(stays)
+            with m.If(~self.forced):
+                m.d.sync += [limit.eq(half), mark.eq(size >> 1)]
+            with m.Elif(slow):
+                m.d.sync += [limit.eq(now), mark.eq(mark >> 1)]
         return m

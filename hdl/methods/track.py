@@ -88,6 +88,7 @@ class TrackMethod(wiring.Component):
         elapsed = self._take_counts(m)
         new = self.updates.p
         m.d.sync += self.updates.valid.eq(ready)
+        fine = self._fine(m, position, ready)
         if spec.smooth:
             delay = delay_of(machine.smooth_delay, spec.form.time_bits)
             with m.If(ready):
@@ -97,7 +98,7 @@ class TrackMethod(wiring.Component):
                 new.velocity.eq(machine.velocity),
                 new.acceleration.eq(machine.acceleration),
                 new.velocity_std.eq(machine.velocity_std),
-                new.position_fine.eq(self._fine(m, position, ready)),
+                new.position_fine.eq(fine),
                 new.interval.eq(elapsed),
                 new.forced.eq(~machine.number.any()),
                 new.standstill.eq(machine.standstill & ~(self.number if self._reads else machine.number.any())),
@@ -112,7 +113,7 @@ class TrackMethod(wiring.Component):
             whole = (position << spec.position_fine_bits) + (machine.position_fine >> shift)
             return whole + machine.position_fine[shift - 1]
         between = (machine.position_fine >> shift) + machine.position_fine[shift - 1]
-        m.submodules.settling = box = SettlingPlace(spec.settling, len(between), len(machine.velocity))
+        m.submodules.settling = box = SettlingPlace(spec.settling, len(between), spec.velocity.native)
         m.d.comb += [
             box.between.eq(between),
             box.velocity.eq(machine.velocity),
