@@ -201,7 +201,8 @@ def _selftest(target: Target) -> int:
     """Run the self-test, and print what its steps have shown; 1 if one has failed."""
     report = SelftestReport([step.name for step in steps(target.registers)])
     with target.presence() as name, target.open(name) as port:
-        board = connected(target.label(name), port, target.manifest)
+        # A simulated board is as late as its computer is busy.
+        board = connected(target.label(name), port, target.manifest, 30.0 if target.is_simulated else 0.5)
         report.head()
         results = run_selftest(board, target.registers, told=report.line)
     return 0 if report.verdict(results) else 1
