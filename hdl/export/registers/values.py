@@ -76,9 +76,9 @@ def sentences(register: Register) -> str:
 
 def _sentences(register: Register) -> Iterator[str]:
     yield register.help
+    yield from dict.fromkeys(map(in_unit, register.fields))
     if is_whole(register):
         (field,) = register.fields
-        yield in_unit(field)
         if field.signed:
             yield "It is in two's complement."
         if field.most is not None:

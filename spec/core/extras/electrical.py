@@ -134,7 +134,8 @@ class ElectricalAngle(Extra):
         # All products are there before the next update, the first one before a tick.
         clocks = max(angles.clocks, angles.tracks + angles.product + 1)
         if (spec.times.shortest_tick if angles.tracks else angles.tick) < clocks:
-            raise ParameterError(self.name, f"needs a tick of {clocks} clocks: take a longer --tick")
+            needs = f"needs a tick of {clocks} clocks"
+            raise ParameterError(self.name, f"{needs}: take a longer --tick", needs)
 
     def corrects(self, spec: Numbers) -> bool:
         """Return whether an index behind the first may show lost counts."""
@@ -148,7 +149,7 @@ class ElectricalAngle(Extra):
 
     def ports(self, spec: Numbers) -> Iterable[Port]:
         use = f"{self.ahead} clocks (ANGLE_LEAD) after"
-        text = f"Electrical angle, {use} this one. It also changes between ticks, in every clock."
+        text = f"Electrical angle, new in every clock, {use} this one. It also changes between ticks."
         yield held(TICK, "angle", SHOWN_BITS, unit=_UNIT, help=text)
         text = "The angle is that of the motor: by an index, by halls, or set. It also changes between ticks."
         yield held(TICK, "angle_valid", help=text)

@@ -18,7 +18,7 @@ LOOP = {"method": "m", "tick": "200us", "max-time": "2ms", "max-speed": "400rad/
 CORES = {
     **{method: (had_by(method, BASE | ALL), "none") for method in METHODS},
     "external ticks": (BASE | {"external-tick": "yes"}, "none"),
-    "axi-lite": (BASE, "axi-lite"),
+    "axi-lite": (BASE | {"electrical": "3", "sincos": "yes"}, "axi-lite"),
     "uart": (BASE, "uart"),
     "axes": (BASE | {"method": "s", "axes": "3", "max-speed": "400rad/s", "parallel": "yes"}, "native"),
     "loop": (BASE | LOOP | {"command": "generator"}, "none"),

@@ -23,7 +23,7 @@ from tachometry.spec.registers.map import RegisterMap
 
 SEEDS = range(8)
 BASE = {"ppr": "8", "clock": "1MHz", "tick": "80us", "max-time": "800us"}
-WIDE = {"velocity-width": "64", "position-width": "48", "bounds": "yes"}
+WIDE = {"velocity-width": "64", "position-width": "48", "bounds": "yes", "electrical": "3", "lead": "0"}
 
 
 @cache

@@ -24,7 +24,7 @@ from tachometry.spec import ParameterError, of_options
 BASE = {"ppr": "8", "clock": "1MHz", "tick": "80us", "max-time": "800us", "max-speed": "400rad/s"}
 LOOP = {"method": "m", "tick": "200us", "max-time": "2ms", "loop": "yes", "gains": "inputs"}
 CORES = {
-    "axi": (BASE | {"method": "s", "index": "yes", "stream": "axi"}, "axi-lite"),
+    "axi": (BASE | {"method": "s", "index": "yes", "stream": "axi", "electrical": "3", "sincos": "yes"}, "axi-lite"),
     "apb": (BASE | {"method": "mt", "position-width": "40"}, "apb"),
     "none": (BASE | {"method": "t", "stream": "axi:edge"}, "none"),
     "axes": (BASE | {"method": "s", "axes": "3", "parallel": "yes", "index": "yes"}, "axi-lite"),
