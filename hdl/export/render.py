@@ -72,7 +72,8 @@ def first_sentence(text: str) -> str:
 def port_comment(port: Port) -> str:
     """Return the comment of a port of the top: its first sentence, sign, unit and strobe."""
     unit = "; signed" * port.signed + (f"; in {port.unit}" if port.unit else "")
-    strobe = f"; read with {port.held_by}" if port.held_by not in ("", port.name) else ""
+    free = "between ticks" in port.help  # it has its own time
+    strobe = f"; read with {port.held_by}" if not free and port.held_by not in ("", port.name) else ""
     return first_sentence(port.help).rstrip(".") + ascii_of(unit) + strobe
 
 

@@ -4,6 +4,7 @@ import enum
 import re
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -139,6 +140,7 @@ def test_comments_and_names_are_written() -> None:
     assert re.findall(r"'h\w+;  // (.*)$", text, re.MULTILINE) == ["first", "third * pi"]
     count = held(TICK, "count", 3, signed=True, unit="counts", help="Counts of a tick. No more.")
     assert port_comment(count) == "Counts of a tick; signed; in counts; read with tick"
+    assert port_comment(replace(count, help="A flag. It also changes between ticks.")) == "A flag; signed; in counts"
     assert "MODE_RUN: begin" in write(Box(enumeration), "box").text
     assert write(Box(choice), "box").text.count("{12{") == 5
 
