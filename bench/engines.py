@@ -48,14 +48,6 @@ def trace() -> PinTrace:
     return encoder.record(parse_motion(MOTION)).recording.place(48_000_000)
 
 
-def part_of(trace: PinTrace, begin: int, clocks: int) -> PinTrace:
-    """Return some clocks of a trace."""
-    first = int(trace.clock.searchsorted(begin, side="right")) - 1
-    inside = slice(first, int(trace.clock.searchsorted(begin + clocks)))
-    at = (trace.clock[inside] - begin).clip(min=0)
-    return PinTrace(at, trace.a[inside], trace.b[inside], clocks)
-
-
 def fastest(work: Callable[[], object], repeats: int = REPEATS) -> float:
     """Return the shortest processor time of some runs, in seconds."""
     times = []
@@ -68,7 +60,7 @@ def fastest(work: Callable[[], object], repeats: int = REPEATS) -> float:
 
 def golden_row(name: str, spec: TachometerSpec, trace: PinTrace, slow: int = SLOW) -> list[str]:
     """Return the row of a golden model on the whole, and the simulator on a part; RuntimeError if they disagree."""
-    clock_by_clock = simulated(spec, part_of(trace, BEGIN, slow))
+    clock_by_clock = simulated(spec, trace.part(BEGIN, BEGIN + slow))
     took, ticks = fastest(lambda: golden.run(spec, trace)), len(golden.run(spec, trace).ticks.clock)
     rate = trace.n_clocks / took
     rates = (ticks / took, rate, clock_by_clock, rate / clock_by_clock)
@@ -105,9 +97,9 @@ def simulated(spec: TachometerSpec, part: PinTrace) -> float:
 
 def speeds(name: str, spec: TachometerSpec, trace: PinTrace, slow: int = SLOW, fast: int = FAST) -> list[str]:
     """Return the row of a core: clocks per second of all engines."""
-    part = part_of(trace, BEGIN, fast)
+    part = trace.part(BEGIN, BEGIN + fast)
     run = golden.run(spec, part)
-    rates = [simulated(spec, part_of(trace, BEGIN, slow))]
+    rates = [simulated(spec, trace.part(BEGIN, BEGIN + slow))]
     rates += [fast / loop_alone(engine, spec, part, run) for engine in ENGINES]
     return [name, *(f"{rate:.3g}" for rate in rates), *(f"{rates[-1] / rate:.3g}" for rate in rates[:-1])]
 

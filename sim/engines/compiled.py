@@ -24,7 +24,7 @@ from tachometry.sim.engines.engine import NO_WATCH, Interrupted, Watch, driven_p
 from tachometry.sim.engines.probes import WORD, Watched
 from tachometry.sim.engines.waveform import Waveform
 from tachometry.sim.signals.axes import Trace
-from tachometry.sim.signals.recording import PinTrace, packed
+from tachometry.sim.signals.recording import packed
 from tachometry.sim.signals.run import Run, observed
 from tachometry.spec import CoreSpec, Port
 from tachometry.spec.control import AnySpec
@@ -127,43 +127,34 @@ class CompiledEngine(ABC):
         return self._libraries[key]
 
     def run(self, spec: CoreSpec, trace: Trace, watch: Watch = NO_WATCH) -> Run:
-        pins = driven_pins(spec, trace)
-        watched = None if watch.vcd is None else Watched(spec)
-        design = Design(spec, pins, watched, effort_of(spec.method, trace.n_clocks))
-        play = Play(self.kept(design), design, trace, watch.window or (0, trace.n_clocks), self.every_clock)
-        interrupt = None
-        with ExitStack() as stack:
-            waveform = None
-            if watch.vcd is not None and watched is not None:
-                waveform = stack.enter_context(Waveform(watch.vcd, spec.timing.clock_hz, watched.widths))
-            try:
-                play.to_the_end(waveform, watch.progress)
-            except KeyboardInterrupt as raised:
-                interrupt = raised
-            if waveform is not None:
-                waveform.close(min(play.done, play.window[1]))
-        run = observed(spec, play.done, play.rows())
-        if interrupt is not None:
-            raise Interrupted(run) from interrupt
-        return run
+        return next(self.in_pieces(spec, iter([trace]), trace.n_clocks, watch))
 
-    def in_pieces(self, spec: CoreSpec, pieces: Iterator[PinTrace], n_clocks: int, watch: Watch) -> Iterator[Run]:
-        """Simulate pieces of a trace of about `n_clocks` clocks; yield the rows of each, on the clock of all.
+    def in_pieces(self, spec: CoreSpec, pieces: Iterator[Trace], n_clocks: int, watch: Watch) -> Iterator[Run]:
+        """Simulate pieces of a trace of `n_clocks` clocks; yield the rows of each, on the clock of all.
 
-        Interrupted has the rows of a piece. No waveform is written.
+        Interrupted has the rows of a piece. A waveform has the first piece alone.
         """
-        play: Play | None = None
+        watched, play = None if watch.vcd is None else Watched(spec), None
         for pins in pieces:
             if play is None:
-                design = Design(spec, driven_pins(spec, pins), effort=effort_of(spec.method, n_clocks))
-                play = Play(self.kept(design), design, pins, (0, 0), self.every_clock)
+                design = Design(spec, driven_pins(spec, pins), watched, effort_of(spec.method, n_clocks))
+                play = Play(self.kept(design), design, pins, watch.window or (0, n_clocks), self.every_clock)
             else:
                 play.go_on(pins)
-            try:
-                play.to_the_end(None, watch.progress)
-            except KeyboardInterrupt as raised:
-                raise Interrupted(observed(spec, play.done, play.rows())) from raised
-            yield observed(spec, play.done, play.rows())
+            with ExitStack() as stack:
+                interrupt, waveform = None, None
+                if watch.vcd is not None and watched is not None:
+                    waveform = stack.enter_context(Waveform(watch.vcd, spec.timing.clock_hz, watched.widths))
+                try:
+                    play.to_the_end(waveform, watch.progress)
+                except KeyboardInterrupt as raised:
+                    interrupt = raised
+                if waveform is not None:
+                    waveform.close(min(play.done, play.window[1]))
+            run = observed(spec, play.done, play.rows())
+            if interrupt is not None:
+                raise Interrupted(run) from interrupt
+            yield run
 
 
 class Play:
@@ -176,7 +167,7 @@ class Play:
         self._design = design
         self.window = window
         self._every_clock = every_clock
-        self.done = 0  # clocks
+        self.done = self.skipped = 0  # clocks
         self._columns = 1 + len(design.outputs)
         self._n_words = design.n_words
         self._rows = np.empty((_CAPACITY, self._columns), dtype=np.int64)
@@ -197,11 +188,6 @@ class Play:
         job = self._job
         job.at, job.level, job.n_changes, job.next = self._at.ctypes.data, self._level.ctypes.data, len(self._at), 0
 
-    @property
-    def skipped(self) -> int:
-        """Clocks that were skipped."""
-        return int(self._job.skipped)
-
     def rows(self) -> NDArray[np.int64]:
         """Clock and outputs in every clock of the trace with a strobe that is done."""
         rows = np.concatenate([np.empty((0, self._columns), dtype=np.int64), *self._found])
@@ -221,7 +207,7 @@ class Play:
                     waveform.sample(clock, sum(word << WORD * k for k, word in enumerate(words)))
             took = time.perf_counter() - begun
             clocks = max(_FIRST_CALL, int((job.clock - self.done) * min(_CALL / max(took, 1e-6), 4)))
-            self.done = job.clock
+            self.done, self.skipped = job.clock, job.skipped
             if progress is not None:
                 progress(self.done)
 

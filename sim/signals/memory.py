@@ -1,14 +1,10 @@
 """Work that would need more memory than is free is refused before it begins."""
 
 import math
-import sys
 from contextlib import suppress
 from pathlib import Path
 
 from tachometry.spec.control import AnySpec
-
-if sys.platform == "linux":
-    import resource
 
 EDGE = 110  # bytes of an edge on its way to a report, as `bench/memory.py` measures
 _CELL = 29  # bytes of a value in a row of a strobe
@@ -24,8 +20,6 @@ def free_bytes() -> float:
     with suppress(OSError, ValueError):  # "max" is no limit
         most, used = (int((_CGROUP / f"memory.{name}").read_text(encoding="ascii")) for name in ("max", "current"))
         limits.append(most - used)
-    if sys.platform == "linux" and (most := resource.getrlimit(resource.RLIMIT_AS)[0]) != resource.RLIM_INFINITY:
-        limits.append(most)
     return max(min(limits), 0)
 
 

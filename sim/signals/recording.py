@@ -217,10 +217,7 @@ class PinTrace(_Lines):
 
     def until(self, n_clocks: int) -> "PinTrace":
         """Return the first clocks of the trace."""
-        inside = self.clock < n_clocks
-        return PinTrace.of_lines(
-            self.clock[inside], n_clocks, {name: line[inside] for name, line in self.lines.items()}
-        )
+        return self.part(0, n_clocks)
 
     def part(self, begin: int, end: int) -> "PinTrace":
         """Return the trace from one clock to before another."""

@@ -23,7 +23,7 @@ def trace(monkeypatch: pytest.MonkeyPatch) -> PinTrace:
 
 
 def test_part_of_a_trace_has_the_same_levels(trace: PinTrace) -> None:
-    part = bench.part_of(trace, 100_000, 50_000)
+    part = trace.part(100_000, 150_000)
     assert part.n_clocks == 50_000
     assert part.clock[0] == 0
     at = np.searchsorted(part.clock, np.arange(50_000), side="right") - 1
@@ -36,6 +36,6 @@ def test_hardware_that_disagrees_is_no_result(trace: PinTrace, monkeypatch: pyte
     name, *cells = bench.golden_row("m", SPEC, trace, slow=3000)
     assert name == "m"
     assert len(cells) == len(bench.GOLDEN_COLUMNS) - 2
-    monkeypatch.setattr(PySim, "run", lambda *_: golden.run(bench.CORES["s"], bench.part_of(trace, 100_000, 3000)))
+    monkeypatch.setattr(PySim, "run", lambda *_: golden.run(bench.CORES["s"], trace.part(100_000, 103_000)))
     with pytest.raises(RuntimeError, match="disagree"):
         bench.golden_row("m", SPEC, trace, slow=3000)
