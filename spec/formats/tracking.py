@@ -122,9 +122,9 @@ class Tracking:
 
     @property
     def placed_bits(self) -> int:
-        """Bits of the sum of twice the places, with displacements and as fine as these; signed."""
+        """Bits of the sum of twice the places, with displacements and as fine as these, or of 64 times one; signed."""
         off = self.displacement
-        return self.places_bits if off is None else self.places_bits + max(self.fine_bits, off.width - 1) + 1
+        return self.places_bits if off is None else max(self.places_bits, 7) + max(self.fine_bits, off.width - 1) + 1
 
     @cached_property
     def moved_bits(self) -> int:

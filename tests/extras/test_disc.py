@@ -76,7 +76,12 @@ CASES = (
 TRACKED = (
     Mapped("track", "disc=far.json index=yes tick=300clk multiplier=block max-time=3000clk", edges=70, clocks=200_000),
     Mapped("track", "disc=other.json disc-table=edges tick=1000clk smooth=yes max-time=5000clk", edges=60),
-    Mapped("track", "disc=slow.json disc-table=sectors index=yes tick=300clk max-time=3000clk", 60, 120_000),
+    Mapped(
+        "track",
+        "disc=slow.json disc-table=sectors index=yes tick=300clk max-time=3000clk max-speed=20rev/s",
+        60,
+        120_000,
+    ),
 )
 SLOW = (
     Mapped("s", "disc=far.json index=yes", edges=100),
