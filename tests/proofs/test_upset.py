@@ -56,6 +56,13 @@ def test_the_velocity_of_tracking_is_right_again_in_time() -> None:
 
 
 @nightly
+def test_tracking_with_a_map_is_right_again_in_time() -> None:
+    campaign = tracking.upsets("track, map", 90)
+    assert campaign.fine
+    assert (campaign.clocks > 0).sum() > 10
+
+
+@nightly
 def test_a_control_loop_is_right_again_in_time() -> None:
     """Every sixth bit."""
     campaign = loops.upsets("loop", 110)
