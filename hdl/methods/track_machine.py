@@ -15,18 +15,8 @@ from tachometry.hdl.methods.serial_unit import SerialUnit
 from tachometry.hdl.wires.commented_memory import CommentedMemory
 from tachometry.hdl.wires.ports import by_name
 from tachometry.spec.formats.tracking import PLACE_BITS, WIDTH
-from tachometry.spec.formats.tracking_code import (
-    ADDRESS_BITS,
-    CHOSEN,
-    FIRST_INPUT,
-    HOW_BITS,
-    INPUTS,
-    OUTPUTS,
-    Instruction,
-    Jump,
-    Left,
-    Program,
-)
+from tachometry.spec.formats.tracking_code import ADDRESS_BITS, FIRST_INPUT, HOW_BITS, INPUTS, OUTPUTS, Program
+from tachometry.spec.formats.tracking_instruction import CHOSEN, Instruction, Jump, Left
 from tachometry.spec.formats.tracking_units import BLOCK, Start
 
 _PLACES_BITS = PLACE_BITS - 1 - 6  # twice the places, over 64

@@ -10,40 +10,17 @@ the first two terms of a line at once.
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from enum import IntEnum
 from functools import cache, cached_property
 
 from tachometry.spec.formats.tracking import Tracking
+from tachometry.spec.formats.tracking_instruction import CHOSEN, OFFSETS, Code, Instruction, Jump, Left
 from tachometry.spec.formats.tracking_listing import LISTING
+from tachometry.spec.formats.tracking_order import joined, spaced
 from tachometry.spec.formats.tracking_units import Start, Times
-
-
-class Left(IntEnum):
-    """Lists the left operands of the adder."""
-
-    ZERO = 0
-    LEAST = 1  # min(sum, 0): the sum if that is negative
-    MOST = 2  # max(sum, 0): the sum if not
-    SUM = 3
-
-
-class Jump(IntEnum):
-    """When an instruction jumps."""
-
-    NEVER = 0
-    ALWAYS = 1
-    NEG = 2  # sum < 0
-    POS = 3
-    EMPTY = 4  # no count
-    ONE = 5
-    END = 6
-
 
 SMOOTH = ("velocity_smooth", "smooth_delay")
 SMOOTH_DELAY_BITS = 32
 INPUTS = ("number", "counts", "places", "times", "last", "moved", "length")
-OFFSETS = ("o0", "o1", "o2", "o3")
-CHOSEN = ("o@last", "o@up", "o@down", "o@m1", "o@m2", "o@m3")  # an offset that the tick chooses
 # Each by its number; standstill: not if it is negative; the last two only of a program with `smooth`.
 OUTPUTS = ("", "velocity", "position_fine", "velocity_std", "acceleration", "standstill", *SMOOTH)
 ADDRESS_BITS = 7
@@ -51,43 +28,6 @@ FIRST_CHOSEN = (1 << ADDRESS_BITS) - 8  # address of what the tick chooses
 FIRST_OFFSET = FIRST_CHOSEN - (1 << ADDRESS_BITS - 1)  # another bit, so that few cells choose
 FIRST_INPUT = FIRST_CHOSEN - 8  # of inputs: the words there are 0
 _LEFTS = {"lo+": Left.LEAST, "hi+": Left.MOST}
-
-
-@dataclass(frozen=True)
-class Instruction:
-    """An instruction."""
-
-    left: Left = Left.SUM
-    first: str = ""  # a word, or $ and an input, in the place of a left operand of zero
-    word: str = ""  # the right operand; ~: the result of the unit
-    # whether the operand is subtracted, or added with the sign that was kept; whether the sign of the sum is kept
-    subtract: bool = False
-    by_sign: bool = False
-    keep: bool = False
-    store: str = ""  # word that takes the sum; empty: none
-    start: Start = Start.NONE
-    how: str = ""  # name of a shift, or number of a table of gains
-    output: str = ""
-    jump: Jump = Jump.NEVER
-    target: str = ""
-
-    @property
-    def reads(self) -> tuple[str, ...]:
-        """The words that it reads."""
-        return tuple(word for word in (self.first, self.word) if word and word[0] not in "$~")
-
-    @property
-    def text(self) -> str:
-        """The instruction as a comment: its sum, what it begins and gives out, and where the program goes on."""
-        left = {Left.ZERO: self.first, Left.LEAST: "min(sum, 0)", Left.MOST: "max(sum, 0)", Left.SUM: "sum"}[self.left]
-        right = f"{'s' * self.by_sign}{'+-'[self.subtract]} {self.word}" if self.word else ""
-        total = f"{left} {right}".strip().removeprefix("+ ") or "0"
-        parts = [f"{self.store} = {total}" if self.store else total, "keep" * self.keep]
-        parts += [f"begin {self.start.name.lower()} {self.how}".rstrip()] if self.start else []
-        parts += [f"out {self.output}"] if self.output else []
-        test = {Jump.NEVER: "", Jump.ALWAYS: "", Jump.END: "end"}.get(self.jump, f"if {self.jump.name.lower()}")
-        parts.append(f"{test} goto {self.target}".strip() if self.target else test)
-        return "; ".join(part for part in parts if part)
 
 
 _STARTS = ("log", "exp", "by", "chance")
@@ -158,14 +98,6 @@ def _paired(chain: list[Instruction]) -> list[Instruction]:
     return chain
 
 
-@dataclass(frozen=True, eq=False)
-class Code:
-    """Instructions, and the places of the labels among them."""
-
-    instructions: tuple[Instruction, ...]
-    labels: Mapping[str, int]
-
-
 @cache
 def assembled(listing: str = LISTING, apart: int = 2, ports: int = 1, **kind: bool) -> Code:
     """Return the instructions of a listing, with some that do nothing where a word would be read too early.
@@ -198,85 +130,7 @@ def assembled(listing: str = LISTING, apart: int = 2, ports: int = 1, **kind: bo
         else:
             chain = _chain(words)
             code += _paired(chain) if ports > 1 else chain
-    return _spaced(_joined(code, labels), apart, ports)
-
-
-def _spaced(code: Code, apart: int, ports: int) -> Code:
-    """Return a code with enough instructions between a word's change and its use."""
-    made: list[Instruction] = []
-    places: list[int] = []
-    for one in code.instructions:
-        reads, backs = one.reads, range(1, min(apart, len(made) + 1))
-        near = (back for back in backs if any(_same(made[-back].store, word) for word in reads))
-        made += [Instruction()] * (apart - next(near, apart))
-        if ports > 1 and _clash(one, *made[:-3:-1]):
-            made.append(Instruction())
-        places.append(len(made))
-        made.append(one)
-    return Code(tuple(made), {label: places[place] for label, place in code.labels.items()})
-
-
-def _clash(one: Instruction, before: Instruction = Instruction(), second: Instruction = Instruction()) -> bool:
-    """Return whether an instruction is too early for the block unit, as of the two before it; see `BlockUnit`."""
-    if one.start == Start.BY:
-        return second.start in (Start.TIMES, Start.EXP)
-    return before.start == Start.BY and (one.start == Start.TIMES or one.how == "by")
-
-
-def _joined(code: list[Instruction], labels: dict[str, int]) -> Code:
-    """Return a code in which a jump also adds the term behind it, or the one at its target; it tests the sum before."""
-
-    def is_term(place: int) -> bool:
-        one = code[place]
-        return Instruction(one.left, one.first, one.word, one.subtract, one.by_sign, one.keep) == one != Instruction()
-
-    def takes_sum(place: int) -> bool:
-        one = code[place]
-        if one.jump == Jump.ALWAYS:
-            return takes_sum(labels[one.target])
-        return one.jump in (Jump.NEG, Jump.POS) or (one.jump != Jump.END and one.left != Left.ZERO)
-
-    def takes_sign(place: int) -> bool:
-        one = code[place]
-        if one.by_sign or one.keep or one.jump == Jump.END:
-            return one.by_sign
-        ahead = [] if one.jump == Jump.ALWAYS else [place + 1]
-        return any(takes_sign(following) for following in [*ahead, *([labels[one.target]] if one.target else [])])
-
-    entered = {*labels.values()}
-    labels = dict(labels)
-    skipped: set[int] = set()
-    for place, one in enumerate(code):
-        always = one.jump == Jump.ALWAYS
-        if one.target and one == Instruction(jump=one.jump, target=one.target):
-            at = labels[one.target]
-            term = at if always else place + 1
-            free = always or not (term in entered or takes_sum(at) or (code[term].keep and takes_sign(at)))
-            stored = code[place - 1].store
-            if free and is_term(term) and not any(_same(stored, word) for word in code[term].reads):
-                target = f"{one.target}+1" if always else one.target
-                labels.setdefault(target, term + 1)
-                code[place] = replace(code[term], jump=one.jump, target=target)
-                skipped |= set() if always else {term}
-    return _without(code, labels, skipped)
-
-
-def _without(code: list[Instruction], labels: dict[str, int], skipped: set[int]) -> Code:
-    """Return a code without these places, and without what nothing reaches."""
-    made: list[Instruction] = []
-    places: list[int] = []  # where each one is among those that are made
-    entered = {labels[one.target] for one in code if one.target}
-    for place, one in enumerate(code):
-        places.append(len(made))
-        ended = place and code[place - 1].jump in (Jump.ALWAYS, Jump.END) and place not in entered
-        if place not in skipped and not ended:
-            made.append(one)
-    return Code(tuple(made), {label: places[place] for label, place in labels.items()})
-
-
-def _same(stored: str, read: str) -> bool:
-    """Return whether two names may be of one word."""
-    return stored == read or ("o@" in stored + read and {stored, read} <= {*OFFSETS, *CHOSEN})
+    return spaced(joined(code, labels), apart, ports)
 
 
 @cache

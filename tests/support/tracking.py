@@ -12,7 +12,8 @@ from tachometry.sim.golden.methods.track_recursion import Recursion, log2
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec import TrackTachometer, of_texts
 from tachometry.spec.formats.tracking import CHANCE_BITS, GAIN_STEPS, GAINS, LOG_BITS, PLACE_BITS, WIDTH
-from tachometry.spec.formats.tracking_code import Instruction, Jump, Left, Program
+from tachometry.spec.formats.tracking_code import Program
+from tachometry.spec.formats.tracking_instruction import Instruction, Jump, Left
 from tachometry.spec.formats.tracking_units import Start
 
 

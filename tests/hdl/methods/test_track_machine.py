@@ -12,7 +12,8 @@ from support.tracking import Interpreter, core, windows
 from tachometry.hdl.methods import track_machine
 from tachometry.sim.golden.methods.track_recursion import Recursion, log2
 from tachometry.spec import TrackTachometer
-from tachometry.spec.formats.tracking_code import Instruction, Program
+from tachometry.spec.formats.tracking_code import Program
+from tachometry.spec.formats.tracking_instruction import Instruction
 from tachometry.spec.formats.tracking_units import Start
 
 CORES = {

@@ -9,7 +9,8 @@ from support.tracking import Interpreter, core, windows
 from tachometry.sim.golden.methods.track_recursion import Recursion, log2
 from tachometry.spec import TrackTachometer
 from tachometry.spec.formats.tracking import WIDTH
-from tachometry.spec.formats.tracking_code import FIRST_INPUT, Instruction, Jump, assembled
+from tachometry.spec.formats.tracking_code import FIRST_INPUT, assembled
+from tachometry.spec.formats.tracking_instruction import Instruction, Jump
 
 # Ticks of few clocks and of many, of one length and of several; words as wide as they come.
 CORES = [

@@ -7,7 +7,8 @@ from support.tracking import core
 
 from tachometry.spec import ParameterError, TrackTachometer, of_options, with_loop
 from tachometry.spec.formats.tracking import WIDTH
-from tachometry.spec.formats.tracking_code import FIRST_INPUT, FIRST_OFFSET, OFFSETS
+from tachometry.spec.formats.tracking_code import FIRST_INPUT, FIRST_OFFSET
+from tachometry.spec.formats.tracking_instruction import OFFSETS
 from tachometry.spec.formats.tracking_units import BLOCK, Serial
 from tachometry.spec.methods.track import in_loop
 

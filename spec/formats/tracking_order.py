@@ -1,0 +1,80 @@
+"""Where a machine has the instructions of the tracking method: what a jump does besides, and what must wait."""
+
+from dataclasses import replace
+
+from tachometry.spec.formats.tracking_instruction import Code, Instruction, Jump, Left, same
+from tachometry.spec.formats.tracking_units import Start
+
+
+def spaced(code: Code, apart: int, ports: int) -> Code:
+    """Return a code with enough instructions between a word's change and its use."""
+    made: list[Instruction] = []
+    places: list[int] = []
+    for one in code.instructions:
+        reads, backs = one.reads, range(1, min(apart, len(made) + 1))
+        near = (back for back in backs if any(same(made[-back].store, word) for word in reads))
+        made += [Instruction()] * (apart - next(near, apart))
+        if ports > 1 and _clash(one, *made[:-3:-1]):
+            made.append(Instruction())
+        places.append(len(made))
+        made.append(one)
+    return Code(tuple(made), {label: places[place] for label, place in code.labels.items()})
+
+
+def _clash(one: Instruction, *others: Instruction) -> bool:
+    """Return whether an instruction is too early for the block unit, as of the two before it; see `BlockUnit`."""
+    before, second = (*others, Instruction(), Instruction())[:2]
+    if one.start == Start.BY:
+        return second.start in (Start.TIMES, Start.EXP)
+    return before.start == Start.BY and (one.start == Start.TIMES or one.how == "by")
+
+
+def joined(code: list[Instruction], labels: dict[str, int]) -> Code:
+    """Return a code in which a jump also adds the term behind it, or the one at its target; it tests the sum before."""
+
+    def is_term(place: int) -> bool:
+        one = code[place]
+        return Instruction(one.left, one.first, one.word, one.subtract, one.by_sign, one.keep) == one != Instruction()
+
+    def takes_sum(place: int) -> bool:
+        one = code[place]
+        if one.jump == Jump.ALWAYS:
+            return takes_sum(labels[one.target])
+        return one.jump in (Jump.NEG, Jump.POS) or (one.jump != Jump.END and one.left != Left.ZERO)
+
+    def takes_sign(place: int) -> bool:
+        one = code[place]
+        if one.by_sign or one.keep or one.jump == Jump.END:
+            return one.by_sign
+        ahead = [] if one.jump == Jump.ALWAYS else [place + 1]
+        return any(takes_sign(following) for following in [*ahead, *([labels[one.target]] if one.target else [])])
+
+    entered = {*labels.values()}
+    labels = dict(labels)
+    skipped: set[int] = set()
+    for place, one in enumerate(code):
+        always = one.jump == Jump.ALWAYS
+        if one.target and one == Instruction(jump=one.jump, target=one.target):
+            at = labels[one.target]
+            term = at if always else place + 1
+            free = always or not (term in entered or takes_sum(at) or (code[term].keep and takes_sign(at)))
+            stored = code[place - 1].store
+            if free and is_term(term) and not any(same(stored, word) for word in code[term].reads):
+                target = f"{one.target}+1" if always else one.target
+                labels.setdefault(target, term + 1)
+                code[place] = replace(code[term], jump=one.jump, target=target)
+                skipped |= set() if always else {term}
+    return _without(code, labels, skipped)
+
+
+def _without(code: list[Instruction], labels: dict[str, int], skipped: set[int]) -> Code:
+    """Return a code without these places, and without what nothing reaches."""
+    made: list[Instruction] = []
+    places: list[int] = []  # where each one is among those that are made
+    entered = {labels[one.target] for one in code if one.target}
+    for place, one in enumerate(code):
+        places.append(len(made))
+        ended = place and code[place - 1].jump in (Jump.ALWAYS, Jump.END) and place not in entered
+        if place not in skipped and not ended:
+            made.append(one)
+    return Code(tuple(made), {label: places[place] for label, place in labels.items()})
