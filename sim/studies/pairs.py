@@ -148,7 +148,7 @@ AXES: tuple[tuple[str, ...], ...] = (
     _axes_words(64, 960, 5, "--max-speed", "500rad/s", "--decoding", "1", "--frac-bits", "4", "--position-width", "48"),
     (*_axes_words(17, 1000, 4, "--frac-bits", "24", "--index", "--filter", "30", "--external-tick"), "--parallel"),
     (*_axes_words(5, 1440, 9, "--max-speed", "2000rad/s", "--unit", "rpm", method="track"), "--parallel"),
-    _axes_words(2, 1920, 6, "--external-tick", "--filter", "9", "--index", "--index-reset", method="track"),
+    _axes_words(2, 1920, 6, "--external-tick", "--filter", "9", "--index", "--electrical", "7", method="track"),
     _axes_words(3, 120, 4, "--unit", "rpm", "--velocity-width", "24", "--external-tick", "--filter", "5"),
 )
 
