@@ -196,6 +196,24 @@ def test_gates_add_counts_exactly() -> None:
 
 
 @nightly
+def test_gates_have_the_angle_of_the_start_after_a_million_turns() -> None:
+    """Forward and back, a count in each clock: the place is half a count off, as after a thousand turns."""
+    spec = Case("m", "electrical=5 ppr=3 tick=4096clk max-time=8192clk").spec
+
+    def end(turns: int) -> list[int]:
+        place = np.append(np.arange(12 * turns), np.arange(12 * turns, -1, -1)) + 50
+        a, b = ((place + ahead) % 4 // 2 for ahead in (0, 1))
+        trace = PinTrace(np.arange(len(place)), a.astype(np.uint8), b.astype(np.uint8), len(place) + 20_000)
+        ticks = Cxxrtl().run(spec, trace.completed(spec)).ticks
+        assert abs(ticks.position).max() > 11 * turns
+        return [ticks.position[-1], ticks.angle[-1]]
+
+    angles = ElectricalAngle.of(spec.extras).angles(spec)  # type: ignore[union-attr]
+    half = angles.of(0) + (angles.count[0] >> 1) >> angles.bits - 16
+    assert end(1000) == end(1_000_000) == [0, half]
+
+
+@nightly
 @pytest.mark.parametrize(
     ("right", "wrong"), [("up.eq(left + remainder)", "up.eq(left)"), ("(step[0] & carry)", "step[0]")]
 )
