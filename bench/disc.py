@@ -23,7 +23,7 @@ FIRST_SEED, COAST = 1201, "ramp:150rad/s:60rad/s:2400ms"  # 40 turns
 ENCODER = {"lines": "500", "index": "yes"}
 BASE = {**ENCODER, "clock": "48MHz", "tick": "20us", "max-speed": "400rad/s"}
 MT = {"max-time": "10ms"}
-METHODS = {"track": {"max-time": "100ms"}, "mt": MT, "mt, 1 ms": MT | {"min-time": "1ms"}}
+METHODS = {"track": {"max-time": "100ms"}, "mt": MT, "mt, 1 ms": MT | {"min-time": "1ms"}, "s": MT}
 DISCS = {
     "off centre": "real eccentricity=0.25",
     "magnetic": "jitter=0.05 nonuniformity=0.02",

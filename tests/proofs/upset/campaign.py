@@ -26,9 +26,9 @@ from tachometry.spec.core.index import Index
 TICK_CYCLES, MAX_TICKS = 100, 20
 # What a core of M may have beside, which must not keep the velocity from recovering; proofs are about these outputs.
 OUTPUTS = "m, outputs"
-MAPPED = ("t, map", "mt, map")  # their turn has 40 edges
+MAPPED = ("t, map", "mt, map", "s, map")  # their turn has 40 edges
 FAR = tuple((0.4 * np.sin(np.arange(40) * np.pi / 20)).tolist())
-_MAP = DiscFile("", Disc(40, FAR, 4, 2, 0.01, 0.05, (60.0, 150.0), 40.0, False))
+_MAP = DiscMap(file=DiscFile("", Disc(40, FAR, 4, 2, 0.01, 0.05, (60.0, 150.0), 40.0, False)))
 _OPTIONS: dict[str, dict[str, Any]] = {
     "m": {"average": 10},
     OUTPUTS: {
@@ -43,7 +43,7 @@ _OPTIONS: dict[str, dict[str, Any]] = {
         ),
     },
     **{
-        name: {"encoder": Encoder(10, 4), "index": Index(), "extras": (DiscMap(file=_MAP),)}
+        name: {"encoder": Encoder(10, 4), "index": Index(), "extras": (_MAP,), "bounds": name in MAPPED[:2]}
         for name in (*MAPPED, "track, map")
     },
     "track": {"timing": Timing(5_000_000, 340, 20), "max_speed": Speed.parse("75rev/s"), "multiplier": "block"},
