@@ -117,10 +117,13 @@ def calibrate(
 def _align(port: Path, manifest: Path | None, turn: int | None) -> None:
     if turn is None or manifest is None:
         raise ValueError("--align must be given with --manifest and --against, and without --index")
-    described = json.loads(manifest.read_text(encoding="utf-8"))
-    with SerialPort(str(port), described["baud"]) as line:
-        link = Link(line, HostRegisters(described))
-        Client(link.read, link.write, described).turn_disc(turn)
+    try:
+        described = json.loads(manifest.read_text(encoding="utf-8"))
+        with SerialPort(str(port), described["baud"]) as line:
+            link = Link(line, HostRegisters(described))
+            Client(link.read, link.write, described).turn_disc(turn)
+    except (json.JSONDecodeError, UnicodeDecodeError, KeyError, TypeError) as error:
+        raise ValueError(f"--manifest must be of a core on a UART with a map and no index, not {manifest}") from error
 
 
 def _of_board(name: str, spec: TachometerSpec) -> Iterator[tuple[str, Recording]]:

@@ -116,6 +116,11 @@ def test_the_number_that_aligns_a_core_is_printed_and_written(
     monkeypatch.setattr("tachometry.cli.commands.calibrate.SerialPort", Core)
     aligns = [*words, "--against", tmp_path / "disc.json", "--align", "/dev/ttyUSB1"]
     assert run(*aligns) == 2
+    for text in ("", "[]", "{}"):
+        (tmp_path / "wrong.json").write_text(text)
+        capsys.readouterr()
+        assert run(*aligns, "--manifest", tmp_path / "wrong.json") == 2
+        assert "--manifest must be of a core on a UART with a map and no index, not " in capsys.readouterr().err
     assert run(*aligns, "--manifest", tmp_path / "core.json") == 0
     assert Core.written == [("DISC_TURN", begins | 1 << 8)]
     assert f"DISC_TURN             {begins}, if the core was reset as the capture began" in capsys.readouterr().out
