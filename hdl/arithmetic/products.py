@@ -28,10 +28,11 @@ def take_products(
         m.d.sync += number.eq(Mux(begin, 0, number + 1))
     term, factor, base = (Array([product[part] for product in products])[number] for part in range(3))
     width = max(len(term) for term, *_ in products)
+    base_bits = max(len(base) for *_, base, _ in products)
     if block:
-        found = result = _multiply(m, (term, factor, base), ends, (width, bits, result_bits))
+        found = result = _multiply(m, (term, factor, base), ends, (width, bits, max(result_bits, base_bits)))
     else:
-        sum_ = _add_bits(m, clock, (term, factor, base), ends, (max(result_bits + 1, width), bits))
+        sum_ = _add_bits(m, clock, (term, factor, base), ends, (max(result_bits + 1, width, base_bits), bits))
         found, result = sum_ >> bits, sum_
     for place, (*_, target) in enumerate(products[:-1]):
         with m.If(done & (number == place)):

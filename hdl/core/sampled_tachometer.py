@@ -68,7 +68,8 @@ class SampledTachometer(Tachometer):
     def _taps(self, m: Module) -> dict[str, Value]:
         updates = self.datapath.updates
         shown = {f"native_{name}": updates.p[name] for name in update_layout(self._spec).members}
-        return {"read_fault": self.read_fault, "native_valid": updates.valid, **shown}
+        taps = {"read_fault": self.read_fault, "phase": self.reader.phase, "native_valid": updates.valid}
+        return taps | shown
 
 
 def master_of(reads: Reads) -> EncoderMaster:

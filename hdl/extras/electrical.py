@@ -10,11 +10,10 @@ from tachometry.hdl.arithmetic.products import Product, take_products
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.arithmetic.sine_cosine import SineCosine, SineTable
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import by_name
+from tachometry.hdl.wires.ports import by_name, only_if
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.electrical import LEADS, REFUSED, REFUSED_BITS, ElectricalAngle
 from tachometry.spec.formats.angles import LEAD_BITS, SHOWN_BITS, SLOPE_BITS, Angles, Factor
-from tachometry.spec.formats.settling import PLACE_BITS
 from tachometry.spec.formats.sine import AHEAD_BITS
 from tachometry.spec.formats.velocity_output import VelocityOutput
 
@@ -34,10 +33,10 @@ class Gates(wiring.Component):
         self._turn = SineTable if extra.sincos_table else SineCosine
         super().__init__(
             {
-                "step": In(signed(2)),
+                **only_if(not angles.is_read, step=In(signed(2))),
                 **{name: In(signed(width) if width > 1 else 1) for name, width in inputs.items()},
                 **dict.fromkeys(("tick", "native_valid", "angle_set"), In(1)),
-                "position": In(PLACE_BITS),
+                "position": In(angles.place_bits),
                 "angle_value": In(SHOWN_BITS),
                 "angle_offset": In(SHOWN_BITS, init=extra.offset),
                 "angle_lead": In(LEAD_BITS, init=extra.ahead),
@@ -54,6 +53,9 @@ class Gates(wiring.Component):
         """Return the gates of this core."""
         taken = [one for one in spec.method_ports if spec.carrying and one.name in ("acceleration", "position_fine")]
         inputs = {"native_velocity": spec.velocity.native, **{f"native_{one.name}": one.width for one in taken}}
+        if read := spec.encoder.sampled:
+            inputs |= {"phase": read.width, "position_valid": 1}
+            return cls(extra, extra.angles(spec), spec.latency.tick, inputs, corrects=False)
         if extra.angles(spec).cycle:
             inputs |= dict.fromkeys(("ready", "level_a", "level_b", "level_c"), 1)
         else:
@@ -63,19 +65,24 @@ class Gates(wiring.Component):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        (step,) = delay(m, self.step, clocks=self._latency - 1)
         indexed = Signal()
         sets = Signal()
         members = self.signature.members
         rises = self.index_rises if "index_rises" in members else C(0)
         known = Signal(init=not self._angles.cycle)
-        counted, moves = self._read(m, known) if self._angles.cycle else self._count(m, step, rises, indexed)
         m.d.sync += sets.eq(self.angle_set)
+        step: Value = C(0, 2)
+        if self._angles.is_read:
+            counted, moves = self._placed(), C(0)
+        else:
+            (step,) = delay(m, self.step, clocks=self._latency - 1)
+            counted, moves = self._read(m, known) if self._angles.cycle else self._count(m, step, rises, indexed)
         if self._angles.tracks:
             begun, phase, slope = self._tracked(m, counted)
         else:
             begun, (phase, slope) = known, self._counted(m, step, counted, moves, known)
-        with m.If(sets | rises | (known & begun if self._angles.cycle else 0)):
+        valid = C(0) if self._angles.is_read else sets | rises | (known & begun if self._angles.cycle else 0)
+        with m.If(valid):
             m.d.sync += [self.angle_valid.eq(1), indexed.eq(indexed | rises)]
         if "home_rises" in members:
             with m.If(self.home_rises):
@@ -141,6 +148,12 @@ class Gates(wiring.Component):
             m.d.sync += [state.eq(level), angle.eq(Array(states.get(number, 0) for number in range(8))[level])]
         return angle, moves
 
+    def _placed(self) -> Value:
+        """Return the angle of the read of a tick."""
+        angles = self._angles
+        turned = (self.phase[: angles.place_bits] * angles.pole_pairs) << angles.bits - angles.place_bits
+        return (turned + angles.of(0))[: angles.bits]
+
     def _tracked(self, m: Module, counted: Value) -> tuple[Signal, Value, Signal]:
         """Return whether an update has come, a phase that grows by its slope in each clock, and this slope.
 
@@ -150,9 +163,9 @@ class Gates(wiring.Component):
         bits, factor_bits, half = angles.bits, angles.factor_bits, angles.tick >> 1
         # Angle and place of the counts at a tick, for the update that it has.
         at = Signal(bits)
-        place = Signal(PLACE_BITS)
+        place = Signal(angles.place_bits)
         fine_bits = angles.position_fine_bits
-        between = Signal(signed(fine_bits + PLACE_BITS))
+        between = Signal(signed(fine_bits + angles.place_bits))
         with m.If(self.tick):
             m.d.sync += [at.eq(counted), place.eq(self.position)]
         m.d.comb += between.eq(self.native_position_fine - (place << fine_bits))
@@ -161,9 +174,8 @@ class Gates(wiring.Component):
         led = Signal()
         update = between, self.native_velocity, self.native_acceleration
         *first, mean, last = phase_products(angles, update, at, (s, (s >> 1) - angles.late))
-        bent, _, slope, _ = mean
         more = self._lead(m, s, angles.led, led) if angles.led else ()
-        products = (*first, (bent, s + (half - angles.late), slope, now), mean, *more, last)
+        products = (*first, (mean[0], s + (half - angles.late), mean[2], now), mean, *more, last)
         done, start = take_products(m, self.native_valid, products, factor_bits, bits, block=angles.block)
         phase = Signal(bits)
         run = Signal(bits)
@@ -178,6 +190,9 @@ class Gates(wiring.Component):
             m.d.sync += grows.eq(now)
         if angles.led:
             m.d.sync += led.eq(done)
+        if angles.is_read:
+            with m.If(done | ~self.position_valid):
+                m.d.sync += self.angle_valid.eq(self.position_valid)
         return begun, (phase + debt)[:bits], grows
 
     def _lead(self, m: Module, s: Value, led: VelocityOutput, ready: Value) -> tuple[Product, ...]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from tachometry.spec.formats.settling import PLACE_BITS
 from tachometry.spec.formats.velocity_output import VelocityOutput
 
 SHOWN_BITS = 16  # of the angle: 2^16 is an electrical turn
@@ -65,6 +66,8 @@ class Angles:
     block: bool = False  # whether a multiplier of the FPGA computes products
     led: VelocityOutput | None = None  # of `velocity_lead`; None: there is none
     once: bool = False  # whether a phase is that of one clock, and does not grow
+    place_bits: int = PLACE_BITS  # bits of the counts between the fine position and the position
+    is_read: bool = False  # whether the place within a turn is read
 
     @property
     def bits(self) -> int:

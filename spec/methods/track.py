@@ -245,7 +245,7 @@ class TrackTachometer(TachometerSpec):
     @cached_property
     def settling(self) -> Settling | None:
         """How `position_fine` goes to the middle of a count in a silence; None: it stays at the edge."""
-        if not any(extra.settles for extra in self.extras):
+        if self.encoder.sampled or not any(extra.settles for extra in self.extras):
             return None
         return Settling(self.position_fine_bits, self.velocity.native_frac_bits)
 

@@ -12,7 +12,6 @@ from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.electrical import LEADS, REFUSED, REFUSED_BITS, ElectricalAngle
 from tachometry.spec.formats.angles import SHOWN_BITS, SLOPE_BITS, Angles, Factor, wrapped
-from tachometry.spec.formats.settling import PLACE_BITS
 from tachometry.spec.formats.sine import (
     AHEAD_BITS,
     ASIDE,
@@ -33,7 +32,11 @@ _LONGEST = 1 << 31  # clocks in which every place that has an end comes to it
 def tables(extra: ElectricalAngle, view: View) -> dict[str, Table]:
     """Return phases, refused indices, and from each clock on the values of registers that are added to a phase."""
     states = extra.angles(view.spec).states
-    counts, refused = (_states(states, view), []) if states else counts_of(extra, view)
+    ticks, read = view.tables["tick"], extra.angles(view.spec).is_read
+    if read:
+        counts, refused = _reads(extra, view), list[int]()
+    else:
+        counts, refused = (_states(states, view), []) if states else counts_of(extra, view)
     updates = view.tables["measured"].clock
     offsets = zip(updates + 1, view.trace.line_at("angle_offset", updates, extra.offset), strict=True)
     offset = _latest([(0, extra.offset), *offsets], "offset")
@@ -41,6 +44,10 @@ def tables(extra: ElectricalAngle, view: View) -> dict[str, Table]:
     found = {"angle_phase": phases, "angle_offset": offset, REFUSED: Table(np.array(refused, np.int64), {})}
     if extra.angles(view.spec).led:
         found["angle_leads"] = _led(extra, view)
+    if read:  # since when positions are valid
+        begins = np.where(np.diff(ticks.position_valid, prepend=0) == 1, ticks.clock, 0)
+        since = np.where(ticks.position_valid, np.maximum.accumulate(begins), _NEVER)
+        found["angle_known"] = Table(np.append(0, ticks.clock), {"since": np.append(_NEVER, since)})
     known = np.maximum(counts.clock[1:2] + 1, phases.clock[:1]) if states else None
     return found | _sets(view, known)
 
@@ -52,6 +59,9 @@ def shown(
     angles = extra.angles(spec)
     marks, homes = (found[f"angle_{name}"].at("at", clock - 1) for name in ("index", "home"))
     valid = np.maximum(_last_set(found, clock - 1), marks) > homes
+    if angles.is_read:
+        done = np.append(-1, found["angle_phase"].clock - 1)
+        valid = done[np.searchsorted(done, clock - 1, side="right") - 1] >= found["angle_known"].at("since", clock - 1)
     columns = {"angle": _angle(angles, found, clock), "angle_valid": valid}
     if extra.corrects(spec):
         refused = np.searchsorted(found[REFUSED].clock, clock, side="right")
@@ -137,6 +147,13 @@ def counts_of(extra: ElectricalAngle, view: View, late_index: int = 1) -> tuple[
     return _latest(rows, "angle", "step"), refused
 
 
+def _reads(extra: ElectricalAngle, view: View) -> Table:
+    """Return the angle of the read of each tick."""
+    ticks, angles, turn = view.tables["tick"], extra.angles(view.spec), view.spec.encoder.encoder_counts
+    angle = np.array([angles.of(place) for place in (ticks["phase"] % turn).tolist()], np.int64)
+    return Table(ticks.clock, {"angle": angle, "step": np.zeros_like(angle)})
+
+
 def _states(states: Mapping[int, int], view: View) -> Table:
     """Return the angle of the latest state of the halls from each clock on, with the step in it."""
     at, levels = view.steps.levels
@@ -156,7 +173,7 @@ def _tracked(extra: ElectricalAngle, view: View, counts: Table) -> Table:
     place = ticks["position"][np.searchsorted(ticks.clock, updates["cause"])] << angles.position_fine_bits
     lead = view.trace.line_at("angle_lead", updates.clock, extra.ahead)
     between = [
-        wrapped(of, angles.position_fine_bits + PLACE_BITS) for of in (updates["position_fine"] - place).tolist()
+        wrapped(of, angles.position_fine_bits + angles.place_bits) for of in (updates["position_fine"] - place).tolist()
     ]
     of_ticks = counts.at("angle", updates["cause"]), between, lead
     columns = np.column_stack((updates.clock, *of_ticks, updates["velocity"], updates["acceleration"])).tolist()

@@ -8,7 +8,8 @@ import numpy as np
 
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import FloatArray, parse_motion
-from tachometry.sim.encoder.virtual import MAX_UNEVEN_PULSES, VirtualEncoder
+from tachometry.sim.encoder.sampled import encoder_of
+from tachometry.sim.encoder.virtual import MAX_UNEVEN_PULSES
 from tachometry.sim.studies.comparing.baselines import Steps, read
 from tachometry.sim.studies.comparing.compare import Curve, Judge
 from tachometry.sim.theory.performance import REAL_DISC
@@ -30,7 +31,7 @@ def expected(extra: ElectricalAngle, spec: TachometerSpec, rad_per_s: float) -> 
     tick_s, counts = spec.timing.tick_cycles / spec.timing.clock_hz, rad_per_s / spec.scale.unit_velocity
     seen = min(max(_SEEN, math.ceil(_SEEN / counts)), _MOST) + extra.ahead // spec.timing.tick_cycles
     moved = parse_motion(f"constant:{rad_per_s!r}rad/s:{(_SETTLES + seen) * tick_s!r}s")
-    encoder = VirtualEncoder.of_core(spec, **(REAL_DISC if spec.encoder.sensor == "quadrature" else {}))
+    encoder = encoder_of(spec, **(REAL_DISC if spec.encoder.sensor == "quadrature" else {}))
     ticks = golden.run(spec, encoder.record(moved).recording.place(spec.timing.clock_hz).completed(spec)).ticks
     begin, end = _SETTLES * spec.timing.tick_cycles, (_SETTLES + seen) * spec.timing.tick_cycles - extra.ahead
     ticks = ticks.rows((ticks.clock > begin) & (ticks.clock < end))
@@ -55,8 +56,7 @@ def judged(
     The zero is that of the disc, by all of its edges; halls have their own. Cores are read at their ticks. A float
     model has its latest count, interpolated as in ODrive, and is carried on with its velocity to the instant of use.
     """
-    turns_per_count = extra.pole_pairs / float(steps.counts_per_rev)
-    lead_s = extra.ahead / spec.timing.clock_hz
+    turns_per_count, lead_s = extra.pole_pairs / float(steps.counts_per_rev), extra.ahead / spec.timing.clock_hz
 
     def true(time: FloatArray) -> FloatArray:
         return extra.pole_pairs * true_angle(time) / math.tau
@@ -74,7 +74,8 @@ def judged(
         return time[kept], ((away + 0.5) % 1 - 0.5) * 360
 
     reads = judge.among(curves[0].reads)
-    found = [errors(reads, place[np.searchsorted(steps.time, reads, side="right")] * turns_per_count)]
+    seen, counts = (steps.time, place) if steps.taken is None else (steps.reads, np.append(0, steps.taken))
+    found = [errors(reads, counts[np.searchsorted(seen, reads, side="right")] * turns_per_count)]
     for curve in curves:
         at = judge.among(curve.reads)
         if curve.angle is None:

@@ -1,7 +1,7 @@
 """The electrical angle of a motor, new in every clock, at the instant of its use."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from typing import Any
 
@@ -21,7 +21,8 @@ REFUSED = "angle_refused"
 REFUSED_BITS = 16  # of the number of refused indices, which stays at its end
 _UNIT = f"2^-{SHOWN_BITS} electrical turns"
 _POLE_PAIRS = """Electrical angle of a motor with P pole pairs, 1 to 512. Outputs angle, in 2^-16 electrical turns and \
-new in every clock, and angle_valid. It is 0 at the index, at the rise of A of halls, or what angle_set sets it to."""
+new in every clock, and angle_valid. It is 0 at the index, at the rise of A of halls, where an encoder that is read \
+has 0, or what angle_set sets it to."""
 _OFFSET = "Electrical angle that is added, as 12.3deg. Register ANGLE_OFFSET begins with it."
 _USE = """Time from the angle at the port to its use, as 1.5tick. Or 75us, or 300clk; below 65536 clocks. The angle \
 is that of the motor so much later. Register ANGLE_LEAD begins with it. With track it also outputs velocity_lead and \
@@ -107,7 +108,9 @@ class ElectricalAngle(Extra):
         speed, led = spec.velocity, None
         if carrying and self.lead is not None:
             led = speed.output or VelocityOutput(Fraction(1), speed.max << speed.native_frac_bits, speed.width)
-        return Angles(counts, self.pole_pairs, tick, spec.tick.longest, bits, late, *of_track, halls, block, led)
+        read = spec.encoder.sampled
+        angles = Angles(counts, self.pole_pairs, tick, spec.tick.longest, bits, late, *of_track, halls, block, led)
+        return replace(angles, place_bits=read.bits, is_read=True) if read else angles
 
     def least_fine_bits(self, spec: Numbers) -> int:
         return ((self.pole_pairs << SHOWN_BITS) // spec.encoder.counts_per_rev).bit_length()
@@ -116,7 +119,6 @@ class ElectricalAngle(Extra):
         return {
             **({"axes": "does not work with both --axes and --sincos"} if self.turns else {}),
             "loop": "does not work with --loop",
-            "sampled": "must be left out with --sensor sampled: it needs edges",
         }
 
     def in_turn(self, slots: int) -> "AngleInTurn":
@@ -125,6 +127,8 @@ class ElectricalAngle(Extra):
     def check(self, spec: Numbers) -> None:
         if spec.encoder.sensor == "hall" and self.pole_pairs != (pairs := spec.encoder.pulses_per_rev):
             raise ParameterError(self.name, f"must be {pairs}, the pole pairs of the halls, not {self.pole_pairs}")
+        if spec.encoder.sampled and spec.carrying is None:
+            raise ParameterError(self.name, "must be given together with --method track for an encoder that is read")
         if spec.encoder.ratio is not None:
             raise ParameterError(self.name, "does not work with --ratio: its index is not that of the motor")
         most = (spec.encoder.encoder_counts - 1) // 2
@@ -151,7 +155,7 @@ class ElectricalAngle(Extra):
         use = f"{self.ahead} clocks (ANGLE_LEAD) after"
         text = f"Electrical angle, new in every clock, {use} this one. It also changes between ticks."
         yield held(TICK, "angle", SHOWN_BITS, unit=_UNIT, help=text)
-        text = "The angle is that of the motor: by an index, by halls, or set. It also changes between ticks."
+        text = "The angle is that of the motor: by an index, by halls, by reads, or set. It also changes between ticks."
         yield held(TICK, "angle_valid", help=text)
         if self.corrects(spec):
             text = "Refused indices: the angle was off by more than 1/16 turn. It also changes between ticks, to 65535."

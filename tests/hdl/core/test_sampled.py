@@ -21,6 +21,7 @@ from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.sim.engines.pysim import PySim
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Run
+from tachometry.sim.studies.extras import expected_rows
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import ParameterError, TachometerSpec, TrackTachometer, of_options, of_texts
 from tachometry.spec.core.extras.health import Fault
@@ -44,7 +45,8 @@ CASES = {
     "track": SLOW,
     "track fine": SLOW
     | {"bits": "16+24", "multiplier": "block", "smooth": "yes", "external-tick": "yes"}
-    | {"position-width": "48", "period": "64", "zero": "1000000007"},
+    | {"position-width": "48", "period": "64", "zero": "1000000007"}
+    | {"electrical": "7", "lead": "1tick"},
     "track coarse": SLOW | {"bits": "5", "unit": "rpm", "sample-age": "100", "reverse": "yes", "max-memory": "5ms"},
     "track period": SLOW | {"multiplier": "serial", "tick": "1000clk", "max-time": "10000clk", "period": "128"},
 }
@@ -85,6 +87,24 @@ def test_gates_and_golden_model_agree_on_every_read(case: str) -> None:
     assert len(run.errors) > 1
     assert {0, 1} == {*run.ticks.position_valid.tolist()}
     assert len({*run.ticks.position.tolist()}) > 50
+
+
+def test_the_angle_of_a_motor_is_that_of_the_encoder_whatever_the_position_is() -> None:
+    motion, angles = parse_motion("sine:40rad/s:10Hz:120ms"), []
+    for zero in ("0", "12345"):
+        texts = {"tick": "100us", "max-time": "2ms", "zero": zero, "electrical": "7", "lead": "1.5tick"}
+        spec = of_texts("track", BASE | texts)
+        truth = encoder_of(spec, start_angle_rad=1.0).record(motion)
+        ticks = golden.run(spec, PinTrace.of(truth.recording, spec)).ticks
+        angles.append(ticks.angle.tolist())
+        assert ticks.angle_valid.tolist() == [0] + [1] * (len(ticks) - 1)
+        use = (ticks.clock + 7200) / spec.timing.clock_hz
+        error = ticks.angle / 2**16 - 7 * truth.true_angle(use) / (2 * np.pi)
+        assert np.abs((error + 0.5) % 1 - 0.5)[300:-2].max() < 0.002
+    assert angles[0] == angles[1]
+    coarse = of_texts("track", BASE | texts | {"bits": "12"})
+    (row,) = expected_rows(coarse, 600.0)
+    assert float(row[1].split()[0]) < 0.05  # degrees
 
 
 def test_zero_is_subtracted_from_the_position() -> None:
