@@ -105,8 +105,10 @@ class Tally:
 def held_velocity(spec: TachometerSpec, run: Run) -> HeldVelocity:
     """Return velocity at the end of every tick; empty if there was no update."""
     cycles, late = spec.timing.tick_cycles, spec.latency.tick_to_velocity
-    own = np.arange(cycles - 1, run.n_clocks, cycles) + spec.latency.tick
-    clock = (own if spec.facts.own_ticks else run.ticks.clock) + late
+    ticks = run.ticks.clock
+    if spec.facts.own_ticks:
+        ticks = np.arange(cycles - 1, run.n_clocks, cycles) + spec.latency.tick
+    clock = ticks + late
     return held_from(clock[clock < run.n_clocks], run.updates, spec)
 
 

@@ -36,6 +36,12 @@ def test_velocity_is_held_from_the_first_update_to_the_end() -> None:
     assert held.velocity_rad_s.tolist() == [3 * LSB, 3 * LSB, -5 * LSB]
 
 
+def test_memory_does_not_grow_with_the_clocks() -> None:
+    """Of what is as long as years, a list of ticks would not fit."""
+    late = held_velocity(SPEC, Run(1 << 50, RUN.tables))
+    assert late.time[:3].tolist() == held_velocity(SPEC, RUN).time.tolist()
+
+
 def test_error_statistics() -> None:
     error = velocity_error(held_velocity(SPEC, RUN), lambda t: np.full(len(t), LSB))  # errors are 2, 2, -6 LSB
     assert error is not None
