@@ -110,6 +110,7 @@ bench: $(VENV)/.test ## speed of the golden models, of the engines and of the te
 	$(BIN)/python bench/engines.py
 	$(BIN)/python bench/evidence.py
 	$(BIN)/python bench/sweep.py
+	$(BIN)/python bench/memory.py
 
 verify: $(VENV)/.test ## every method on every engine against the golden models, a billion clocks, written to docs/measured
 	$(BIN)/python bench/verify.py
