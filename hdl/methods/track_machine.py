@@ -150,6 +150,8 @@ class TrackMachine(wiring.Component):
         self.go = Signal()
         self.taken = Signal()  # a jump is
         self.stop = Signal()
+        self.selects = Signal()  # the condition is one to store the sum, and not to jump
+        self.passed = Signal()  # it is not met
         # The adder.
         self.sum_ = Signal(signed(WIDTH), reset_less=True)
         self.sign = Signal()  # that is kept
@@ -290,15 +292,21 @@ class TrackMachine(wiring.Component):
             self.carry.eq(self.minus ^ (self.from_unit & self.unit.up)),
             self.total.eq((Cat(C(1, 1), self.left).as_signed() + Cat(self.carry, flipped).as_signed()) >> 1),
         ]
-        with m.If(self.go):
-            m.d.sync += self.sum_.eq(self.total)
-        if not self._two:
+        keeps, writes = self.go & self.now.keep, self.go & self.now.writes
+        if self._two:
+            m.d.comb += self.selects.eq(self.now.writes & Value.cast(self.now.jump).any())
+            keeps, writes = keeps & ~self.passed, writes & ~self.passed
+            with m.If(self.go & ~self.selects):
+                m.d.sync += self.sum_.eq(self.total)
+        else:
+            with m.If(self.go):
+                m.d.sync += self.sum_.eq(self.total)
             with m.If(~self.hold & follows & ~self.used):
                 m.d.sync += self.sum_.eq(0)
-        with m.If(self.go & self.now.keep):
+        with m.If(keeps):
             m.d.sync += self.sign.eq(self.total[-1])
         m.d.comb += [
-            self._write.en.eq(self.go & self.now.writes),
+            self._write.en.eq(writes),
             self._write.addr.eq(self._at(self._stored(self.now.store))),
             self._write.data.eq(self.total),
         ]
@@ -334,8 +342,12 @@ class TrackMachine(wiring.Component):
             Jump.EMPTY: empty,
             Jump.ONE: one,
         }
+        is_met = Cat(met.get(jump, C(0, 1)) for jump in Jump).bit_select(self.now.jump, 1)
+        if self._two:
+            m.d.comb += self.passed.eq(self.selects & ~is_met)
+            is_met &= ~self.selects
         m.d.comb += [
-            self.taken.eq(self.go & Cat(met.get(jump, C(0, 1)) for jump in Jump).bit_select(self.now.jump, 1)),
+            self.taken.eq(self.go & is_met),
             self.stop.eq(self.go & (self.now.jump == Jump.END)),
         ]
 

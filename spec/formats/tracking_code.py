@@ -3,8 +3,8 @@
 The machine has one adder with an accumulator, the *sum*; a memory of words; and a unit that takes products,
 logarithms, powers and shifts, and whose result is read as `~`. An instruction takes a clock. It waits while the unit
 works and it needs it. A word is read before its use, so none is read right behind its change. A jump tests the sum that
-was before it, and meanwhile adds a term as others do; it stores nothing. A machine that reads two words at a time takes
-the first two terms of a line at once.
+was before it, and meanwhile adds a term as others do; it stores nothing. The quick machine reads two words at a time,
+so it takes the first two terms of a line at once. It stores a sum on a condition where a jump would pass over that.
 """
 
 import re
@@ -15,7 +15,7 @@ from functools import cache, cached_property
 from tachometry.spec.formats.tracking import Tracking
 from tachometry.spec.formats.tracking_instruction import CHOSEN, OFFSETS, Code, Instruction, Jump, Left
 from tachometry.spec.formats.tracking_listing import LISTING
-from tachometry.spec.formats.tracking_order import joined, spaced
+from tachometry.spec.formats.tracking_order import joined, selected, spaced
 from tachometry.spec.formats.tracking_units import Start, Times
 
 SMOOTH = ("velocity_smooth", "smooth_delay")
@@ -130,6 +130,8 @@ def assembled(listing: str = LISTING, apart: int = 2, ports: int = 1, **kind: bo
         else:
             chain = _chain(words)
             code += _paired(chain) if ports > 1 else chain
+    if ports > 1:
+        code, labels = selected(code, labels)
     return spaced(joined(code, labels), apart, ports)
 
 

@@ -17,7 +17,7 @@ class Left(IntEnum):
 
 
 class Jump(IntEnum):
-    """When an instruction jumps."""
+    """When an instruction jumps or, if it stores the sum, when it does: then it leaves the sum as it was."""
 
     NEVER = 0
     ALWAYS = 1

@@ -5,6 +5,9 @@ from dataclasses import replace
 from tachometry.spec.formats.tracking_instruction import Code, Instruction, Jump, Left, same
 from tachometry.spec.formats.tracking_units import Start
 
+_MOST_SELECTED = 4  # instructions: a jump that is taken costs as much
+_OF_STORE = ("first", "word", "subtract", "by_sign", "keep", "store")
+
 
 def spaced(code: Code, apart: int, ports: int) -> Code:
     """Return a code with enough instructions between a word's change and its use."""
@@ -29,18 +32,44 @@ def _clash(one: Instruction, *others: Instruction) -> bool:
     return before.start == Start.BY and (one.start == Start.TIMES or one.how == "by")
 
 
+def _takes_sum(code: list[Instruction], labels: dict[str, int], place: int) -> bool:
+    """Return whether the sum is taken with which a place is reached."""
+    one = code[place]
+    if one.jump == Jump.ALWAYS:
+        return _takes_sum(code, labels, labels[one.target])
+    if one == Instruction(jump=one.jump, target=one.target) and one.jump in (Jump.EMPTY, Jump.ONE):
+        return any(_takes_sum(code, labels, at) for at in (place + 1, labels[one.target]))
+    return one.jump in (Jump.NEG, Jump.POS) or (one.jump != Jump.END and one.left != Left.ZERO)
+
+
+def _is_store(one: Instruction) -> bool:
+    return bool(one.store) and one == Instruction(Left.ZERO, *(getattr(one, name) for name in _OF_STORE))
+
+
+def selected(code: list[Instruction], labels: dict[str, int]) -> tuple[list[Instruction], dict[str, int]]:
+    """Return a code in which a sum is only stored, or its sign kept, on a condition, where jumps passed over no more.
+
+    Each of these takes one instruction, and leaves the sum as it was.
+    """
+    code, skipped, entered = [*code], set[int](), {*labels.values()}
+    for place, one in enumerate(code):
+        opposite = {Jump.NEG: Jump.POS, Jump.POS: Jump.NEG}.get(one.jump)
+        if opposite and one == Instruction(jump=one.jump, target=one.target):
+            passed = range(place + 1, labels[one.target])
+            stores = all(_is_store(code[each]) and each not in entered for each in passed)
+            if 0 < len(passed) <= _MOST_SELECTED and stores and not _takes_sum(code, labels, passed.stop):
+                code[place + 1 : passed.stop] = [replace(code[each], jump=opposite) for each in passed]
+                skipped.add(place)
+    made = _without(code, labels, skipped)
+    return [*made.instructions], {**made.labels}
+
+
 def joined(code: list[Instruction], labels: dict[str, int]) -> Code:
     """Return a code in which a jump also adds the term behind it, or the one at its target; it tests the sum before."""
 
     def is_term(place: int) -> bool:
         one = code[place]
         return Instruction(one.left, one.first, one.word, one.subtract, one.by_sign, one.keep) == one != Instruction()
-
-    def takes_sum(place: int) -> bool:
-        one = code[place]
-        if one.jump == Jump.ALWAYS:
-            return takes_sum(labels[one.target])
-        return one.jump in (Jump.NEG, Jump.POS) or (one.jump != Jump.END and one.left != Left.ZERO)
 
     def takes_sign(place: int) -> bool:
         one = code[place]
@@ -57,7 +86,9 @@ def joined(code: list[Instruction], labels: dict[str, int]) -> Code:
         if one.target and one == Instruction(jump=one.jump, target=one.target):
             at = labels[one.target]
             term = at if always else place + 1
-            free = always or not (term in entered or takes_sum(at) or (code[term].keep and takes_sign(at)))
+            free = always or not (
+                term in entered or _takes_sum(code, labels, at) or (code[term].keep and takes_sign(at))
+            )
             stored = code[place - 1].store
             if free and is_term(term) and not any(same(stored, word) for word in code[term].reads):
                 target = f"{one.target}+1" if always else one.target

@@ -72,19 +72,24 @@ class Interpreter:
                 Jump.EMPTY: number == 0,
                 Jump.ONE: number == 1,
             }[one.jump]
-            place = self.program.code.labels[one.target] if taken else place
+            selects = bool(one.store and one.jump)
+            if selects and not taken:
+                continue
+            place = self.program.code.labels[one.target] if taken and one.target else place
             terms = {"": 0, "~": result} | {f"${word}": value for word, value in inputs.items()}
             terms |= {word: self.words[name(word)] for word in one.reads}
             first, operand = terms[one.first], terms[one.word]
             left = {Left.ZERO: first, Left.SUM: sum_, Left.LEAST: min(sum_, 0), Left.MOST: max(sum_, 0)}[one.left]
             minus = one.subtract != (one.by_sign and sign < 0)
-            sum_ = left - operand if minus else left + operand
+            before, sum_ = sum_, left - operand if minus else left + operand
             if not -(1 << (WIDTH - 1)) <= sum_ < 1 << (WIDTH - 1):
                 raise OverflowOfWord(f"{one} in {self.program.form}")
             if one.keep:
                 sign = -1 if sum_ < 0 else 1
             if one.store:
                 self.words[name(one.store)] = sum_
+            if selects:
+                sum_ = before
             if one.output:
                 shown[one.output] = int(sum_ >= 0) if one.output == "standstill" else sum_
             match one.start:

@@ -112,6 +112,29 @@ def test_a_jump_adds_the_term_behind_it(lines: str, word: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ("a + b; if neg goto there; c = d; there:; e", "c"),
+        ("a + b; if pos goto there; c = ~ keep; e = d + a; there:; b", "ce"),
+        ("a + b; if neg goto there; c = d; there:; one + two; if neg goto there; end", "c"),
+        ("a + b; if neg goto there; c = d; there:; if one goto back; d; back:; e; end", "c"),
+        ("a + b; if neg goto there; c = d; there:; sum + e; end", ""),  # there the sum is still needed
+        ("a + b; if neg goto there; c = d; there:; if neg goto there; end", ""),
+        ("a + b; if neg goto there; c = d; there:; if one goto back; sum + d; back:; e; end", ""),
+        ("a + b; if neg goto there; c = d; back:; e = f; there:; d; goto back", ""),  # it is gone to as well
+        ("a + b; if neg goto there; c = d + e + f; there:; end", ""),  # of two instructions
+        ("a + b; if neg goto there; c = d log; there:; end", ""),
+        ("a + b; if one goto there; c = d; there:; end", ""),  # no sum decides
+        ("a + b; if neg goto there; c = d; e = f; g = h; i = j; k = l; there:; end", ""),  # a jump is quicker
+    ],
+)
+def test_a_sum_is_stored_on_the_condition_that_passed_over_it(lines: str, words: str) -> None:
+    code = assembled(lines, ports=2).instructions
+    assert "".join(one.store for one in code if one.jump and one.store) == words
+    assert {one.jump for one in code if one.jump and one.store} <= {Jump.POS if "neg" in lines else Jump.NEG}
+
+
+@pytest.mark.parametrize(
     ("line", "terms"),
     [
         ("a + b - c", [("a", "b"), ("", "c")]),
