@@ -1,6 +1,6 @@
 """The machine of the tracking method: one adder, one accumulator, a memory, a program, and a unit."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from functools import reduce
 from operator import and_, or_
 
@@ -12,66 +12,15 @@ from tachometry.hdl.arithmetic.idle import Idle, IdleBox
 from tachometry.hdl.front_end.sampling_clock import state_after, states_of
 from tachometry.hdl.methods.block_unit import BlockUnit
 from tachometry.hdl.methods.serial_unit import SerialUnit
+from tachometry.hdl.methods.track_instruction import encoded, layout_of
 from tachometry.hdl.wires.commented_memory import CommentedMemory
 from tachometry.hdl.wires.ports import by_name
 from tachometry.spec.formats.tracking import PLACE_BITS, WIDTH
-from tachometry.spec.formats.tracking_code import ADDRESS_BITS, FIRST_INPUT, HOW_BITS, INPUTS, OUTPUTS, Program
-from tachometry.spec.formats.tracking_instruction import CHOSEN, Instruction, Jump, Left
+from tachometry.spec.formats.tracking_code import ADDRESS_BITS, FIRST_INPUT, INPUTS, OUTPUTS, Program
+from tachometry.spec.formats.tracking_instruction import CHOSEN, Jump
 from tachometry.spec.formats.tracking_units import BLOCK, Start
 
 _PLACES_BITS = PLACE_BITS - 1 - 6  # twice the places, over 64
-
-
-def _layout(program: Program) -> data.StructLayout:
-    """Return an instruction. A jump has its target where others have how, and where the sum goes."""
-    target = len(program.code.instructions).bit_length()
-    store = max(ADDRESS_BITS, target - HOW_BITS)
-    return data.StructLayout(
-        {
-            "left": Left,
-            "from_unit": 1,
-            "word": ADDRESS_BITS,
-            **({"first": ADDRESS_BITS} if program.times.ports > 1 else {}),
-            "subtract": 1,
-            "by_sign": 1,
-            "keep": 1,
-            "writes": 1,
-            "start": Start,
-            "output": 3,
-            "jump": Jump,
-            "how": HOW_BITS,
-            "store": store,
-        }
-    )
-
-
-def _encoded(program: Program, one: Instruction, layout: data.StructLayout, at: Sequence[int]) -> int:
-    """Return an instruction as the program memory holds it; `at` is where each one stands."""
-    where, nothing = program.addresses, FIRST_INPUT + len(INPUTS)
-    inputs = {f"${name}": FIRST_INPUT + number for number, name in enumerate(INPUTS)}
-    first, word = ({**where, **inputs, "": nothing, "~": nothing}[name] for name in (one.first, one.word))
-    if one.first and program.times.ports == 1:
-        word = first
-    how, store = program.number(one), where[one.store]
-    if one.target:
-        target = at[program.code.labels[one.target]]
-        how, store = target & ((1 << HOW_BITS) - 1), target >> HOW_BITS
-    values = {
-        "left": one.left,
-        "from_unit": one.word == "~",
-        "word": word,
-        "first": first,
-        "subtract": one.subtract,
-        "by_sign": one.by_sign,
-        "keep": one.keep,
-        "writes": bool(one.store),
-        "start": one.start,
-        "output": OUTPUTS.index(one.output),
-        "jump": one.jump,
-        "how": how,
-        "store": store,
-    }
-    return sum(values[name] << field.offset for name, field in layout)  # `layout.const` takes a hundred times as long
 
 
 class TrackMachine(wiring.Component):
@@ -118,13 +67,13 @@ class TrackMachine(wiring.Component):
 
     def _store_program(self) -> None:
         program = self._program
-        self._layout = layout = _layout(program)
+        self._layout = layout = layout_of(program)
         # Nothing needs them to be in order, so a shift register with feedback takes the place of a counter.
         self._states = at = states_of(len(program.code.instructions).bit_length())
         code = dict(zip(at, enumerate(program.code.instructions), strict=False))
         places = [code.get(place) for place in range(len(at) + 1)]
         texts = [f"instruction {one[0]}: {one[1].text}" if one else "" for one in places]
-        words = [_encoded(program, one[1], layout, at) if one else 0 for one in places]
+        words = [encoded(program, one[1], layout, at) if one else 0 for one in places]
         self._rom = CommentedMemory(texts, shape=layout.size, depth=len(places), init=words)
         named = {place: name for name, place in program.addresses.items()}
         self._words = CommentedMemory(
