@@ -23,21 +23,28 @@ _LOW = CHANCE_BITS - DROPPED  # zeros below a product
 class BlockUnit(Unit):
     """A multiplier for half a word, and a barrel shifter in two stages; `tracking_units.BLOCK` has their times.
 
-    A factor may begin while another operation is under way, but not two clocks after a product or a power, which is
-    shifted when it would be. It is used two clocks after its begin, or later. The program sees to both.
+    A factor may begin while another operation is under way, but not so that both would be shifted in one clock: not two
+    clocks after a power, or three after a product. It is used two clocks after its begin, or later. The program sees to
+    both.
     """
 
     def __init__(self, program: Program) -> None:
         super().__init__(program)
         bits = self._bits
-        # Of the doing before.
+        # Of the doing before, and of that before it.
         self.last = Signal(Start)
+        self.last_but_one = Signal(Start)
         self.begins = Signal()  # a product
         self.multiplied = Signal()
         self.ready = Signal()  # a product or a power
         # A product, of the lower half of the word and then of the upper; or a power: its last bit is that of 2^36.
         self.product = Signal(signed(WIDTH + bits), reset_less=True)
         self.distance = Signal(6, reset_less=True)  # that it goes
+        # Of the doing: it seeks the leading one, that of a factor or of a logarithm; by how much it shifts by name.
+        self.seeks = Signal()
+        self.of_factor = Signal()
+        self.of_log = Signal()
+        self.named = Signal(6, reset_less=True)
         # Between both stages of the shifter.
         self.second = Signal(signed(WIDTH + bits + _LOW), reset_less=True)
         self.rest = Signal(6, reset_less=True)
@@ -45,7 +52,7 @@ class BlockUnit(Unit):
         self.second_factor = Signal()
         self.second_log = Signal(name="is_log")
         self.ends = Signal()
-        self.may_be_large = Signal()
+        self.large = Signal()  # a product is beyond ±2^36
         # Behind it.
         self.log_whole = Signal(6)
         self.was_log = Signal()
@@ -57,6 +64,7 @@ class BlockUnit(Unit):
         latencies = Array(C(max(self._program.times.of(item) - 1, 0), 3) for item in Start)
         m.d.comb += self.busy.eq(left.any())
         m.d.sync += [left.eq(Mux(left.any(), left - 1, latencies[self.start])), self.last.eq(self.doing)]
+        m.d.sync += self.last_but_one.eq(self.last)
         self._multiply(m)
         with m.If(self.begins | (self.doing == Start.EXP)):
             m.d.sync += self.distance.eq(Mux(self.doing == Start.EXP, by_power, by_product))
@@ -66,10 +74,16 @@ class BlockUnit(Unit):
 
     def _distances(self, m: Module) -> tuple[Value, Value, Value]:
         """Return how far powers, products, and all others go to the right."""
-        named = Signal(6)
+        named, start = self.named, self.start
         places = Signal(signed(11))
         shifts = Array(C(shift, 6) for _, shift in self._shifts)
-        m.d.comb += [named.eq(shifts[self.how_done]), places.eq(RESULT_BITS - self.whole)]
+        m.d.sync += [
+            named.eq(shifts[self.how]),
+            self.seeks.eq((start == Start.LOG) | (start == Start.BY)),
+            self.of_factor.eq(start == Start.BY),
+            self.of_log.eq(start == Start.LOG),
+        ]
+        m.d.comb += places.eq(RESULT_BITS - self.whole)
         nothing = places[6:-1].any() & ~places[-1]
         by_power = Mux(places[-1] | ~places.any(), 1, places[:6] | nothing.replicate(6))
         by_product = (named + _LOW - self.places)[:6]
@@ -78,26 +92,26 @@ class BlockUnit(Unit):
     def _multiply(self, m: Module) -> None:
         """Multiply the lower half of the word, and then the upper."""
         half = WIDTH // 2
+        operand = Signal(signed(half + 1), reset_less=True)
+        part = Signal(signed(half + 1 + self._bits), reset_less=True)
         low = Signal(half, reset_less=True)
         carried = Signal(self._bits, reset_less=True)
-        upper = Signal(signed(half), reset_less=True)
-        begins, last = self.begins, self.last
-        part = Mux(begins, self.sum[:half], upper) * self.factor
+        begins, last, earlier = self.begins, self.last, self.last_but_one
         power = Cat(C(0, CHANCE_BITS + RESULT_BITS - POWER_BITS - _LOW), self.table.data[:POWER_BITS], C(1, 1))
         m.d.sync += [
             begins.eq(self.start == Start.TIMES),
-            Cat(low, carried).eq(Mux(begins, part, 0)),
-            upper.eq(self.sum[half:]),
+            operand.eq(Mux(begins, self.sum[half:].as_signed(), self.coming)),
+            part.eq(operand * self.factor),
+            Cat(low, carried).eq(Mux(last == Start.TIMES, part, 0)),
             self.product.eq(Mux(last == Start.EXP, power, Cat(low, part + carried).as_signed())),
-            self.multiplied.eq(last == Start.TIMES),
-            self.ready.eq((last == Start.TIMES) | (last == Start.EXP)),
+            self.multiplied.eq(earlier == Start.TIMES),
+            self.ready.eq((earlier == Start.TIMES) | (last == Start.EXP)),
         ]
 
     def _shift_far(self, m: Module, by_shift: Value) -> None:
         """Shift by 32, 16 and 8 places."""
-        doing = self.doing
-        finds, factor = (doing == Start.LOG) | (doing == Start.BY), doing == Start.BY
-        size = (self.sum ^ ((doing == Start.LOG) & self.sum[-1]).replicate(WIDTH))[:WIDTH]
+        finds, factor = self.seeks, self.of_factor
+        size = (self.sum ^ (self.of_log & self.sum[-1]).replicate(WIDTH))[:WIDTH]
         value = Signal.like(self.second, reset_less=False)
         places = Signal(6)
         begin = self._bits - 1 - CHANCE_BITS  # from here on a factor is too large
@@ -112,14 +126,16 @@ class BlockUnit(Unit):
             ),
             places.eq(Mux(self.ready, self.distance, found)),
         ]
+        above = self.product[CHANCE_BITS + RESULT_BITS - _LOW :]
+        beyond = (above ^ self.product[-1].replicate(len(above))) >> self.distance
         m.d.sync += [
             self.second.eq(self.shifted(m, value, places, (5, 4, 3))),
             self.rest.eq(places),
             self.second_finds.eq(finds),
             self.second_factor.eq(factor),
-            self.second_log.eq(doing == Start.LOG),
-            self.ends.eq(self.ready | (doing == Start.OVER)),
-            self.may_be_large.eq(self.multiplied),
+            self.second_log.eq(self.of_log),
+            self.ends.eq(self.ready | (self.doing == Start.OVER)),
+            self.large.eq(self.multiplied & beyond.any()),
         ]
 
     def _shift_near(self, m: Module) -> Value:
@@ -143,11 +159,7 @@ class BlockUnit(Unit):
         """Show what was shifted or looked up, held within 2^36 if it is a product."""
         found, data = shifted[CHANCE_BITS : CHANCE_BITS + WIDTH], self.table.data
         looked_up = Signal()
-        large = Signal()
-        m.d.comb += [
-            looked_up.eq(self.was_log | self.was_gain),
-            large.eq(self.may_be_large & self.too_large(shifted)),
-        ]
+        m.d.comb += looked_up.eq(self.was_log | self.was_gain)
         read = Cat(data[:LOG_BITS], Mux(self.was_log, self.log_whole, data[LOG_BITS:]))
         low = Mux(looked_up, read, found[:TABLE_BITS])
         with m.If(self.ends | looked_up):
@@ -157,11 +169,11 @@ class BlockUnit(Unit):
             ]
         with m.If(looked_up):
             m.d.sync += self.result[TABLE_BITS:].eq(0)
-        with m.If(large):
+        with m.If(self.large):
             m.d.sync += [
                 self.result[:RESULT_BITS].eq(0),
                 self.result[RESULT_BITS].eq(1),
-                self.result[RESULT_BITS + 1 :].eq(shifted[-1].replicate(WIDTH - RESULT_BITS - 1)),
+                self.result[RESULT_BITS + 1 :].eq(self.second[-1].replicate(WIDTH - RESULT_BITS - 1)),
                 self.up.eq(0),
             ]
 

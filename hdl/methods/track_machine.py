@@ -1,6 +1,6 @@
 """The machine of the tracking method: one adder, one accumulator, a memory, a program, and a unit."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import reduce
 from operator import and_, or_
 
@@ -17,8 +17,8 @@ from tachometry.hdl.wires.commented_memory import CommentedMemory
 from tachometry.hdl.wires.ports import by_name
 from tachometry.spec.formats.tracking import PLACE_BITS, WIDTH
 from tachometry.spec.formats.tracking_code import ADDRESS_BITS, FIRST_INPUT, INPUTS, OUTPUTS, Program
-from tachometry.spec.formats.tracking_instruction import CHOSEN, Jump
-from tachometry.spec.formats.tracking_units import BLOCK, Start
+from tachometry.spec.formats.tracking_instruction import CHOSEN, EARLY, Jump
+from tachometry.spec.formats.tracking_units import BLOCK, STAGES, Start
 
 _PLACES_BITS = PLACE_BITS - 1 - 6  # twice the places, over 64
 
@@ -26,9 +26,8 @@ _PLACES_BITS = PLACE_BITS - 1 - 6  # twice the places, over 64
 class TrackMachine(wiring.Component):
     """Runs the program once for every tick; `spec.formats.tracking_code` defines each instruction.
 
-    While an instruction is executed, the word of the next one is read, and the one behind that is fetched; with more
-    stages, there is a register in front of the memory of words and one behind it. All wait while one needs the unit,
-    and that is busy.
+    An instruction is fetched, and executed three clocks later: there is a register in front of the memory of words and
+    one behind it. All wait while one needs the unit, and that is busy.
 
     Where a word is read at a time, cells are saved: the sum is cleared where the next instruction does not take it, and
     inputs are cleared where they are not read, as a reset of registers takes no cell. So the unit and the outputs take
@@ -98,6 +97,8 @@ class TrackMachine(wiring.Component):
         self.hold = Signal()  # all wait for the unit
         self.go = Signal()
         self.taken = Signal()  # a jump is
+        self.ahead = Signal(self._layout, reset_less=True)  # the instruction before `fetched`, of the quick machine
+        self.early = Signal()  # it jumps, as no sum decides
         self.stop = Signal()
         self.selects = Signal()  # the condition is one to store the sum, and not to jump
         self.passed = Signal()  # it is not met
@@ -112,11 +113,10 @@ class TrackMachine(wiring.Component):
         self.used = Signal(attrs={"keep": "true"})  # the sum is the first term
         self.from_unit = Signal()  # and the result of the unit is the second
         self.negative = self.sum_[-1]
-        self.word = self._read.data
+        self.word = Signal(signed(WIDTH), name="word", reset_less=True)
         self.made = self.sum_  # the unit and the outputs take it
         if not self._two:
             self.negative = Signal(name="negative")
-            self.word = Signal(signed(WIDTH), name="word", reset_less=True)
             self.made = self.total
 
     @property
@@ -141,8 +141,9 @@ class TrackMachine(wiring.Component):
         m.d.comb += self.used.eq(Mux(below, least_or_sum, most_or_sum))
         # Where no word is meant one is read that is 0, and so is an input where none is; it is a first term.
         if self._two:
-            left = Mux(self.used, self.sum_, 0) | self._take_input(m, coming) | added
+            left = Mux(self.used, self.sum_, 0) | self._take_words(m, coming, added)
             minus = self.now.subtract ^ (self.now.by_sign & self.sign)
+            m.d.comb += self.unit.coming.eq(self.total)
         else:
             left, minus = self.sum_, self._take_word(m, coming, earlier, below)
         self._add(m, left, minus, follows)
@@ -156,13 +157,15 @@ class TrackMachine(wiring.Component):
 
     def _read_words(self, m: Module, fetched: data.View) -> Value:
         """Fetch an instruction, and read the words of the one before; return the second one."""
-        address = self._at(self._chosen(m, fetched.word))
-        if not self._two:
-            held = Signal.like(Value.cast(address), name="held", reset_less=True)
-            m.d.sync += held.eq(Mux(self.hold, held, address))
-            address = held
+        following: Value = self.pc
+        if self._two:
+            following = Mux(self.early, Cat(self.ahead.how, self.ahead.store), following)
+        if self._two:  # what the block RAM gives comes late
+            address = self._at(self._chosen(m, self._held(m, fetched.word)))
+        else:
+            address = self._held(m, self._at(self._chosen(m, fetched.word)))
         m.d.comb += [
-            self.place.eq(Mux(self.taken, Cat(self.now.how, self.now.store), self.pc)),
+            self.place.eq(Mux(self.taken, Cat(self.now.how, self.now.store), following)),
             self._fetch.addr.eq(self.place),
             self._fetch.en.eq(~self.hold),
             self._read.addr.eq(address),
@@ -172,19 +175,29 @@ class TrackMachine(wiring.Component):
         if not self._two:
             return C(0, signed(WIDTH))
         second = self._words.read_port()
-        m.d.comb += [second.addr.eq(self._at(fetched.first)), second.en.eq(~self.hold)]
+        m.d.comb += [second.addr.eq(self._at(self._held(m, fetched.first))), second.en.eq(~self.hold)]
         return second.data
+
+    def _held(self, m: Module, address: Value) -> Value:
+        """Return what addresses a word, a clock later."""
+        held = Signal(len(address), name="held", reset_less=True)
+        m.d.sync += held.eq(Mux(self.hold, held, address))
+        return held
 
     def _execute(self, m: Module, fetched: data.View) -> tuple[data.View, data.View, Value]:
         """Move instructions on to `now`; return the two before it, and whether the latter follows."""
-        coming, valid = fetched, self.fetched
+        coming, valid = fetched, self.fetched & ~self.early if self._two else self.fetched
         earlier = coming
-        for _ in range(self._program.times.stages - 1):
+        for stage in range(STAGES - 1):
             earlier = coming
-            following = Signal(self._layout, reset_less=True)
+            following = (
+                self.ahead if self._two and not stage else Signal(self._layout, name="following", reset_less=True)
+            )
             follows = Signal()
             with m.If(~self.hold):
                 m.d.sync += [following.eq(coming), follows.eq(valid & ~self.taken & ~self.stop)]
+            if following is self.ahead:
+                m.d.comb += self.early.eq(follows & self._is_met(following.jump, EARLY))
             coming, valid = following, follows
         is_next = valid & ~self.taken & ~self.stop
         with m.If(~self.hold):
@@ -203,15 +216,16 @@ class TrackMachine(wiring.Component):
         with m.If(self.begin):
             m.d.sync += self.fetched.eq(1)
 
-    def _take_input(self, m: Module, coming: data.View) -> Value:
-        """Return the input that an instruction with two words takes."""
-        given = Signal(signed(WIDTH), reset_less=True)
+    def _take_words(self, m: Module, coming: data.View, added: Value) -> Value:
+        """Take both words of an instruction, or an input in the place of the second, and return that one."""
+        second = Signal(signed(WIDTH), reset_less=True)
+        given = Signal(signed(WIDTH))
+        with m.If(coming.first[3:] == FIRST_INPUT >> 3):
+            inputs = Array((*self._inputs(), C(0)))  # as many as its index selects
+            m.d.comb += given.eq(inputs[coming.first[:3]])
         with m.If(~self.hold):
-            m.d.sync += [self.from_unit.eq(coming.from_unit), given.eq(0)]
-            with m.If(coming.first[3:] == FIRST_INPUT >> 3):
-                inputs = Array((*self._inputs(), C(0)))  # as many as its index selects
-                m.d.sync += given.eq(inputs[coming.first[:3]])
-        return given
+            m.d.sync += [self.from_unit.eq(coming.from_unit), self.word.eq(self._read.data), second.eq(added | given)]
+        return second
 
     def _take_word(self, m: Module, coming: data.View, earlier: data.View, below: Value) -> Value:
         """Take the word or input of an instruction; return whether it is subtracted."""
@@ -283,6 +297,19 @@ class TrackMachine(wiring.Component):
 
     def _jump(self, m: Module) -> None:
         """Jump if the condition is met."""
+        if self._two:
+            is_met = self._is_met(self.now.jump, tuple({*Jump} - {*EARLY}))
+            m.d.comb += self.passed.eq(self.selects & ~is_met)
+            is_met &= ~self.selects
+        else:
+            is_met = self._is_met(self.now.jump, tuple(Jump))
+        m.d.comb += [
+            self.taken.eq(self.go & is_met),
+            self.stop.eq(self.go & (self.now.jump == Jump.END)),
+        ]
+
+    def _is_met(self, condition: Value, among: Sequence[Jump]) -> Value:
+        """Return whether a condition is met that is among some."""
         empty, one = ~self.number.any(), self.number == 1
         met = {
             Jump.ALWAYS: C(1, 1),
@@ -291,14 +318,7 @@ class TrackMachine(wiring.Component):
             Jump.EMPTY: empty,
             Jump.ONE: one,
         }
-        is_met = Cat(met.get(jump, C(0, 1)) for jump in Jump).bit_select(self.now.jump, 1)
-        if self._two:
-            m.d.comb += self.passed.eq(self.selects & ~is_met)
-            is_met &= ~self.selects
-        m.d.comb += [
-            self.taken.eq(self.go & is_met),
-            self.stop.eq(self.go & (self.now.jump == Jump.END)),
-        ]
+        return Cat(met.get(jump, C(0, 1)) if jump in among else C(0, 1) for jump in Jump).bit_select(condition, 1)
 
     def _contents(self) -> list[int]:
         """Return the first words of all axes."""

@@ -10,6 +10,7 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import only_if
 from tachometry.spec.formats.tracking import (
     CHANCE_BITS,
     EXP_INDEX,
@@ -24,7 +25,7 @@ from tachometry.spec.formats.tracking import (
     WIDTH,
 )
 from tachometry.spec.formats.tracking_code import HOW_BITS, Program
-from tachometry.spec.formats.tracking_units import Start
+from tachometry.spec.formats.tracking_units import BLOCK, Start
 
 _GAIN_LOW = LOG_BITS - (GAIN_STEPS - 1).bit_length()
 
@@ -39,6 +40,7 @@ class Unit(wiring.Component):
                 "start": In(Start),  # the operation that begins; none does while the unit is busy
                 "how": In(HOW_BITS),  # number of the shift, or of the table of gains
                 "sum": In(signed(WIDTH)),  # the operand; the block unit takes it a clock later
+                **only_if(program.times == BLOCK, coming=In(WIDTH // 2)),  # its lower half, a clock earlier
                 "busy": Out(1),  # the result is not there yet
                 "result": Out(signed(WIDTH)),
                 "up": Out(1),  # the result is to be rounded up, by one

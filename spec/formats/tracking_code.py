@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 from tachometry.spec.formats.tracking import Tracking
-from tachometry.spec.formats.tracking_instruction import CHOSEN, OFFSETS, Code, Instruction, Jump, Left
+from tachometry.spec.formats.tracking_instruction import CHOSEN, EARLY, OFFSETS, Code, Instruction, Jump, Left
 from tachometry.spec.formats.tracking_listing import LISTING
 from tachometry.spec.formats.tracking_order import joined, selected, spaced
-from tachometry.spec.formats.tracking_units import Start, Times
+from tachometry.spec.formats.tracking_units import STAGES, Start, Times
 
 SMOOTH = ("velocity_smooth", "smooth_delay")
 SMOOTH_DELAY_BITS = 32
@@ -99,10 +99,10 @@ def _paired(chain: list[Instruction]) -> list[Instruction]:
 
 
 @cache
-def assembled(listing: str = LISTING, apart: int = 2, ports: int = 1, **kind: bool) -> Code:
+def assembled(listing: str = LISTING, ports: int = 1, **kind: bool) -> Code:
     """Return the instructions of a listing, with some that do nothing where a word would be read too early.
 
-    The one that reads a word is `apart` instructions behind one that stores it, or more. Each reads `ports` words.
+    The one that reads a word is `APART` instructions behind one that stores it, or more. Each reads `ports` words.
     """
     code: list[Instruction] = []
     labels: dict[str, int] = {}
@@ -132,7 +132,7 @@ def assembled(listing: str = LISTING, apart: int = 2, ports: int = 1, **kind: bo
             code += _paired(chain) if ports > 1 else chain
     if ports > 1:
         code, labels = selected(code, labels)
-    return spaced(joined(code, labels), apart, ports)
+    return spaced(joined(code, labels), ports)
 
 
 @cache
@@ -144,7 +144,7 @@ def _longest(times: Times, output: str = "", **kind: bool) -> int:
 def _longest_of(counts: int, times: Times, output: str, kind: Mapping[str, bool]) -> int:
     """Return them for no count, one, or several; nothing else of how ways exclude each other is known."""
     known = {Jump.ALWAYS: True, Jump.END: True, Jump.EMPTY: counts == 0, Jump.ONE: counts == 1}
-    made = assembled(apart=times.apart, ports=times.ports, **kind)
+    made = assembled(ports=times.ports, **kind)
     code, labels = made.instructions, made.labels
     entry: dict[int, tuple[int, int]] = {labels["tick"]: (0, 0)}  # clock, and when the unit has finished
     longest, open_ = 0, {labels["tick"]}
@@ -163,7 +163,7 @@ def _longest_of(counts: int, times: Times, output: str, kind: Mapping[str, bool]
             continue
         following = [] if known.get(one.jump) else [(place + 1, clock)]
         if one.target and known.get(one.jump, True):
-            following.append((labels[one.target], clock + times.stages))
+            following.append((labels[one.target], clock + (1 if times.ports > 1 and one.jump in EARLY else STAGES)))
         for after, at in following:
             before = entry.get(after, (-1, -1))
             now = max(before[0], at), max(before[1], free)
@@ -186,7 +186,7 @@ class Program:
     @cached_property
     def code(self) -> Code:
         """The instructions."""
-        return assembled(apart=self.times.apart, ports=self.times.ports, **self._kind)
+        return assembled(ports=self.times.ports, **self._kind)
 
     @property
     def _kind(self) -> dict[str, bool]:

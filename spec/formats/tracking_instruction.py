@@ -28,6 +28,8 @@ class Jump(IntEnum):
     END = 6
 
 
+EARLY = (Jump.ALWAYS, Jump.EMPTY, Jump.ONE)  # no sum decides, so the quick machine jumps two clocks earlier
+
 OFFSETS = ("o0", "o1", "o2", "o3")
 CHOSEN = ("o@last", "o@up", "o@down", "o@m1", "o@m2", "o@m3")  # an offset that the tick chooses
 

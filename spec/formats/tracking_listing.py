@@ -59,10 +59,9 @@ known:
     a product half_velocity
     edges e = raw - edge keep; share = log_dt - log_T
     w = sum lo+ growing
-    block step = zero
     block t = v + ~ product place
     edges block $number by
-    block V = t - v + t
+    block step = zero; block V = t - v + t
     serial t = v + ~
     serial V = sum + ~
     serial step = zero
@@ -219,9 +218,9 @@ ready:                                  # growth of the memory and noise, for th
     minus_Ds = zero - D; growth = zero; after = minus_one
     limit = order + ~ + ~
     lag log
-    w = order_lag - log_X - limit
-    edges slack = half
-    trouble = ~ + w + ~                 # lag² over 7/2 U
+    serial w = order_lag - log_X - limit; edges slack = half
+    block trouble = order_lag - log_X - limit + ~ + ~
+    serial trouble = ~ + w + ~          # lag² over 7/2 U
     D over 2
     log_X + log_256; if neg goto long
     edges {; log_X + log_64; if neg goto some

@@ -2,33 +2,40 @@
 
 from dataclasses import replace
 
-from tachometry.spec.formats.tracking_instruction import Code, Instruction, Jump, Left, same
-from tachometry.spec.formats.tracking_units import Start
+from tachometry.spec.formats.tracking_instruction import EARLY, Code, Instruction, Jump, Left, same
+from tachometry.spec.formats.tracking_units import APART, Start
 
 _MOST_SELECTED = 4  # instructions: a jump that is taken costs as much
 _OF_STORE = ("first", "word", "subtract", "by_sign", "keep", "store")
 
 
-def spaced(code: Code, apart: int, ports: int) -> Code:
+def spaced(code: Code, ports: int) -> Code:
     """Return a code with enough instructions between a word's change and its use."""
     made: list[Instruction] = []
     places: list[int] = []
     for one in code.instructions:
-        reads, backs = one.reads, range(1, min(apart, len(made) + 1))
+        reads, backs = one.reads, range(1, min(APART, len(made) + 1))
         near = (back for back in backs if any(same(made[-back].store, word) for word in reads))
-        made += [Instruction()] * (apart - next(near, apart))
-        if ports > 1 and _clash(one, *made[:-3:-1]):
+        made += [Instruction()] * (APART - next(near, APART))
+        while ports > 1 and (
+            _clash(one, *made[:-4:-1]) or _clash(_target(code, one), Instruction(), one, *made[:-2:-1])
+        ):
             made.append(Instruction())
         places.append(len(made))
         made.append(one)
     return Code(tuple(made), {label: places[place] for label, place in code.labels.items()})
 
 
+def _target(code: Code, one: Instruction) -> Instruction:
+    """Return the instruction to which one of the quick machine jumps early, which is two clocks later; or nothing."""
+    return code.instructions[code.labels[one.target]] if one.target and one.jump in EARLY else Instruction()
+
+
 def _clash(one: Instruction, *others: Instruction) -> bool:
-    """Return whether an instruction is too early for the block unit, as of the two before it; see `BlockUnit`."""
-    before, second = (*others, Instruction(), Instruction())[:2]
+    """Return whether an instruction is too early for the block unit, as of three before it; see `BlockUnit`."""
+    before, second, third = (*others, *[Instruction()] * 3)[:3]
     if one.start == Start.BY:
-        return second.start in (Start.TIMES, Start.EXP)
+        return second.start == Start.EXP or third.start == Start.TIMES
     return before.start == Start.BY and (one.start == Start.TIMES or one.how == "by")
 
 
@@ -55,10 +62,13 @@ def selected(code: list[Instruction], labels: dict[str, int]) -> tuple[list[Inst
     for place, one in enumerate(code):
         opposite = {Jump.NEG: Jump.POS, Jump.POS: Jump.NEG}.get(one.jump)
         if opposite and one == Instruction(jump=one.jump, target=one.target):
-            passed = range(place + 1, labels[one.target])
-            stores = all(_is_store(code[each]) and each not in entered for each in passed)
-            if 0 < len(passed) <= _MOST_SELECTED and stores and not _takes_sum(code, labels, passed.stop):
-                code[place + 1 : passed.stop] = [replace(code[each], jump=opposite) for each in passed]
+            at = after = place + 1
+            while _is_store(code[after]) and after not in entered:
+                after += 1
+            met = labels[one.target]  # where the jump would go on
+            same_way = after == met or code[after] == code[met] == Instruction(jump=Jump.END)
+            if 0 < after - at <= _MOST_SELECTED and same_way and not _takes_sum(code, labels, after):
+                code[at:after] = [replace(each, jump=opposite) for each in code[at:after]]
                 skipped.add(place)
     made = _without(code, labels, skipped)
     return [*made.instructions], {**made.labels}

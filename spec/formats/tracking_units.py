@@ -19,6 +19,10 @@ class Start(IntEnum):
     CHANCE = 7
 
 
+STAGES = 3  # clocks from when an instruction is fetched until it is executed, which are lost when a jump is taken
+APART = 3  # instructions from one that stores a word to the first that reads it
+
+
 @dataclass(frozen=True)
 class Times:
     """Clocks from the begin of an operation of the unit until its result can be used."""
@@ -30,26 +34,19 @@ class Times:
     gain: int
     by: int
     times: int
-    # clocks from when an instruction is fetched until it is executed, which are lost when a jump is taken: 1, or 3
-    stages: int = 1
     ports: int = 1
-
-    @property
-    def apart(self) -> int:
-        """Instructions from one that stores a word to the first that reads it."""
-        return (self.stages + 3) // 2
 
     @property
     def fetch_clocks(self) -> int:
         """Clocks to fetch the first instruction, to read its word, and to hold the result; with two ports twice."""
-        return self.stages + 1 + self.ports
+        return STAGES + 1 + self.ports
 
     def of(self, start: Start) -> int:
         """Return those of what begins; 0: nothing."""
         return getattr(self, start.name.lower(), 0)
 
 
-BLOCK = Times(log=4, exp=5, over=3, gain=3, by=0, times=5, ports=2)
+BLOCK = Times(log=4, exp=5, over=3, gain=3, by=0, times=6, ports=2)
 
 
 @dataclass(frozen=True)
@@ -123,9 +120,7 @@ class Serial:
         )
         read = self._steps(self.read_pairs)
         times = 5 + self.digits + product
-        return Times(
-            log=8 + log + read, exp=5 + power, over=5 + over, gain=5 + read, by=5 + factor, times=times, stages=3
-        )
+        return Times(log=8 + log + read, exp=5 + power, over=5 + over, gain=5 + read, by=5 + factor, times=times)
 
     @staticmethod
     def _steps(pairs: int) -> int:

@@ -12,9 +12,10 @@ from support.tracking import Interpreter, core, windows
 from tachometry.hdl.methods import track_machine
 from tachometry.sim.golden.methods.track_recursion import Recursion, log2
 from tachometry.spec import TrackTachometer
-from tachometry.spec.formats.tracking_code import Program
+from tachometry.spec.formats.tracking import RESULT_BITS, WIDTH
+from tachometry.spec.formats.tracking_code import Program, assembled
 from tachometry.spec.formats.tracking_instruction import Instruction
-from tachometry.spec.formats.tracking_units import Start
+from tachometry.spec.formats.tracking_units import BLOCK, Start
 
 CORES = {
     "serial": core(multiplier="serial", clock="12MHz", tick="200us", max_speed="500rad/s", max_time="8ms"),
@@ -24,9 +25,8 @@ CORES = {
 NAMES = ("number", "times", "places", "last", "moved", "kind", "down", "end", "length")
 
 
-def check(spec: TrackTachometer, rows: Sequence[Sequence[int]], play: Player = clock_by_clock) -> int:
+def check(program: Program, rows: Sequence[Sequence[int]], play: Player = clock_by_clock) -> int:
     """Begin a tick as soon as may be: outputs hold what they must, in their clock; how many instructions were met."""
-    program = spec.program
     spacing = program.all_clocks
     inputs: list[dict[str, int]] = []
     for row in rows:
@@ -55,16 +55,41 @@ def rows_of(spec: TrackTachometer, seed: int, n_ticks: int) -> list[tuple[int, .
 @pytest.mark.parametrize("name", CORES)
 def test_machine(name: str) -> None:
     spec = CORES[name]
-    met = check(spec, rows_of(spec, 1, 1000), compiled.clock_by_clock)
+    met = check(spec.program, rows_of(spec, 1, 1000), compiled.clock_by_clock)
     assert met > 0.9 * len(spec.program.code.instructions)
+
+
+class Chosen(Program):
+    """A program that stores two words and a sign on a condition."""
+
+    code = assembled(
+        """
+        reset: a = one; b = one
+        tick: $moved - a keep; if neg goto there
+        a = $moved - b; b = $times - one keep
+        there: zero s+ one out velocity
+        a out velocity_std; b out acceleration; a + b out position_fine; end
+        """.replace(": ", ":\n").replace("a out", "c = b; " * 99 + "a out"),  # of a usual length
+        ports=2,
+    )
+
+
+def test_what_a_condition_chooses() -> None:
+    """Of two stores the second has the same condition, whatever the first one stored."""
+    program, rng = CORES["block"].program, np.random.default_rng(1)
+    chosen = Chosen(program.form, program.times, 0)
+    assert sum(bool(one.store and one.jump) for one in chosen.code.instructions) == 2
+    rows = [(1, int(rng.integers(9)), 0, 0, int(rng.integers(-9, 9)), 0, 0, 0, 1) for _ in range(12)]
+    check(chosen, rows)
 
 
 def results(program: Program, operations: Sequence[tuple[Instruction, int]], clocks: int) -> list[int]:
     """Return what the unit gives for instructions and operands, so many clocks apart."""
     rows: list[dict[str, int]] = []
     for one, operand in operations:
-        # The block unit takes the sum in the clock after the start.
+        # The block unit takes the sum in the clock after the start, but half of a product's in that of the start.
         begins = {"start": one.start, "how": program.number(one), "sum": operand}
+        begins |= {"coming": operand % (1 << WIDTH // 2)} if program.times is BLOCK else {}
         rows += [begins, *[begins | {"start": Start.NONE}] * (clocks - 1)]
     seen = clock_by_clock(track_machine.TrackMachine(program).unit, rows, ["result", "busy"])[clocks - 1 :: clocks]
     assert not any(row["busy"] for row in seen)
@@ -103,3 +128,20 @@ def test_logarithms(name: str) -> None:
     values = [0, -1, 1, *(sign * ((1 << k) - less) for k in range(1, 38, 5) for less in (0, 1) for sign in (1, -1))]
     operations = [(Instruction(start=Start.LOG), value) for value in values]
     assert results(CORES[name].program, operations, 48) == [log2(value) for value in values]
+
+
+@pytest.mark.parametrize("name", CORES)
+def test_products(name: str) -> None:
+    """Many are near a bound of theirs, to either side."""
+    program, rng = CORES[name].program, np.random.default_rng(1)
+    right = Recursion(program.form, program.ahead)
+    right._chance = 0
+    operations, products = [], []
+    for how in ("half_velocity", "place", "mean", "velocity") * 16:
+        factor = int(rng.integers(1 << 15, 1 << 16)) >> int(rng.integers(14))
+        bound = (1 << RESULT_BITS + program.form.shifts[how]) // factor
+        operand = int(rng.choice([-1, 1])) * min(int(bound * rng.uniform(0.3, 3)), (1 << WIDTH - 1) - 1)
+        operations += [(Instruction(start=Start.BY), factor), (Instruction(start=Start.TIMES, how=how), operand)]
+        products.append(right._product(operand, factor, how))
+    assert results(program, operations, 48)[1::2] == products
+    assert {-(1 << RESULT_BITS), 1 << RESULT_BITS} <= {*products}

@@ -165,7 +165,7 @@ CASES = [
     _case(
         "track",
         "block, external tick",
-        280,
+        300,
         13,
         5,
         500,
@@ -173,7 +173,7 @@ CASES = [
         frac_bits=None,
         multiplier="block",
         external_tick=True,
-        max_tick_cycles=320,
+        max_tick_cycles=340,
         **_FRONT,
     ),
 ]

@@ -118,6 +118,8 @@ def test_a_jump_adds_the_term_behind_it(lines: str, word: str) -> None:
         ("a + b; if pos goto there; c = ~ keep; e = d + a; there:; b", "ce"),
         ("a + b; if neg goto there; c = d; there:; one + two; if neg goto there; end", "c"),
         ("a + b; if neg goto there; c = d; there:; if one goto back; d; back:; e; end", "c"),
+        ("if one goto there; a + b; if neg goto there; c = d; end; there:; end", "c"),  # both ways end
+        ("if one goto there; a + b; if neg goto there; c = d; end; there:; a; end", ""),
         ("a + b; if neg goto there; c = d; there:; sum + e; end", ""),  # there the sum is still needed
         ("a + b; if neg goto there; c = d; there:; if neg goto there; end", ""),
         ("a + b; if neg goto there; c = d; there:; if one goto back; sum + d; back:; e; end", ""),
@@ -161,12 +163,15 @@ def test_two_terms_are_added_at_once(line: str, terms: list[tuple[str, str]]) ->
         ("a by; b over by", 1),
         ("a by; b over 1", 0),
         ("a product time; b by", 0),
-        ("a product time; b; c by", 1),  # both would shift at once
+        ("a product time; b; c by", 0),
+        ("a product time; b; c; d by", 1),  # both would shift at once
         ("a exp; b; c by", 1),
         ("a exp; b; c; d by", 0),
-        ("a = b; c = d + a", 1),  # it is not written yet
-        ("a = b; c = a + d", 1),
-        ("a = b; c; d = a + c", 0),
+        ("a product time; goto there; back:; b; end; there:; c by; goto back", 1),  # two clocks behind the jump
+        ("a product time; b; goto there; back:; c; end; there:; d by; goto back", 0),
+        ("a = b; c = d + a", 2),  # it is not written yet
+        ("a = b; c = a + d", 2),
+        ("a = b; c; d; e = a + c", 0),
     ],
 )
 def test_what_comes_too_early_waits(listing: str, idle: int) -> None:
