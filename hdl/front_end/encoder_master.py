@@ -1,5 +1,7 @@
 """The ports and the report that masters of absolute encoders have in common."""
 
+from typing import Any
+
 from amaranth import Module, Mux, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
@@ -41,6 +43,12 @@ class EncoderMaster(wiring.Component):
 
     def _synchronise(self, m: Module, reads: Reads, frame: Frame) -> None:
         m.submodules[f"sync_{reads.line}"] = Synchronizer(by_name(self, [reads.line])[reads.line], frame.line)
+
+    def _recover(self, m: Module, machine: Any) -> None:
+        """Let the master rest after an upset to no state of its machine, an FSM."""
+        self.state = machine.state
+        with m.If(self.state >= len(machine.encoding)):
+            m.d.sync += self.state.eq(0)
 
     def _report(self, m: Module, frame: Frame, reason: Value, warning: Value, age: Value) -> None:
         """Drive the record of a read that is done or left out."""

@@ -39,7 +39,7 @@ class SerialEncoder(EncoderMaster):
         self._synchronise(m, reads, frame)
         m.d.sync += [frame.at.eq(Mux(frame.beat, 2 * reads.half - 1, frame.at - 1)), frame.time.eq(frame.time + 1)]
         self._run_clock(m, frame)
-        with m.FSM():
+        with m.FSM() as machine:
             with m.State("IDLE"):
                 m.d.comb += frame.idle.eq(1)
                 m.d.sync += [
@@ -61,6 +61,7 @@ class SerialEncoder(EncoderMaster):
                 m.d.comb += frame.rests.eq(1)
                 with m.If(frame.time == reads.rest - 2):
                     m.next = "IDLE"
+        self._recover(m, machine)
         wrong: Value = frame.unequal
         if reads.crc:
             wrong |= frame.check != self._reads.residue

@@ -36,7 +36,7 @@ class SpiEncoder(EncoderMaster):
         self._synchronise(m, reads, frame)
         m.d.comb += [self.spi_sck.eq(frame.sck), self.spi_cs_n.eq(frame.cs_n)]
         m.d.sync += frame.at.eq(frame.at - 1)
-        with m.FSM():
+        with m.FSM() as machine:
             with m.State("IDLE"):
                 m.d.comb += frame.idle.eq(1)
                 m.d.sync += [frame.at.eq(reads.setup - 1), frame.left.eq(WORD_BITS), frame.odd.eq(0)]
@@ -57,6 +57,7 @@ class SpiEncoder(EncoderMaster):
                 m.next = "REST"
             with m.State("REST"), m.If(frame.beat):
                 m.next = "IDLE"
+        self._recover(m, machine)
         wrong, age = ~frame.odd.all(), Value.cast(reads.oldest)
         error = Value.cast(0)
         if reads.late:

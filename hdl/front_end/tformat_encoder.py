@@ -52,7 +52,7 @@ class TformatEncoder(EncoderMaster):
         m.d.comb += frame.ends.eq(frame.beat & (frame.place == _STOP))
         with m.If(frame.beat):
             m.d.sync += frame.place.eq(Mux(frame.ends, 0, frame.place + 1))
-        with m.FSM():
+        with m.FSM() as machine:
             self._request(m, frame)
             with m.State("WAIT"):
                 m.d.sync += [frame.place.eq(0), frame.at.eq(reads.half - 1)]
@@ -73,6 +73,7 @@ class TformatEncoder(EncoderMaster):
                 m.next = "REST"
             with m.State("REST"), m.If(frame.time == reads.rest - 2):
                 m.next = "IDLE"
+        self._recover(m, machine)
         reason = Mux(frame.wrong | frame.check.any(), WRONG_CHECK, Mux(frame.error, ERROR_BIT, 0))
         self._report(m, frame, reason, frame.warning, frame.time)
         return m

@@ -2,16 +2,19 @@
 
 from collections.abc import Iterable
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
+from amaranth.sim import Simulator
 from support.nightly import nightly
 from support.reads import Clocks, play
 
+from tachometry.hdl.core.sampled_tachometer import master_of
 from tachometry.sim.encoder.absolute import Answers, answer, frames
 from tachometry.sim.golden.encoder_read import Line, records
 from tachometry.spec.core.chips import SpiReads
-from tachometry.spec.core.reads import ERROR_BIT, WRONG_CHECK
+from tachometry.spec.core.reads import ERROR_BIT, WRONG_CHECK, Reads
 from tachometry.spec.core.tformat import TformatReads
 
 HZ = 10**8
@@ -52,6 +55,23 @@ def test_an_answer_of_tformat_is_that_of_the_data_sheet() -> None:
     tx = [level[max(clock for clock in level if clock <= 51 + 20 * bit + 10)] for bit in range(10)]
     assert [each & 1 for each in tx] == [0, 0, 1, 0, 1, 1, 0, 0, 0, 1]
     assert [clock for clock, each in pins.tolist() if not each & 2] == [0, 251, start[1] + 201]
+
+
+@pytest.mark.parametrize("reads", [Reads(9, HZ, 10**7), AS5047P, TFORMAT])
+def test_a_master_rests_after_an_upset_to_no_state(reads: Reads) -> None:
+    master = master_of(reads)
+    simulator, seen = Simulator(master), []
+
+    async def play(ctx: Any) -> None:
+        for state in (5, 6, 7):
+            ctx.set(master.state, state)
+            await ctx.tick()
+            seen.append(ctx.get(master.state))
+
+    simulator.add_clock(1e-6)
+    simulator.add_testbench(play)
+    simulator.run()
+    assert seen[-2:] == [0, 0]
 
 
 def _select(pins: Clocks) -> list[tuple[Clocks, Clocks, int, int]]:
