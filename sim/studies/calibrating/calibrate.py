@@ -153,7 +153,7 @@ def _without_slips(run: Run, n: int) -> Iterator[Run]:
     turns = displacement[: len(displacement) // n * n].reshape(-1, n)
     change = np.sqrt(np.mean(np.diff(turns, axis=0) ** 2, axis=1))
     most = max(_DIFFERS, 1 + 5 / np.sqrt(2 * n))  # of few edges the usual difference varies more
-    differs = change > most * np.median(change)
+    differs = change > most * (np.median(change) if len(change) else 0)
     spoilt = np.concatenate([[True], np.append(differs, False) | np.append(False, differs), [True]])
     for number, (begin, end) in enumerate(np.flatnonzero(np.diff(spoilt)).reshape(-1, 2).tolist()):
         first = start + begin * n if begin else 0
