@@ -99,9 +99,9 @@ BOUNDED = (
     Mapped("mt", "disc=slow.json disc-table=sectors index=yes bounds=yes", edges=100, late=True),
 )
 # Beside what shows a place of the shaft.
-_FINE = "disc=far.json index=yes tick=300clk max-time=3000clk"
+_FINE = "disc=far.json index=yes tick=400clk max-time=4000clk"
 BESIDE = (
-    Mapped("track", f"{_FINE} electrical=3 lead=1tick probe=2 stream=axi", edges=60, clocks=120_000),
+    Mapped("track", f"{_FINE} electrical=3 lead=1tick probe=2 stream=axi", edges=60, clocks=120_000, late=True),
     Mapped("track", f"{_FINE} position-compare=1.5:0.25:200:1clk:fine smooth=yes", edges=60, clocks=120_000, late=True),
     Mapped("mt", "disc=far.json index=yes tick=99clk max-time=990clk electrical=3 probe=1", 99, 90_000, late=True),
     Mapped("t", "disc=slow.json disc-table=sectors index=yes position-compare=3:5:20:9clk", edges=100, late=True),

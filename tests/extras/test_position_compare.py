@@ -17,7 +17,7 @@ _TRACK = "position-fine-bits=3 multiplier=block tick=400clk max-time=1600clk pos
 CORES = (
     Case("s", "position-compare=list:3:2clk position-width=8", edges=100),
     Case("m", "position-compare=-20:7:0:1clk:both tick=6clk position-width=8 preset=100 index=yes index-reset=yes"),
-    Case("m", "position-compare=-90:3:50:2clk:both tick=6clk position-width=8"),
+    Case("m", "position-compare=-90:3:50:2clk:both tick=6clk position-width=8", late=True),
     Case("track", f"position-compare=1.5:0.25:40:1clk:fine {_TRACK}", edges=6, clocks=16_000, seed=5),
 )
 BUS = Case("s", "position-compare=list:4:3clk position-width=8", seed=4, swings=True)

@@ -14,7 +14,7 @@ from tachometry.sim.encoder.virtual import VirtualEncoder
 
 CASES = (
     Case("s", "probe=rising,falling,both index=yes"),
-    Case("track", "probe=2 tick=500clk max-time=2000clk preset=40 unit=rpm lowpass=100Hz", edges=10, clocks=20_000),
+    Case("track", "probe=2 tick=500clk max-time=2000clk preset=40 unit=rpm lowpass=100Hz", 10, 20_000, late=True),
     Case("m", "probe=both,both filter=3clk max-speed=100rev/s position-width=8"),
 )
 BUS = Case("s", "probe=rising,falling,both position-width=8", edges=40)

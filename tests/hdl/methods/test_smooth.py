@@ -38,7 +38,7 @@ CASES = (
 
 
 # The last is played in Icarus.
-@pytest.mark.parametrize("case", only(CASES[:2], CASES), ids=lambda case: case.words)
+@pytest.mark.parametrize("case", only(CASES[:1], CASES), ids=lambda case: case.words)
 def test_gates_and_golden_model_agree(case: Case) -> None:
     """No other output differs from that of the core without."""
     spec, updates = case.spec, case.run().updates
