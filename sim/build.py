@@ -5,6 +5,7 @@ import ctypes
 import functools
 import hashlib
 import importlib.util
+import json
 import os
 import re
 import shlex
@@ -14,6 +15,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import platformdirs
 
@@ -198,6 +200,17 @@ def cached(key: str, suffix: str, make: Callable[[Path], Path]) -> Path:
             raise
         raise OSError(f"cannot write to the build cache {folder}: {error.strerror}") from error
     return target
+
+
+def cached_value(key: str, make: Callable[[Path], Any]) -> Any:
+    """Return a value of JSON, as `cached` does a file; `make` returns it, given a folder to work in."""
+
+    def write(folder: Path) -> Path:
+        made = folder / "value"
+        made.write_text(json.dumps(make(folder)), encoding="utf-8")
+        return made
+
+    return json.loads(cached(key, ".json", write).read_text(encoding="utf-8"))
 
 
 def _intact(folder: Path, key: str) -> Path | None:

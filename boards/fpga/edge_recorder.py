@@ -7,10 +7,10 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.boards.fpga.board import Board
 from tachometry.hdl.wires.synchronizer import Synchronizer
-from tachometry.spec.registers.edges import BAUD, EDGE, HEADER, LEVELS, header
+from tachometry.spec.registers.edges import BAUD, EDGE, HEADER, LEVELS, MAGIC
 
 _WORD = 8 * EDGE
-_FIRST = HEADER // EDGE  # words of the header
+_FIRST = HEADER.size // EDGE  # words of the header
 
 
 def recorder_of(board: Board) -> "EdgeRecorder":
@@ -29,7 +29,7 @@ class EdgeRecorder(wiring.Component):
     """
 
     def __init__(self, clock_hz: int, bit_cycles: int, edges: int = 8192) -> None:
-        self._header, self._bit_cycles, self._edges = header(clock_hz, edges), bit_cycles, edges
+        self._header, self._bit_cycles, self._edges = HEADER.pack(MAGIC, clock_hz, edges), bit_cycles, edges
         super().__init__({**dict.fromkeys(("a", "b", "z", "uart_rx"), In(1)), "uart_tx": Out(1, init=1)})
 
     def elaborate(self, platform: object) -> Module:
@@ -62,7 +62,7 @@ class EdgeRecorder(wiring.Component):
         return m
 
     def _of_header(self, place: Signal) -> Value:
-        return Const(int.from_bytes(self._header, "little"), 8 * HEADER).word_select(place[:2], _WORD)
+        return Const(int.from_bytes(self._header, "little"), 8 * HEADER.size).word_select(place[:2], _WORD)
 
     def _send(self, m: Module, sending: Signal, word: Value) -> Signal:
         """Send a word byte by byte; return whether its last one begins."""

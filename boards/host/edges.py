@@ -14,18 +14,16 @@ def read_edges(port: Port, timeout: float = 60.0) -> tuple[int, list[tuple[int, 
     port.write(b"\0")
     found, end = bytearray(), time.monotonic() + timeout
     while True:
-        begin = max(found.find(MAGIC), 0)
-        size = begin + HEADER
-        if len(found) >= size:
-            size += EDGE * int.from_bytes(found[size - 2 : size], "little")
-            if len(found) >= size:
+        begin = found.find(MAGIC)
+        first = begin + HEADER.size
+        if begin >= 0 and len(found) >= first:
+            _, clock_hz, edges = HEADER.unpack_from(found, begin)
+            if len(found) >= (size := first + EDGE * edges):
                 break
         if time.monotonic() > end:
             raise NoAnswer(
                 f"{len(found)} bytes have come in {timeout:g} s, and no whole block of edges: turn the shaft"
             )
         found += port.read(4096)
-    body = found[begin + HEADER : size]
-    words = [int.from_bytes(body[at : at + EDGE], "little") for at in range(0, len(body), EDGE)]
-    clock_hz = int.from_bytes(found[begin + len(MAGIC) : begin + len(MAGIC) + 4], "little")
+    words = [int.from_bytes(found[at : at + EDGE], "little") for at in range(first, size, EDGE)]
     return clock_hz, [(word >> LEVELS, word % (1 << LEVELS)) for word in words]

@@ -8,7 +8,7 @@ _VELOCITIES = ("velocity_lower", "velocity_upper")  # ports with the LSB of velo
 
 
 def lsb_of(unit: str) -> float:
-    """Return one LSB of a port in its unit, as of `2^-8 counts` or `1/32767`; of electrical turns in degrees."""
+    """Return one LSB of a port in its unit, such as `2^-8 counts` or `1/32767`; electrical turns give degrees."""
     found = re.match(r"2\^-(\d+) (electrical)?|1/(\d+)", unit)
     if found is None:
         return 1.0

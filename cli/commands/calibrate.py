@@ -25,6 +25,7 @@ from tachometry.sim.signals.recording import Recording
 from tachometry.sim.studies.calibrating.calibrate import calibrate as calibration_of
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.disc import Disc
+from tachometry.spec.language.files import MOST_JSON, read_text
 from tachometry.spec.registers.edges import BAUD
 
 _TIMES = 15  # recordings of a board
@@ -118,11 +119,11 @@ def _align(port: Path, manifest: Path | None, turn: int | None) -> None:
     if turn is None or manifest is None:
         raise ValueError("--align must be given with --manifest and --against, and without --index")
     try:
-        described = json.loads(manifest.read_text(encoding="utf-8"))
+        described = json.loads(read_text(manifest, MOST_JSON))
         with SerialPort(str(port), described["baud"]) as line:
             link = Link(line, HostRegisters(described))
             Client(link.read, link.write, described).turn_disc(turn)
-    except (json.JSONDecodeError, UnicodeDecodeError, KeyError, TypeError) as error:
+    except (json.JSONDecodeError, UnicodeDecodeError, KeyError, TypeError, RecursionError) as error:
         raise ValueError(f"--manifest must be of a core on a UART with a map and no index, not {manifest}") from error
 
 

@@ -66,7 +66,7 @@ def outputs_of(spec: CoreSpec, targets: Mapping[str, Path], inputs: Sequence[Pat
     return outputs
 
 
-def write_tables(spec: CoreSpec, outputs: Outputs, run: Run, tally: Tally | None) -> None:
+def write_tables(spec: CoreSpec, outputs: Outputs, run: Run, tally: Tally) -> None:
     """Write the rows of a run, or of the next piece of one, see `write_trace`."""
     if path := outputs.get("--trace"):
         write_trace(path, spec, run, tally)

@@ -106,7 +106,7 @@ def measured(spec: TachometerSpec, plans: Plans, late: str = "") -> list[tuple[s
 def _real(spec: TachometerSpec) -> str:
     mapped = DiscMap.of(spec.extras)
     if mapped is not None and (off := mapped.edges_off(spec)) is not None:
-        return f"that of the map, which leaves {off:.2g} counts RMS"
+        return f"as mapped, {off:.2g} counts RMS remain"
     uneven, phase = REAL_DISC["nonuniformity"], REAL_DISC["phase_error_deg"]
     return f"{100 * REAL_DISC['jitter']:g} % jitter, edges off by {uneven:g} of their pitch, phase by {phase:g} degrees"
 

@@ -85,6 +85,13 @@ def _jumps(
     return refused, anew
 
 
+def ways(position: NDArray[np.int64], width: int) -> NDArray[np.int64]:
+    """Return how far each position of so many bits is from the one before, the first from 0: the shorter way round."""
+    half = 1 << width - 1
+    moved: NDArray[np.int64] = (np.diff(position, prepend=0) + half & 2 * half - 1) - half
+    return moved
+
+
 def ticks_of(spec: TachometerSpec, reads: Reads, last: NDArray[np.int64]) -> Table:
     """Return pulse numbers and positions of all ticks, with what the tracking method takes of each.
 
@@ -92,7 +99,7 @@ def ticks_of(spec: TachometerSpec, reads: Reads, last: NDArray[np.int64]) -> Tab
     """
     sampled = spec.encoder.sampled
     assert sampled is not None
-    half, most, number = 1 << sampled.width - 1, spec.timing.max_ticks, np.arange(len(last))
+    most, number = spec.timing.max_ticks, np.arange(len(last))
     through = np.searchsorted(reads.clock, last, side="right")
     has = np.diff(through, prepend=0) > 0
     row = np.maximum(through - 1, 0)  # of the read that a tick takes
@@ -100,7 +107,7 @@ def ticks_of(spec: TachometerSpec, reads: Reads, last: NDArray[np.int64]) -> Tab
     silent = np.minimum(number - latest, most)
     before = np.append(most, silent[:-1])
     sample = reads.sample[row] if len(reads.sample) else np.zeros_like(last)
-    way = (np.diff(sample, prepend=0) + half & 2 * half - 1) - half
+    way = ways(sample, sampled.width)
     forgets = np.diff(np.append(0, np.cumsum(reads.anew))[through], prepend=0) > 0
     known = has & (before < most) & ~forgets
     moved = np.where(known, way, 0)

@@ -57,9 +57,8 @@ class Tally:
         self.least, self.most, self.total = math.inf, -math.inf, 0.0  # rad/s, of the held velocity
         self._squares = self._errors = self._worst = 0.0
 
-    def add(self, run: Run, true_speed: TrueSpeed | None = None) -> HeldVelocity:
-        """Take the next rows, and return the velocity that is held in them."""
-        self.count(run)
+    def hold(self, run: Run, true_speed: TrueSpeed | None = None) -> None:
+        """Take the velocity that is held in the next rows."""
         if (old := self.window) is not None:
             self.begin = old.n_clocks
             first = self.begin - self._spec.latency.tick_to_velocity
@@ -69,9 +68,16 @@ class Tally:
             run = Run(run.n_clocks, run.tables | {name: rows.then(run.tables[name]) for name, rows in before.items()})
         self.window, held = run, held_velocity(self._spec, run)
         new = held.time >= self.begin / self._spec.timing.clock_hz
-        held = HeldVelocity(held.time[new], held.velocity_rad_s[new])
-        self._hold(held, true_speed)
-        return held
+        time, velocity = held.time[new], held.velocity_rad_s[new]
+        self.n_held += len(velocity)
+        self.least = float(np.min(velocity, initial=self.least))
+        self.most = float(np.max(velocity, initial=self.most))
+        self.total += float(np.sum(velocity))
+        if true_speed is not None:
+            error = velocity - true_speed(time)
+            self._squares += float(np.sum(error * error))
+            self._errors += float(np.sum(error))
+            self._worst = float(np.max(np.abs(error), initial=self._worst))
 
     def count(self, run: Run) -> None:
         """Count rows, and what is not 0 in them."""
@@ -79,21 +85,6 @@ class Tally:
             self.rows[strobe] += len(table)
             self.n_values += len(table) * (1 + len(table.columns))
             self.not_zero.update({(strobe, name): int(np.count_nonzero(table[name])) for name in table.columns})
-
-    def _hold(self, held: HeldVelocity, true_speed: TrueSpeed | None) -> None:
-        velocity = held.velocity_rad_s
-        self.n_held += len(velocity)
-        self.least, self.most = (
-            end(velocity, initial=past) for end, past in ((np.min, self.least), (np.max, self.most))
-        )
-        self.total += float(np.sum(velocity))
-        if true_speed is not None:
-            error = velocity - true_speed(held.time)
-            self._squares, self._errors = (
-                self._squares + float(np.sum(error * error)),
-                self._errors + float(np.sum(error)),
-            )
-            self._worst = float(np.max(np.abs(error), initial=self._worst))
 
     @property
     def error(self) -> VelocityError | None:

@@ -10,6 +10,7 @@ from tachometry.sim.captures.file import CaptureError, OptionError
 from tachometry.sim.encoder.motion import Motion
 from tachometry.sim.encoder.sampled import encoder_of
 from tachometry.sim.golden.encoder_read import Line, Records, records
+from tachometry.sim.golden.sampled import ways
 from tachometry.sim.signals.recording import Recording
 from tachometry.sim.signals.source import Source
 from tachometry.spec import TachometerSpec
@@ -39,9 +40,7 @@ def of_frames(recording: Recording, spec: TachometerSpec) -> Recording:
     if np.count_nonzero(good) < 2:
         why = wrong or "there is one"
         raise CaptureError(f"a capture must have two right frames, with --bits and --crc as they are: {why}")
-    half = 1 << reads.width - 1
-    moved = (np.diff(found.sample[good], prepend=0) + half & 2 * half - 1) - half
-    turns = (np.cumsum(moved) + 0.5) / (1 << sampled.bits) / float(spec.encoder.turns)
+    turns = (np.cumsum(ways(found.sample[good], reads.width)) + 0.5) / (1 << sampled.bits) / float(spec.encoder.turns)
     motion = Motion.of_table(time[good] - time[good][0], (-1 if spec.encoder.reverse else 1) * 2 * np.pi * turns)
     notes = [f"{plural(len(good), 'frame')}; between two the shaft is taken to turn evenly"]
     notes += [f"{plural(len(good) - int(good.sum()), 'frame')} not taken: {wrong}"] if wrong else []

@@ -4,15 +4,13 @@ The factors are the options that a method declares, with the values that these d
 exclude each other are found by trying.
 """
 
-import json
 from fractions import Fraction
 from functools import cache
 from importlib.metadata import version
 from itertools import combinations, product
 from operator import itemgetter
-from pathlib import Path
 
-from tachometry.sim.build import cached, digest
+from tachometry.sim.build import cached_value, digest
 from tachometry.spec import (
     AxesSpec,
     CoreSpec,
@@ -91,13 +89,7 @@ def rows(method: str) -> tuple[Texts, ...]:
     ]
     every = {name: list(values) for name, values in factors(method).items()}
     key = digest(every, sorted((names, sorted(pairs)) for names, pairs in never.items()), version("covertable"))
-
-    def array(folder: Path) -> Path:
-        (folder / "rows").write_text(json.dumps(make(every, constraints=constraints)), encoding="utf-8")
-        return folder / "rows"
-
-    found: list[Texts] = json.loads(cached(key, ".json", array).read_text(encoding="utf-8"))
-    return tuple(found)
+    return tuple(cached_value(key, lambda _: make(every, constraints=constraints)))
 
 
 @cache

@@ -41,8 +41,8 @@ class Running:
     vcd: Path | None = None
     bar: Bar = no_bar
     whole: bool = True  # whether all rows are needed at once; else a core that can be is run in pieces
-    # takes the rows of the run, or of each of its pieces with the numbers up to it
-    sink: Callable[[Run, Tally | None], object] = lambda *_: None
+    # takes the rows of each piece of the run, which may be the whole, with the numbers up to it
+    sink: Callable[[Run, Tally], object] = lambda *_: None
 
 
 @dataclass(frozen=True)
@@ -152,21 +152,24 @@ def simulate(
     whole = running.whole or engine is None or not in_pieces(spec.tachometer)
     trace = _placed(spec, source, recordings, running.pulses, whole=whole)
     shown, vcd = running.window(spec, trace.n_clocks), running.vcd
+    tally, speed = Tally(spec.tachometer), truths[0].true_speed if truths else None
+
+    def take(run: Run) -> None:
+        tally.count(run)
+        if isinstance(trace, PinTrace):
+            tally.hold(run, speed)
+        running.sink(run, tally)
+
     with running.bar("simulating", trace.n_clocks, "clocks", rate=True) as progress:
-        watch, tally, pieces = Watch(vcd, shown, progress), Tally(spec.tachometer), None
+        watch = Watch(vcd, shown, progress)
         if isinstance(trace, PinTrace) and not whole:
-            pieces, speed = tally, truths[0].true_speed if truths else None
-            found = _in_pieces(
-                spec.tachometer, trace, engine, watch, lambda run: (tally.add(run, speed), running.sink(run, tally))
-            )
+            found = _in_pieces(spec.tachometer, trace, engine, watch, take)
         else:
             found = lockstep(spec, trace, chosen, watch=watch, fewest=_fewest(spec))
-            tally.count(found.actual)
-            running.sink(found.actual, None)
+            take(found.actual)
     missing = " (there is no C++ compiler)" if (running.engine, chosen.name) == ("auto", "pysim") else ""
-    known = [None] * len(recordings) if truths is None else truths
-    each = enumerate(zip(recordings, known, strict=True))
-    axes = tuple(_axis(spec, found.actual, pieces, number, *of) for number, of in each)
+    known: Sequence[Encoding | None] = truths or [None] * len(recordings)
+    axes = tuple(_axis(spec, found.actual, tally, n, *of) for n, of in enumerate(zip(recordings, known, strict=True)))
     if vcd is not None:
         add_curves(vcd, spec.timing.clock_hz, (shown[0], min(shown[1], found.actual.n_clocks)), _curves(axes))
     return Simulation(spec, chosen.name + missing, trace.n_clocks, found, tally, axes)
@@ -218,19 +221,12 @@ def _curves(axes: Sequence[Axis]) -> dict[str, Curve]:
     return found
 
 
-def _axis(
-    core: CoreSpec, run: Run, tally: Tally | None, number: int, recording: Recording, truth: Encoding | None
-) -> Axis:
-    """Return the results of an axis; `tally` is that of a run in pieces, of which `run` has the last rows."""
+def _axis(core: CoreSpec, run: Run, tally: Tally, number: int, recording: Recording, truth: Encoding | None) -> Axis:
+    """Return the results of an axis; `tally` is that of the core, and `run` has the last rows of a run in pieces."""
     if core.axes is not None:
         return _axis_of_many(core, run, number, recording, truth)
     spec = core
-    counts_in = None
-    if tally is None:
-        tally = Tally(spec)
-        held = tally.add(run, None if truth is None else truth.true_speed)
-    else:
-        held = held_velocity(spec, run)
+    counts_in, held = None, held_velocity(spec, run)
     if truth is not None:
         # Up to the pin sample that the last tick can hold.
         clock = int(run.ticks.clock[-1]) - spec.latency.tick - spec.latency.pin_to_count

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from tachometry.sim.build import cached, digest
+from tachometry.sim.build import cached_value, digest
 from tachometry.sim.signals.temporary import run_tool
 from tachometry.spec import Port
 from tachometry.spec.control import AnySpec
@@ -132,16 +132,14 @@ def made(
     It raises RuntimeError if a command fails.
     """
 
-    def make(folder: Path) -> Path:
+    def make(folder: Path) -> list[Any]:
         for name, text in files.items():
             (folder / name).write_text(text, encoding="utf-8")
         for command in commands:
             call(folder, command)
-        every = folder / "every.json"
-        every.write_text(json.dumps([json.loads((folder / name).read_text("utf-8")) for name in results]))
-        return every
+        return [json.loads((folder / name).read_text("utf-8")) for name in results]
 
-    found: list[Any] = json.loads(cached(digest(files, commands, results, tools), ".json", make).read_text())
+    found: list[Any] = cached_value(digest(files, commands, results, tools), make)
     return found
 
 

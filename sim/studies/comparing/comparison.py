@@ -10,7 +10,7 @@ import numpy as np
 
 from tachometry.sim.encoder.motion import FloatArray, parse_motion
 from tachometry.sim.encoder.sampled import encoder_of
-from tachometry.sim.golden.sampled import Reads
+from tachometry.sim.golden.sampled import Reads, ways
 from tachometry.sim.signals.progress import Bar, no_bar
 from tachometry.sim.signals.recording import PinTrace, Recording
 from tachometry.sim.signals.shown import Shown
@@ -190,12 +190,11 @@ def steps_beside(spec: TachometerSpec, recording: Recording) -> Steps:
 
 
 def _positions(spec: TachometerSpec, trace: PinTrace, reads: FloatArray) -> Steps:
-    """Return the positions that a core has taken, each held until the next one."""
+    """Return the positions read by a core, each held until the next one."""
     sampled, taken, hz = spec.encoder.sampled, Reads.of(spec, trace), spec.timing.clock_hz
     assert sampled is not None
-    half = 1 << sampled.width - 1
-    moved = (np.diff(taken.sample, prepend=taken.sample[:1]) + half & 2 * half - 1) - half
-    place = np.append(0, np.cumsum(moved))
+    place = np.cumsum(ways(taken.sample, sampled.width))
+    place = np.append(0, place - place[:1])
     at = np.searchsorted(taken.clock, np.round(reads * hz), side="right")
     old = reads * hz - (taken.clock - taken.age)[np.maximum(at - 1, 0)] if len(taken.clock) else reads
     none = np.empty(0, np.int64)

@@ -18,7 +18,7 @@ class Line:
     """A serial port whose bytes are those of a UART's levels, 8 clocks a bit."""
 
     def __init__(self, levels: list[int]) -> None:
-        self.bytes, at = bytearray(b"noise"), 0
+        self.bytes, at = bytearray(20), 0  # noise
         while 0 in levels[at:]:
             at = levels.index(0, at) + BIT // 2
             bits = levels[at : at + 10 * BIT : BIT]

@@ -20,7 +20,7 @@ from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.spec import of_texts
 from tachometry.spec.core.disc import Disc
 from tachometry.spec.registers import frames
-from tachometry.spec.registers.edges import header
+from tachometry.spec.registers.edges import HEADER, MAGIC
 from tachometry.spec.registers.manifest import manifest
 from tachometry.spec.registers.map import RegisterMap
 
@@ -148,7 +148,7 @@ class Board:
         trace = made.recording.place(12_000_000)
         gap, level = np.diff(trace.clock, prepend=0), trace.a + 2 * trace.b + 4 * trace.lines["z"]
         words = b"".join(int(one << 3 | two).to_bytes(3, "little") for one, two in zip(gap, level, strict=True))
-        self.bytes = header(12_000_000, len(gap)) + words
+        self.bytes = HEADER.pack(MAGIC, 12_000_000, len(gap)) + words
 
     def read(self, size: int, /) -> bytes:
         found, self.bytes = self.bytes[:size], self.bytes[size:]
