@@ -10,16 +10,8 @@ ICEBREAKER = Board(
     platform=platform("icebreaker:ICEBreakerPlatform"),
     headers=(
         # The emulator is below the encoder: three jumpers join them.
-        Header(
-            "PMOD1A",
-            pins("a:1 b:2 z:3 tick_in:4 emulated_a:7 emulated_b:8 emulated_z:9 capture:10"),
-            ("pmod", 0),
-        ),
-        Header(
-            "PMOD1B",
-            pins("spi_cs_n:1 spi_mosi:2 spi_miso:3 spi_sck:4 current_pdm:7 enable:8"),
-            ("pmod", 1),
-        ),
+        Header("PMOD1A", pins("a:1 b:2 z:3 tick_in:4 emulated_a:7 emulated_b:8 emulated_z:9 capture:10"), ("pmod", 0)),
+        Header("PMOD1B", pins("spi_cs_n:1 spi_mosi:2 spi_miso:3 spi_sck:4 current_pdm:7 enable:8"), ("pmod", 1)),
     ),
     attributes={"IO_STANDARD": "SB_LVCMOS"},
     pull_up={"PULLUP": 1},

@@ -45,12 +45,7 @@ Examples:
     help="Simulate FILE in place of NAME.v. It is a netlist after synthesis; give it again for the models "
     "of its cells.",
 )
-@option(
-    "Check",
-    "--waves DIR",
-    type=FilePath(),
-    help="Folder of waveforms of cores that differ.",
-)
+@option("Check", "--waves DIR", type=FilePath(), help="Folder of waveforms of cores that differ.")
 @option(
     "Check",
     "--proof",

@@ -23,12 +23,7 @@ Examples:
 )
 @board_argument
 @click.argument("place", type=FilePath(), required=False, metavar="[FILE|DIR]")
-@option(
-    "Board",
-    "--flash",
-    is_flag=True,
-    help="Write to the flash memory of the board, to stay.",
-)
+@option("Board", "--flash", is_flag=True, help="Write to the flash memory of the board, to stay.")
 def program(board: Board, place: Path | None, flash: bool) -> int:
     """Load a bitstream into a board, which is connected by USB: FILE, or that of DIR, which is build/BOARD if nothing
     else is said.

@@ -36,11 +36,7 @@ a --clock that is a few times the edge rate then. Edges closer than a clock are 
 @OUTPUT_OPTIONS
 @ENGINE_OPTIONS
 def replay(
-    spec: CoreSpec,
-    capture: Path,
-    read: Callable[..., Recording],
-    targets: dict[str, Path],
-    running: Running,
+    spec: CoreSpec, capture: Path, read: Callable[..., Recording], targets: dict[str, Path], running: Running
 ) -> int:
     """Run a core on captured encoder signals, against the golden model.
 

@@ -45,13 +45,7 @@ a --clock that is a few times the edge rate then.""",
 @MOTION_OPTIONS
 @OUTPUT_OPTIONS
 @ENGINE_OPTIONS
-def simulate(
-    spec: CoreSpec,
-    record: Recorder,
-    tables: list[Path],
-    targets: dict[str, Path],
-    running: Running,
-) -> int:
+def simulate(spec: CoreSpec, record: Recorder, tables: list[Path], targets: dict[str, Path], running: Running) -> int:
     """Run a core on a virtual encoder, against the golden model and the truth.
 
     The hardware is simulated clock by clock and compared with the golden model in every bit of every update and tick.

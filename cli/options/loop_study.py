@@ -52,10 +52,7 @@ class Loop:
         False, "Let the observer use the acceleration of method track. It then works at every control tick."
     )
     delay: str | None = declaration(
-        None,
-        "Delay from a control tick to its current. At most a control tick.",
-        metavar="TIME",
-        shown="none",
+        None, "Delay from a control tick to its current. At most a control tick.", metavar="TIME", shown="none"
     )
     gates: bool = declaration(
         False, "Also run the controller in gates. It is the core that generate --loop makes with these options."

@@ -18,11 +18,7 @@ _OPTIONS = [
         suffixes=(".vcd",),
         help="Waveform of pins, ports and inner values. A GTKWave save file (.gtkw) beside it opens it.",
     ),
-    output(
-        "--plot",
-        suffixes=(".png", ".pdf", ".svg"),
-        help="Figure of velocity, error, pulse numbers, times.",
-    ),
+    output("--plot", suffixes=(".png", ".pdf", ".svg"), help="Figure of velocity, error, pulse numbers, times."),
     output(
         "--trace",
         help="CSV with a row per update. Its columns: clock, tick, interval (the manifest has its unit), "

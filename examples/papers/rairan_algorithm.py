@@ -3,13 +3,7 @@
 import numpy as np
 
 from papers.lab import Lab
-from papers.rairan_equations import (
-    Row,
-    rairan_eq01_update_time,
-    rairan_eq03_error,
-    rairan_eq04_max_error,
-    table1_rows,
-)
+from papers.rairan_equations import Row, rairan_eq01_update_time, rairan_eq03_error, rairan_eq04_max_error, table1_rows
 from papers.result import Claim, Curve, Panel, Result
 from tachometry.sim.theory.rairan import rairan_update_time
 

@@ -34,11 +34,7 @@ class EmulatedLine(wiring.Component):
         level = Signal()
         left = Signal(BOUNCE_WIDTH)
         whole = level ^ (left.any() & self.random) ^ self.noise
-        m.d.sync += [
-            before.eq(self.ideal),
-            left.eq(Mux(left == 0, 0, left - 1)),
-            self.line.eq(whole | self.broken),
-        ]
+        m.d.sync += [before.eq(self.ideal), left.eq(Mux(left == 0, 0, left - 1)), self.line.eq(whole | self.broken)]
         if "whole" in self.signature.members:
             m.d.sync += self.whole.eq(whole)
         with m.If((self.ideal ^ before) & ~self.drop):

@@ -73,11 +73,7 @@ class InputConditioner(wiring.Component):
                 m.d.comb += equals[name].eq(clocks_since_reset[1] & (level == other))
             if self._filter_clocks:
                 m.submodules[f"filter_{name}"] = line = self._filters[name]
-                m.d.comb += [
-                    line.level.eq(level),
-                    line.valid.eq(clocks_since_reset[1]),
-                    levels[name].eq(line.filtered),
-                ]
+                m.d.comb += [line.level.eq(level), line.valid.eq(clocks_since_reset[1]), levels[name].eq(line.filtered)]
                 m.d.sync += readies[name].eq(line.known)
                 swallowed.append(line.swallowed)
             else:

@@ -57,11 +57,7 @@ def transition(
     """Return whether a change of levels counts, whether backward, and whether both have changed, which never counts."""
     change_a = level_a ^ past_a
     change_b = level_b ^ past_b
-    counted = {
-        1: change_a & ~change_b & ~level_b,
-        2: change_a & ~change_b,
-        4: change_a ^ change_b,
-    }[decoding]
+    counted = {1: change_a & ~change_b & ~level_b, 2: change_a & ~change_b, 4: change_a ^ change_b}[decoding]
     backward = ~(level_a ^ past_b)
     return counted, backward, change_a & change_b
 

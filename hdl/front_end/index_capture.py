@@ -40,11 +40,7 @@ class IndexCapture(wiring.Component):
         m = Module()
         level, ready = delay(m, self.level_z, self.ready, clocks=0 if self._early else self._late)
         past_z = Signal()
-        m.d.sync += [
-            past_z.eq(level),
-            self.first.eq(level & ~past_z & ready),
-            self.index_valid.eq(self.rises),
-        ]
+        m.d.sync += [past_z.eq(level), self.first.eq(level & ~past_z & ready), self.index_valid.eq(self.rises)]
         if self.first is not self.seen:
             m.d.comb += self.seen.eq(*delay(m, self.first, clocks=self._late))
         if self._once:

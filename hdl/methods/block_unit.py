@@ -5,15 +5,7 @@ from collections.abc import Sequence
 from amaranth import Array, C, Cat, Module, Mux, Signal, Value, signed
 
 from tachometry.hdl.methods.track_unit import Unit
-from tachometry.spec.formats.tracking import (
-    CHANCE_BITS,
-    DROPPED,
-    LOG_BITS,
-    POWER_BITS,
-    RESULT_BITS,
-    TABLE_BITS,
-    WIDTH,
-)
+from tachometry.spec.formats.tracking import CHANCE_BITS, DROPPED, LOG_BITS, POWER_BITS, RESULT_BITS, TABLE_BITS, WIDTH
 from tachometry.spec.formats.tracking_code import BY_FACTOR, Program
 from tachometry.spec.formats.tracking_units import Start
 

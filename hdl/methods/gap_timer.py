@@ -39,11 +39,7 @@ class GapTimer(wiring.Component):
             m.d.sync += self.age.eq(self.age + 1)
             with m.If(ends):
                 m.d.sync += [self.age.eq(1), self.opened.eq(self.count)]
-        m.d.sync += [
-            tick.eq(self.coming),
-            self.count.eq(self.count_before),
-            self.overdue.eq(self.overdue_before),
-        ]
+        m.d.sync += [tick.eq(self.coming), self.count.eq(self.count_before), self.overdue.eq(self.overdue_before)]
         silent = self.coming & ~self.count_before
         if self._on_lattice:
             last = Signal()

@@ -124,10 +124,7 @@ def _find(channels: Mapping[int, str], vectors: Mapping[int, str], wanted: Chann
 
 
 def choose_channels(
-    path: Path,
-    channels: Mapping[int, str],
-    wanted: Channels,
-    vectors: Mapping[int, str] = NO_VECTORS,
+    path: Path, channels: Mapping[int, str], wanted: Channels, vectors: Mapping[int, str] = NO_VECTORS
 ) -> tuple[Line, ...]:
     """Return the encoder lines among the channels of a capture: A, B and others, by their names.
 

@@ -130,9 +130,7 @@ class EncoderOptions:
         parse=_bounce,
     )
     lost: float = _fault(
-        "Probability that a line misses a pulse, so two edges.",
-        "PROBABILITY",
-        number_reader(FRACTION),
+        "Probability that a line misses a pulse, so two edges.", "PROBABILITY", number_reader(FRACTION)
     )
     illegal: float = _fault(
         "Probability that an edge comes together with the next. Both lines change at once then.",
@@ -152,9 +150,7 @@ class EncoderOptions:
         parse=_line_fault,
     )
     index_width: int = option(
-        1,
-        "Quarter periods of the index mark, 1 to 16. A mark wider than 1 is not gated by A and B.",
-        metavar="N",
+        1, "Quarter periods of the index mark, 1 to 16. A mark wider than 1 is not gated by A and B.", metavar="N"
     )
     index_skew_s: float = option(
         None,
@@ -165,9 +161,7 @@ class EncoderOptions:
         parse=_time,
     )
     noise: float = _fault(
-        "Noise of sampled positions: standard deviation in LSB. At most 1000.",
-        "LSB",
-        number_reader(FRACTION),
+        "Noise of sampled positions: standard deviation in LSB. At most 1000.", "LSB", number_reader(FRACTION)
     )
     interpolation: tuple[float, int] | None = option(
         None,

@@ -137,9 +137,7 @@ _GAINS = ("position", "velocity", "observer", "filter", "inertia", "torque_const
 _WAYS = ("way", "on_filtered", "feed_forward")
 _ENCODER = struct("Encoder", pitch=_D, offset=_P, n_edges=_I, jitter=_P, n_jitter=_I)
 CONTROLLER = struct(
-    "Controller",
-    **dict.fromkeys(_GAINS, _D),
-    **dict.fromkeys((*_WAYS, "clocks", "first", "delay"), _I),
+    "Controller", **dict.fromkeys(_GAINS, _D), **dict.fromkeys((*_WAYS, "clocks", "first", "delay"), _I)
 )
 _CORE = struct(
     "Core",

@@ -327,10 +327,7 @@ def homed(spec: TachometerSpec, steps: Steps, clock: NDArray[np.int64]) -> NDArr
 
 
 def count(
-    spec: TachometerSpec,
-    steps: Steps,
-    last: NDArray[np.int64],
-    beyond: NDArray[np.bool_] | None = None,
+    spec: TachometerSpec, steps: Steps, last: NDArray[np.int64], beyond: NDArray[np.bool_] | None = None
 ) -> tuple[Table, Table]:
     """Return pulse numbers and positions of all ticks, and positions at the index.
 

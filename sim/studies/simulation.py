@@ -134,11 +134,7 @@ def _placed(spec: CoreSpec, source: str, recordings: Sequence[Recording], pulses
 
 
 def simulate(
-    spec: CoreSpec,
-    source: str,
-    recordings: Sequence[Recording],
-    truths: Sequence[Encoding] | None,
-    running: Running,
+    spec: CoreSpec, source: str, recordings: Sequence[Recording], truths: Sequence[Encoding] | None, running: Running
 ) -> Simulation:
     """Run hardware and golden model on a recording for each axis.
 

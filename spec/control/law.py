@@ -52,12 +52,7 @@ class Law(WithTachometer, Motor):
         parse=Quantity(PLAIN),
     )
     velocity_gain: Fraction = option(  # noqa: RUF009
-        None,
-        "Gain k_v of the velocity error, in 1/s.",
-        text="30",
-        name="kv",
-        metavar="KV",
-        parse=Quantity(PLAIN),
+        None, "Gain k_v of the velocity error, in 1/s.", text="30", name="kv", metavar="KV", parse=Quantity(PLAIN)
     )
     observer: Fraction = option(  # noqa: RUF009
         None,

@@ -147,8 +147,7 @@ def _check_ticks(spec: Core) -> None:
         raise ParameterError("tick_cycles", "must be at least 2 with an external tick, not 1")
     if not shortest <= spec.tick.longest <= MAX_TICK_CYCLES:
         raise ParameterError(
-            "max_tick_cycles",
-            f"must be from {shortest}, one tick, to {MAX_TICK_CYCLES}, not {spec.max_tick_cycles}",
+            "max_tick_cycles", f"must be from {shortest}, one tick, to {MAX_TICK_CYCLES}, not {spec.max_tick_cycles}"
         )
 
 

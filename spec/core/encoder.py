@@ -212,10 +212,7 @@ class Encoder:
         **_READ,
     )
     chip: str | None = option(
-        None,
-        "Chip of an encoder with spi. as5047p answers a tick late.",
-        choices=tuple(CHIPS),
-        **_READ,
+        None, "Chip of an encoder with spi. as5047p answers a tick late.", choices=tuple(CHIPS), **_READ
     )
     encoder_clock: int | None = option(
         None,
@@ -245,9 +242,7 @@ class Encoder:
     )
     gray: bool = option(False, "The encoder sends Gray code.", **_READ)
     repeat: bool = option(
-        False,
-        "Read an encoder with ssi twice, and take equal reads only. It must repeat its position.",
-        **_READ,
+        False, "Read an encoder with ssi twice, and take equal reads only. It must repeat its position.", **_READ
     )
 
     def __post_init__(self) -> None:

@@ -113,10 +113,7 @@ class Serial:
         product = max(map(self._steps, range((named + 1) // 2 + 1)))
         log, factor = (
             max(self._seeks(leading, pairs, end) for leading in range(WIDTH - 1))
-            for pairs, end in (
-                (self.pairs(Start.LOG, 0), self.log_end),
-                (self.least_pairs, self.form.factor_bits - 1),
-            )
+            for pairs, end in ((self.pairs(Start.LOG, 0), self.log_end), (self.least_pairs, self.form.factor_bits - 1))
         )
         read = self._steps(self.read_pairs)
         times = 5 + self.digits + product

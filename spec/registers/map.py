@@ -32,10 +32,7 @@ COUNTER_WIDTH = 8  # bits of each counter of COUNTERS
 # What a core has with an interrupt, besides the registers.
 IRQ = Port("irq", "output", help="Interrupt, high while an event waits that INTERRUPT_ENABLE lets through.")
 
-_CONTROLS = {
-    "preset": "Writing 1 sets the position to PRESET.",
-    "home": "Writing 1 lets the next index be taken.",
-}
+_CONTROLS = {"preset": "Writing 1 sets the position to PRESET.", "home": "Writing 1 lets the next index be taken."}
 _DESCRIBED = ("name", "low", "width", "access", "reset", "signed", "unit", "port", "shift")  # in the manifest
 
 
@@ -243,13 +240,7 @@ class RegisterMap:
                 name = port.name.upper() + ("_HIGH" if word else "_LOW" if len(words) > 1 else "")
                 low = "" if len(words) == 1 else "Upper word. " if word else "Lower word. "
                 field = Field(
-                    "value",
-                    WORD,
-                    help=port.help,
-                    signed=port.signed,
-                    unit=port.unit,
-                    port=port.name,
-                    shift=word,
+                    "value", WORD, help=port.help, signed=port.signed, unit=port.unit, port=port.name, shift=word
                 )
                 first = port is values[0] and not word
                 yield name, f"{low}{port.help}", (field,), {**more, "captures": first and captures}

@@ -45,11 +45,7 @@ LAYOUTS = {
         "forced overflow standstill homed probed position_compare fault over_speed",
     ),
     "mt": ("<IIqi12x", "time flags position velocity", "forced overflow standstill out_of_range"),
-    "track": (
-        "<IIqiii4x",
-        "time flags position_fine position velocity acceleration",
-        "forced overflow standstill",
-    ),
+    "track": ("<IIqiii4x", "time flags position_fine position velocity acceleration", "forced overflow standstill"),
 }
 
 

@@ -151,10 +151,7 @@ BASELINES: dict[str, Baseline] = {
         "16 edges, order 2",
         estimators.least_squares,
         {"period": _PERIOD, "edges": Parameter("edges", parse_whole), "order": _ORDER, **_BOUND},
-        (
-            {"edges": "2 3", "order": "1", "bound": "1 2"},
-            {"edges": _EDGES, "order": "1 2 3", "bound": "1 2"},
-        ),
+        ({"edges": "2 3", "order": "1", "bound": "1 2"}, {"edges": _EDGES, "order": "1 2 3", "bound": "1 2"}),
         {"period_s": None},
     ),
     "foaw": Baseline(

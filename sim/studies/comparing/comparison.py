@@ -124,13 +124,7 @@ def _instants(source: Source, curves: list[Curve], judge: Judge, earliest: float
     return judge, instants
 
 
-def comparison(
-    spec: TachometerSpec,
-    specs: Specs,
-    make: Make,
-    source: Source,
-    judging: Judging,
-) -> Comparison:
+def comparison(spec: TachometerSpec, specs: Specs, make: Make, source: Source, judging: Judging) -> Comparison:
     """Run methods on the same edges, and compare them with the truth.
 
     - `spec`: Whose encoder, clock and tick hold for all, and with which float models are read.

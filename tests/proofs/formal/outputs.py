@@ -9,12 +9,7 @@ from amaranth.lib.wiring import In
 from proofs.formal.prove import Proof
 
 from tachometry.hdl.extras import health, over_speed, position_compare, probe
-from tachometry.hdl.front_end import (
-    index_capture,
-    modulo_counter,
-    open_circuit,
-    position_counter,
-)
+from tachometry.hdl.front_end import index_capture, modulo_counter, open_circuit, position_counter
 from tachometry.spec import Encoder, STachometer
 from tachometry.spec.core.extras.position_compare import Compare
 

@@ -98,10 +98,7 @@ def test_a_plain_waveform_of_this_name_is_refused(folder: Path) -> None:
 
 @pytest.mark.parametrize(
     ("limit", "most", "said"),
-    [
-        ("_MOST_NAMES", 10, "10 characters for its names"),
-        ("_MOST_CHANGES", 100, "100 characters for its changes"),
-    ],
+    [("_MOST_NAMES", 10, "10 characters for its names"), ("_MOST_CHANGES", 100, "100 characters for its changes")],
 )
 def test_a_file_beyond_a_limit_is_refused(
     limit: str, most: int, said: str, folder: Path, monkeypatch: pytest.MonkeyPatch
@@ -113,10 +110,7 @@ def test_a_file_beyond_a_limit_is_refused(
 
 @pytest.mark.parametrize(
     ("work", "said"),
-    [
-        ("sys.stdin.read(); bytearray(1 << 32)", f"{2 << 30} bytes of memory"),
-        ("all(iter(object, 1))", "1 s"),
-    ],
+    [("sys.stdin.read(); bytearray(1 << 32)", f"{2 << 30} bytes of memory"), ("all(iter(object, 1))", "1 s")],
 )
 def test_a_reader_that_takes_too_much_is_ended(
     work: str, said: str, folder: Path, monkeypatch: pytest.MonkeyPatch

@@ -58,11 +58,7 @@ def test_what_is_no_frame_is_refused(tmp_path: Path, capsys: pytest.CaptureFixtu
     words = capture("biss", KINDS["biss"], tmp_path)
     other = [word.replace("4+13", "4+14") for word in words]
     for line, more, why in (
-        (
-            words,
-            ["--b", "x"],
-            "two right frames, with --bits and --crc as they are: no answer 120",
-        ),
+        (words, ["--b", "x"], "two right frames, with --bits and --crc as they are: no answer 120"),
         (other, ["--b", "SLO"], "a wrong check 1"),
         (words, ["--b", "MA", "--a", "x"], "line A must be the encoder's clock"),
     ):

@@ -15,16 +15,7 @@ from support.nightly import nightly
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.engines.loop import Log, LoopSimulation, Observer
 from tachometry.sim.studies.loops import control
-from tachometry.sim.studies.loops.control import (
-    Load,
-    Outcome,
-    Setting,
-    Task,
-    each_seed,
-    mean,
-    outcome_of,
-    sound,
-)
+from tachometry.sim.studies.loops.control import Load, Outcome, Setting, Task, each_seed, mean, outcome_of, sound
 from tachometry.spec.language.option import ParameterError
 
 
