@@ -1,11 +1,11 @@
 """A board records edges of an encoder, and sends them to `tachometry calibrate --port`."""
 
 from amaranth import Cat, Const, Module, Mux, Signal, Value
-from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from tachometry.boards.fpga.board import Board
+from tachometry.hdl.wires.ports import Box
 from tachometry.hdl.wires.synchronizer import Synchronizer
 from tachometry.spec.registers.edges import BAUD, EDGE, HEADER, LEVELS, MAGIC
 
@@ -18,7 +18,7 @@ def recorder_of(board: Board) -> "EdgeRecorder":
     return EdgeRecorder(board.clock_hz, round(board.clock_hz / BAUD), board.edges)
 
 
-class EdgeRecorder(wiring.Component):
+class EdgeRecorder(Box):
     """Fills a memory with edges when a character comes over `uart_rx`, then sends it, and waits for the next one.
 
     An edge is a word with the levels of A, B and Z, and the clocks since the word before; where these are too many, a
@@ -32,8 +32,7 @@ class EdgeRecorder(wiring.Component):
         self._header, self._bit_cycles, self._edges = HEADER.pack(MAGIC, clock_hz, edges), bit_cycles, edges
         super().__init__({**dict.fromkeys(("a", "b", "z", "uart_rx"), In(1)), "uart_tx": Out(1, init=1)})
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         pins, levels, was = (Signal(LEVELS + 1, name=name) for name in ("pins", "levels", "was"))
         gap = Signal(_WORD - LEVELS)
         place = Signal(range(self._edges + _FIRST + 1))
@@ -59,7 +58,6 @@ class EdgeRecorder(wiring.Component):
             m.d.sync += place.eq(place + 1)
             with m.If(place == self._edges + _FIRST - 1):
                 m.d.sync += sending.eq(0)
-        return m
 
     def _of_header(self, place: Signal) -> Value:
         return Const(int.from_bytes(self._header, "little"), 8 * HEADER.size).word_select(place[:2], _WORD)

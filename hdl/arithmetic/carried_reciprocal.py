@@ -1,10 +1,10 @@
 """1/m as quotient and remainder, for long measurements."""
 
 from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
-from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import Box
 from tachometry.spec.formats import carried_reciprocal
 
 
@@ -17,7 +17,7 @@ def _less_another(total: Signal, more: Value, q: Signal, borrow: Value) -> Value
     return ((Cat(1, sums) + Cat(1, borrow, carries[:-1])) >> 1)[:width].as_signed()
 
 
-class CarriedReciprocal(wiring.Component):
+class CarriedReciprocal(Box):
     """Gives Q = ⌊C/m⌋ and R = C mod m exactly: from a small table, and beyond it from m to m + 1 by subtraction.
 
     When it moves, m may count up by one, start over at 1, or go on at `entry`; it may do so in every clock. Why one
@@ -37,8 +37,7 @@ class CarriedReciprocal(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         spec = self._reciprocal
         m.submodules.table = memory = Memory(shape=spec.width, depth=spec.depth, init=spec.table)
         read = memory.read_port()
@@ -70,4 +69,3 @@ class CarriedReciprocal(wiring.Component):
                 m.d.sync += [q.eq(quotient), less.eq(remainder)]
         table_q, table_r = read.data[: spec.quotient_width], read.data[spec.quotient_width :]
         m.d.comb += [self.q.eq(Mux(carried, q, table_q)), self.r.eq(Mux(carried, r, table_r))]
-        return m

@@ -1,13 +1,12 @@
 """A divider finds a quotient bit by bit."""
 
 from amaranth import Array, Cat, Const, Module, Mux, Signal, Value, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import Box, only_if
 
 
-class Divider(wiring.Component):
+class Divider(Box):
     """Divides serially, signed, non-restoring: gives ⌊2^s · dividend / divisor⌋, or the nearest integer to it.
 
     In each step the divisor is taken from the doubled remainder, or added if that is negative; so it stays within
@@ -73,8 +72,7 @@ class Divider(wiring.Component):
             place &= ~(1 << bit)
         return place
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         # Only the flags of work in progress need a reset; all else is loaded before it is used.
         left, running, start = self._left, self.running, self.start
         remainder = Signal(signed(len(self.by) + 1), reset_less=True)
@@ -106,7 +104,6 @@ class Divider(wiring.Component):
         with m.If(start):
             first = Cat(Const(0, len(digits) - own), total[:own]) if own else self.divisor >> self._steps
             m.d.sync += [running.eq(1), digits.eq(first), left.eq(self._steps - 1), by.eq(self.divisor)]
-        return m
 
     @property
     def _above(self) -> Value:

@@ -4,14 +4,14 @@ from collections.abc import Callable, Mapping
 from typing import Protocol, runtime_checkable
 
 from amaranth import Module, Signal, signed
-from amaranth.lib import data, stream, wiring
+from amaranth.lib import data, stream
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.carried_reciprocal import CarriedReciprocal
 from tachometry.hdl.arithmetic.reciprocal import DividedReciprocal, LookedUpReciprocal
 from tachometry.hdl.arithmetic.remainder_scaler import RemainderScaler
 from tachometry.hdl.arithmetic.scaler import PipelinedScaler, SerialScaler, WideSerialScaler
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import Box, only_if
 from tachometry.spec.formats import carried_reciprocal, reciprocal
 
 
@@ -53,7 +53,7 @@ def _scaler(shape: _Shape, width: int, serial: bool) -> Callable[..., _Scaler]:
     return WideSerialScaler if shape.is_wide(width) else SerialScaler
 
 
-class Quotient(wiring.Component):
+class Quotient(Box):
     """Computes base + N/m, and bounds of it, correctly rounded and without a divider.
 
     1/m is looked up, divided, carried on from m to m + 1, or constant; it is multiplied step by step or all at once.
@@ -107,8 +107,7 @@ class Quotient(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         new, q = self.results.p, self._constant
         if self.reciprocal is not None:
             m.submodules.reciprocal = self.reciprocal
@@ -132,4 +131,3 @@ class Quotient(wiring.Component):
         first = next(iter(self.scalers.values())).results
         m.d.comb += self.results.valid.eq(first.valid)
         m.d.comb += [new[field].eq(first.p.tag[field]) for field in first.p.tag.shape().members]
-        return m

@@ -1,14 +1,14 @@
 """The reciprocal of m_s is looked up or divided."""
 
 from amaranth import Cat, Const, Module, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import Box
 from tachometry.spec.formats import reciprocal as spec
 
 
-class LookedUpReciprocal(wiring.Component):
+class LookedUpReciprocal(Box):
     """Looks q(m) up in a table in block RAM.
 
     Latency: q is there two clocks after m. The register behind the table is what the memories of many FPGAs have
@@ -25,18 +25,16 @@ class LookedUpReciprocal(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         table = self._reciprocal
         m.submodules.table = memory = Memory(shape=table.width, depth=table.depth, init=table.table)
         read = memory.read_port()
         found = Signal(table.width, reset_less=True)
         m.d.comb += [read.addr.eq(self.m), read.en.eq(1), self.q.eq(found)]
         m.d.sync += found.eq(read.data)
-        return m
 
 
-class DividedReciprocal(wiring.Component):
+class DividedReciprocal(Box):
     """Finds q(m) by a subtraction a clock.
 
     Latency: q is there `reciprocal.steps` and two clocks after `moves`, or after the reset, and stays until it moves.
@@ -52,8 +50,7 @@ class DividedReciprocal(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         # The first digit is 1 in any case, and has gone through all others when the division is done.
         digits = Signal(self._reciprocal.steps)
         less_one = Signal(signed(len(self.m) + 1))  # R − 1
@@ -69,4 +66,3 @@ class DividedReciprocal(wiring.Component):
         with m.If(moved):
             m.d.sync += [digits.eq(0), less_one.eq(0)]
         m.d.comb += self.q.eq(Cat(Const(1, 1), digits[:-1]))
-        return m

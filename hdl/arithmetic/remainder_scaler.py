@@ -6,11 +6,12 @@ found by as many subtractions of m, which leave a remainder of either sign (non-
 """
 
 from amaranth import Cat, Const, Module, Value, signed
-from amaranth.lib import data, wiring
+from amaranth.lib import data
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.scaled import scaled_stream
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import Box
 from tachometry.hdl.wires.registers import registers
 from tachometry.spec.formats.carried_reciprocal import CarriedReciprocal
 
@@ -27,7 +28,7 @@ def _rounded(total: Value, quotient: Value, up: Value) -> Value:
     return (Cat(1, total).as_signed() + Cat(up, quotient).as_signed()) >> 1
 
 
-class RemainderScaler(wiring.Component):
+class RemainderScaler(Box):
     """Has a stage for every step: `start` may be high in every clock.
 
     Latency: a result comes as many clocks after `start` as N has bits and ⌊N·R/m⌋ has digits, and three more.
@@ -62,8 +63,7 @@ class RemainderScaler(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         result = registers(self.results.p.shape(), "result")
         m.d.comb += self.results.p.eq(result)
 
@@ -97,4 +97,3 @@ class RemainderScaler(wiring.Component):
         m.d.sync += self.results.valid.eq(valid)
         with m.If(valid):
             m.d.sync += [result.quotient.eq(_rounded(total, quotient.as_signed(), up)), result.tag.eq(tag)]
-        return m

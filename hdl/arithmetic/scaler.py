@@ -6,16 +6,17 @@ of N, and accepts any update rate.
 """
 
 from amaranth import Cat, Const, Module, Mux, Signal, Value, ValueLike, signed
-from amaranth.lib import data, wiring
+from amaranth.lib import data
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.scaled import scaled_stream
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import Box
 from tachometry.hdl.wires.registers import registers
 from tachometry.spec.formats.reciprocal import Reciprocal
 
 
-class _Scaler(wiring.Component):
+class _Scaler(Box):
     """Holds the parts that all scalers share.
 
     - `towards`: Round to the nearest (0), down (−1) or up (1).
@@ -51,8 +52,7 @@ class _SerialScaler(_Scaler):
     Latency: a result comes as many clocks after `start` as N has digits, and one more.
     """
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         result = registers(self.results.p.shape(), "result")
         m.d.comb += self.results.p.eq(result)
         run = Signal(self._digits)  # bit i: the product of the digit that comes after i others is added
@@ -75,7 +75,6 @@ class _SerialScaler(_Scaler):
         quotient = self._sum(m, run[:-1].any(), addend, carry)
         with m.If(run[-1]):
             m.d.sync += [result.quotient.eq(quotient), result.tag.eq(self.tag)]
-        return m
 
     def _next_digit(self, m: Module) -> Value:
         """Return the two bits that tell a digit, and the one below first; another digit in every clock after `load`."""
@@ -165,8 +164,7 @@ class PipelinedScaler(_Scaler):
     Latency: a result comes as many clocks after `start` as N has bits, and one more.
     """
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         result = registers(self.results.p.shape(), "result")
         m.d.comb += self.results.p.eq(result)
 
@@ -184,4 +182,3 @@ class PipelinedScaler(_Scaler):
         with m.If(valid):
             left = Value.cast(total >> (self._scale_bits - self._bits))[: len(result.quotient)].as_signed()
             m.d.sync += [result.quotient.eq((base << self._frac_bits) + left), result.tag.eq(tag)]
-        return m

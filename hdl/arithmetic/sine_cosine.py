@@ -1,14 +1,14 @@
 """Sine and cosine of an angle."""
 
 from amaranth import Array, C, Cat, Module, Mux, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import Box
 from tachometry.spec.formats.sine import ASIDE, FACTOR_SHIFT, GUARD_BITS, ONE, QUARTER, START, STEPS, TURNS, WIDTH
 
 
-class SineCosine(wiring.Component):
+class SineCosine(Box):
     """Takes an angle, in 2^-16 turns, in clock 0 after reset and in each `STEPS` clocks.
 
     Latency: `STEPS` + 1 clocks.
@@ -17,8 +17,7 @@ class SineCosine(wiring.Component):
     def __init__(self) -> None:
         super().__init__({"angle": In(16), "sin": Out(signed(16)), "cos": Out(signed(16))})
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         step = Signal(range(STEPS))
         x, y, rest = (Signal(signed(WIDTH), name=name) for name in ("x", "y", "rest"))
         quadrant = Signal(2)
@@ -47,10 +46,9 @@ class SineCosine(wiring.Component):
                 self.cos.eq(Mux(quadrant[0] ^ quadrant[1], -one, one)),
                 self.sin.eq(Mux(quadrant[1], -other, other)),
             ]
-        return m
 
 
-class SineTable(wiring.Component):
+class SineTable(Box):
     """Does the same by a table of a quarter turn: half of the clocks are for the sine, the others for the cosine.
 
     To an entry is added what the place in it, times the other function, is; bit by bit.
@@ -59,8 +57,7 @@ class SineTable(wiring.Component):
     def __init__(self) -> None:
         super().__init__({"angle": In(16), "sin": Out(signed(16)), "cos": Out(signed(16))})
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         m.submodules.table = table = Memory(shape=ONE.bit_length(), depth=len(QUARTER), init=QUARTER)
         read = table.read_port()
         clock = Signal(range(STEPS), init=STEPS - 1)
@@ -88,4 +85,3 @@ class SineTable(wiring.Component):
             m.d.sync += sine.eq(total)
             with m.If(cosine):
                 m.d.sync += [held.eq(self.angle), self.sin.eq(sine), self.cos.eq(total)]
-        return m

@@ -1,7 +1,7 @@
 """The S method for many axes."""
 
 from amaranth import Module, Signal, Value, signed
-from amaranth.lib import data, wiring
+from amaranth.lib import data
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
@@ -12,7 +12,7 @@ from tachometry.hdl.axes.turns import Turns
 from tachometry.hdl.output.update import update_layout
 from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import by_name, only_if
+from tachometry.hdl.wires.ports import Box, by_name, only_if
 from tachometry.spec.methods.axes import AxesSpec
 from tachometry.spec.methods.s_axis import DECIDE, READ, SAxis
 
@@ -35,7 +35,7 @@ class _Turn:
         self.before = Signal(kept)
 
 
-class AxesDatapath(wiring.Component):
+class AxesDatapath(Box):
     """S-method datapath that the axes have in turn: from the counts of a tick to position and velocity.
 
     The counts of all axes are handed over in one round; then each axis has its turn. In a turn the state of the axis is
@@ -91,8 +91,7 @@ class AxesDatapath(wiring.Component):
         """Signals of the inside that a waveform should show."""
         return {"turn": self.turns.axis, "m_s": self.window.state.m_s, "numerator": self.window.numerator}
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         m.submodules.turns = self.turns
         m.submodules.window = self.window
         m.submodules.quotient = self.quotient
@@ -101,7 +100,6 @@ class AxesDatapath(wiring.Component):
         self._add(m, turn)
         self._decide(m, turn)
         self._show(m)
-        return m
 
     def _read(self, m: Module, turn: _Turn) -> None:
         """Read the count that was handed over, and the state; both are registered, as block RAM is slow."""

@@ -5,7 +5,7 @@ from functools import reduce
 from operator import or_
 
 from amaranth import C, Module, Mux, Signal, Value, signed
-from amaranth.lib import data, wiring
+from amaranth.lib import data
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
@@ -15,7 +15,7 @@ from tachometry.hdl.axes.track_turns import SHOWN_AFTER, TrackTurns, shown_of, t
 from tachometry.hdl.output.update import shown_layout, update_layout
 from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import by_name, follow, only_if
+from tachometry.hdl.wires.ports import Box, by_name, follow, only_if
 from tachometry.spec.methods.axes import AxesSpec
 from tachometry.spec.methods.axis import output_cycles
 from tachometry.spec.methods.track_axis import TrackAxis
@@ -34,7 +34,7 @@ def kept_layout(axis: TrackAxis) -> data.StructLayout:
     return data.StructLayout(shapes)
 
 
-class AxesTrackDatapath(wiring.Component):
+class AxesTrackDatapath(Box):
     """Tracking datapath that the axes have in turn; as many machines as all turns of a tick need.
 
     Latency: the outputs of an axis are new `spec.plan.latency` clocks after its turn has begun.
@@ -73,8 +73,7 @@ class AxesTrackDatapath(wiring.Component):
         """Signals of the inside that a waveform should show."""
         return {"turn": self.axis}
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         length = self._length(m)
         for number, turns in enumerate(self.machines):
             m.submodules[f"machine_{number}"] = turns
@@ -99,7 +98,6 @@ class AxesTrackDatapath(wiring.Component):
         ]
         if self._axis.extras:
             m.d.comb += self.native_velocity.eq(update.velocity)
-        return m
 
     def _shown(self, m: Module) -> tuple[Signal, Signal, data.View, data.View]:
         """Return a strobe, whose turn is shown with it, and what is new: it is added up once for all machines."""

@@ -5,15 +5,16 @@ from types import MappingProxyType
 from typing import Any
 
 from amaranth import Cat, Const, Module, Mux, ShapeLike, Signal, Value, signed
-from amaranth.lib import data, wiring
+from amaranth.lib import data
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.front_end.decoder import transition
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import Box
 
 
-class AxisCounters(wiring.Component):
+class AxisCounters(Box):
     """Decodes the lines of an axis in its slot, and adds up the steps of its tick; levels and sums are in a memory.
 
     Latency: what is seen in a slot is at the outputs three clocks later. It is back in the memory a clock after that,
@@ -47,8 +48,7 @@ class AxisCounters(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         kept = data.StructLayout({"a": 1, "b": 1, "count": self.count.shape()})
         m.submodules.memory = memory = Memory(shape=kept, depth=self._slots, init=[], attrs=self._memory)
         read = memory.read_port()
@@ -81,7 +81,6 @@ class AxisCounters(wiring.Component):
             write.data.count.eq(self.count),
             write.en.eq(1),
         ]
-        return m
 
     def _add(self, m: Module, before: Any, first: Signal, ready: Signal, step: Signal) -> None:
         """Add a step to what was added up in the rounds before."""

@@ -3,15 +3,15 @@
 from collections.abc import Sequence
 
 from amaranth import Module, Mux, Signal
-from amaranth.lib import data, wiring
+from amaranth.lib import data
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import by_name
+from tachometry.hdl.wires.ports import Box, by_name
 
 
-class AxisFilter(wiring.Component):
+class AxisFilter(Box):
     """Passes a level of an axis when it was the same at `looks` looks that follow each other; see `GlitchFilter`.
 
     Latency: what is seen in a slot is at the outputs three clocks later, and so are the other inputs.
@@ -33,8 +33,7 @@ class AxisFilter(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         of_line = data.StructLayout({"filtered": 1, "known": 1, "before": 1, "held": range(max(self._looks, 2))})
         kept = data.StructLayout(dict.fromkeys(self._lines, of_line))
         m.submodules.memory = memory = Memory(shape=kept, depth=self._slots, init=[])
@@ -62,7 +61,6 @@ class AxisFilter(wiring.Component):
             self.seen_ready.eq(ready),
         ]
         m.d.comb += [read.addr.eq(self.slot), write.addr.eq(self.seen_slot), write.data.eq(after), write.en.eq(1)]
-        return m
 
     def _next(self, m: Module, state: data.View, level: Signal, name: str) -> data.View:
         """Return the state of a line after a look at it."""

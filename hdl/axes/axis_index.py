@@ -1,14 +1,15 @@
 """The positions of all axes at their index lines."""
 
 from amaranth import Module, Mux, Signal, signed
-from amaranth.lib import data, wiring
+from amaranth.lib import data
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import Box
 
 
-class AxisIndex(wiring.Component):
+class AxisIndex(Box):
     """Captures the position of an axis when its index line Z rises.
 
     It adds up all steps once more: the positions of the datapath are those of ticks.
@@ -33,8 +34,7 @@ class AxisIndex(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         kept = data.StructLayout({"z": 1, "position": self.index_position.shape()})
         m.submodules.memory = memory = Memory(shape=kept, depth=self._slots, init=[])
         read = memory.read_port()
@@ -60,4 +60,3 @@ class AxisIndex(wiring.Component):
             write.data.position.eq(self.position),
             write.en.eq(1),
         ]
-        return m

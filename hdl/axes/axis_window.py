@@ -1,11 +1,13 @@
 """The window of a measurement, for an axis whose state is in a memory."""
 
 from amaranth import Module, Mux, signed
-from amaranth.lib import data, wiring
+from amaranth.lib import data
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import Box
 
-class AxisWindow(wiring.Component):
+
+class AxisWindow(Box):
     """Does the work of `AlterationDetector` and `IntervalAccumulator`; their registers come in and go out. No latency.
 
     - `max_ticks`, `kept_ticks`: Longest window, and what a forced update leaves of it.
@@ -40,8 +42,7 @@ class AxisWindow(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         state, after, m_e = self.state, self.next, self.m_e
         alteration = (m_e != state.previous) & (m_e != state.offset) & ~self.clears
         longest = state.m_s == self._max_ticks
@@ -64,4 +65,3 @@ class AxisWindow(wiring.Component):
                 & (state.rests | state.nearly | (longest & ~(state.opening | state.previous).any()))
             ),
         ]
-        return m

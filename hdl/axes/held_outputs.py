@@ -3,13 +3,12 @@
 from collections.abc import Mapping, Sequence
 
 from amaranth import Module, Shape, Signal
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.wires.ports import by_name
+from tachometry.hdl.wires.ports import Box, by_name
 
 
-class HeldOutputs(wiring.Component):
+class HeldOutputs(Box):
     """Holds every value of every axis in a register.
 
     Latency: a value is in its register in the clock after its strobe.
@@ -28,12 +27,10 @@ class HeldOutputs(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         new = by_name(self, self._names)
         for axis in range(self._axes):
             mine = Signal(name=f"of_{axis}")
             m.d.comb += mine.eq(self.strobe & (self.axis == axis))
             with m.If(mine):
                 m.d.sync += [held.eq(new[name]) for name, held in by_name(self, new, f"{{}}_{axis}").items()]
-        return m

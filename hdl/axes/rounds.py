@@ -1,15 +1,14 @@
 """Whose turn it is to be looked at."""
 
 from amaranth import EnableInserter, Module, Signal
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.front_end.external_tick import ExternalTick
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import Box, only_if
 
 
-class Rounds(wiring.Component):
+class Rounds(Box):
     """Goes round the slots, one a clock; the first round begins with the first clock after reset.
 
     - `external`: Fewest and most rounds of a tick whose end comes from outside.
@@ -35,8 +34,7 @@ class Rounds(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         ends = Signal()
         clock = self.sampling_clock
         m.submodules.sampling_clock = EnableInserter(ends)(clock)
@@ -53,4 +51,3 @@ class Rounds(wiring.Component):
         m.d.sync += self.slot.eq(self.slot + 1)
         with m.If(ends):
             m.d.sync += [self.slot.eq(0), self.first.eq(self.last), warmed.eq((warmed << 1) | 1)]
-        return m

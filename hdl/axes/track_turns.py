@@ -1,7 +1,7 @@
 """One machine of the tracking method, which some axes have in turn."""
 
 from amaranth import Module, Signal, Value, signed
-from amaranth.lib import data, wiring
+from amaranth.lib import data
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
@@ -9,7 +9,7 @@ from tachometry.hdl.axes.axis_tick_counts import BLOCK, counts_layout
 from tachometry.hdl.methods.track import delay_of
 from tachometry.hdl.methods.track_machine import TrackMachine
 from tachometry.hdl.output.update import update_layout
-from tachometry.hdl.wires.ports import by_name, drive, only_if
+from tachometry.hdl.wires.ports import Box, by_name, drive, only_if
 from tachometry.spec.formats.tracking import PLACE_BITS, WIDTH
 from tachometry.spec.formats.tracking_code import SMOOTH
 from tachometry.spec.methods.axes import AxesSpec
@@ -41,7 +41,7 @@ def turn_layout(axis: TrackAxis) -> data.StructLayout:
     )
 
 
-class TrackTurns(wiring.Component):
+class TrackTurns(Box):
     """Gives one machine to one axis after the other."""
 
     def __init__(self, spec: AxesSpec, machine: int) -> None:
@@ -65,8 +65,7 @@ class TrackTurns(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         spec, axis, machine = self._spec, self._axis, self.machine
         m.submodules.machine = machine
         plan, n = spec.plan, len(self._own)
@@ -102,7 +101,6 @@ class TrackTurns(wiring.Component):
         ]
         if position is not None:
             m.d.comb += self.turn.position.eq(position)
-        return m
 
     def _handed(self, m: Module, reads: Value) -> tuple[data.View, Signal | None]:
         """Return counts of the axis that has its turn, and its position if an index may reset it."""

@@ -1,11 +1,12 @@
 """Which axis has the datapath."""
 
 from amaranth import Cat, Module, Signal
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import Box
 
-class Turns(wiring.Component):
+
+class Turns(Box):
     """Gives the datapath to one axis after the other, for some clocks each.
 
     After reset each has a turn before any tick: the datapath has nothing else to do, and clears its memory.
@@ -22,8 +23,7 @@ class Turns(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         final = Signal()
         ends = self.step[-1]
         m.d.comb += final.eq(self.axis == self._axes - 1)
@@ -35,4 +35,3 @@ class Turns(wiring.Component):
         # Whatever an upset has left ends here.
         with m.If(self.begin):
             m.d.sync += [self.step.eq(1), self.axis.eq(0)]
-        return m

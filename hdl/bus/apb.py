@@ -10,8 +10,7 @@ class ApbBridge(Bridge):
 
     bus = "apb"
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         native = self.native
         setup = Signal()
         m.d.comb += [
@@ -24,4 +23,3 @@ class ApbBridge(Bridge):
             self.s_apb_prdata.eq(native.read_data),
             self.s_apb_pslverr.eq(native.error),
         ]
-        return m

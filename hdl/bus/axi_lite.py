@@ -40,14 +40,12 @@ class AxiLiteBridge(Bridge):
 
     bus = "axi-lite"
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         write, read = _Write(self), _Read(self)
         self._take(m, write, read)
         self._reach_registers(m, write, read)
         self._answer_write(m, write)
         self._answer_read(m, read)
-        return m
 
     def _take(self, m: Module, write: _Write, read: _Read) -> None:
         """Take addresses and data as they come, one of each."""

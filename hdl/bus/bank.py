@@ -5,19 +5,18 @@ from functools import reduce
 from operator import or_
 
 from amaranth import Cat, Const, Module, Mux, Shape, Signal, Value, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.bus.counter import SaturatingCounter
 from tachometry.hdl.bus.native import native_port
-from tachometry.hdl.wires.ports import by_name
+from tachometry.hdl.wires.ports import Box, by_name
 from tachometry.spec.language.field import WORD, Field, Register
 from tachometry.spec.registers.map import COUNTER_WIDTH, RegisterMap
 
 _DEEPEST = 128  # terms of an expression
 
 
-class RegisterBank(wiring.Component):
+class RegisterBank(Box):
     """Registers as `RegisterMap` lists them, on a native port.
 
     A capture takes in one clock all that the core shows in it. It is made by `capture`, and by reading the first
@@ -41,8 +40,7 @@ class RegisterBank(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         bus = self.bus
         here = {register.name: bus.address == number for number, register in enumerate(self._map)}
         writable = Cat(here[register.name] for register in self._map if register.writable).any()
@@ -54,7 +52,6 @@ class RegisterBank(wiring.Component):
         shown = {**captured, **self._counts(m, lost=lost), "clear": Const(0), "hold": hold, **self._settings(m, here)}
         shown |= by_name(self, (field.port for field in self._map.live))
         self._answer(m, shown)
-        return m
 
     def _control(self, m: Module, here: dict[str, Value], hold: Signal) -> Signal:
         """Follow CONTROL; return whether all is captured in this clock."""

@@ -5,12 +5,12 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
 from tachometry.hdl.bus.native import native_port
-from tachometry.hdl.wires.ports import members
+from tachometry.hdl.wires.ports import Box, members
 from tachometry.spec.registers.buses import BUSES, CAPTURE
 from tachometry.spec.registers.map import RegisterMap
 
 
-class Bridge(wiring.Component):
+class Bridge(Box):
     """From a bus to the native port; `bus` is the name of the bus."""
 
     bus = ""
@@ -30,8 +30,7 @@ class NativeBridge(Bridge):
 
     bus = "native"
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         m.d.comb += [
             self.native.address.eq(self.reg_address),
             self.native.read.eq(self.reg_read),
@@ -40,4 +39,3 @@ class NativeBridge(Bridge):
             self.reg_read_data.eq(self.native.read_data),
             self.reg_error.eq(self.native.error),
         ]
-        return m

@@ -1,11 +1,12 @@
 """A counter tells how often something happened."""
 
 from amaranth import Module
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import Box
 
-class SaturatingCounter(wiring.Component):
+
+class SaturatingCounter(Box):
     """Counts the clocks of an event, and stays at its greatest value."""
 
     def __init__(self, width: int) -> None:
@@ -17,9 +18,7 @@ class SaturatingCounter(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         m.d.sync += self.count.eq(self.count + (self.event & ~self.count.all()))
         with m.If(self.clear):
             m.d.sync += self.count.eq(0)
-        return m

@@ -7,7 +7,7 @@ from amaranth import Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.wires.ports import by_name, follow
+from tachometry.hdl.wires.ports import Box, by_name, follow
 from tachometry.spec.registers.map import RegisterMap
 
 _KINDS = {
@@ -17,7 +17,7 @@ _KINDS = {
 }
 
 
-class Interrupts(wiring.Component):
+class Interrupts(Box):
     """Keeps events for a program; one that comes in the clock in which it is cleared waits on."""
 
     def __init__(self, registers: RegisterMap, axes: int = 1) -> None:
@@ -32,8 +32,7 @@ class Interrupts(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         rested = Signal.like(self.standstill)  # at the latest tick of each axis
         m.d.sync += rested.eq((self.standstill & self.ticks) | (rested & ~self.ticks))
         stall = (self.standstill & self.ticks & ~rested).any()
@@ -44,7 +43,6 @@ class Interrupts(wiring.Component):
             m.d.sync += pending[event].eq(comes[event] | (pending[event] & ~clear[event]))
             raised.append(pending[event] & enable[event])
         m.d.sync += self.irq.eq(reduce(or_, raised))
-        return m
 
 
 def connect(m: Module, box: Interrupts, bank: wiring.Component, core: wiring.Component) -> None:

@@ -51,14 +51,12 @@ class SpiBridge(Bridge):
 
     bus = "spi"
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         lines, frame = _Lines(), _Frame()
         self._watch(m, lines)
         self._shift(m, lines, frame)
         self._reach_registers(m, lines, frame)
         self._send(m, lines, frame)
-        return m
 
     def _watch(self, m: Module, lines: _Lines) -> None:
         """Find the edges of the clock; a frame that was under way at reset is left out."""

@@ -1,10 +1,10 @@
 """A sender makes frames of telemetry on a UART."""
 
 from amaranth import Cat, Const, Module, Mux, Signal
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.bus.native import native_port
+from tachometry.hdl.wires.ports import Box
 from tachometry.spec.language.field import WORD
 from tachometry.spec.registers.frames import CRC_POLYNOMIAL, CRC_START, CRC_WIDTH, FROM_CORE, SEQUENCES, TYPE_LOW, Type
 from tachometry.spec.registers.map import RegisterMap
@@ -32,7 +32,7 @@ class _Bytes:
         self.word_ends = self.in_words & (self.byte == _WORD_BYTES - 1)
 
 
-class TelemetrySender(wiring.Component):
+class TelemetrySender(Box):
     """Sends all captured registers in a frame, as `spec.registers.frames` describes it.
 
     The registers are captured in the clock in which the frame begins.
@@ -52,8 +52,7 @@ class TelemetrySender(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         at = _Bytes(self._words, self._bit_cycles)
         sequence = self._begin(m, at)
         self._time_bits(m, at)
@@ -63,7 +62,6 @@ class TelemetrySender(wiring.Component):
             m.d.sync += [self.busy.eq(1), at.in_header.eq(1), at.left.eq(self._words), at.check.eq(CRC_START)]
             m.d.sync += [at.place.eq(0), at.shown.eq(sequence)]
         self._read_words(m, at)
-        return m
 
     def _begin(self, m: Module, at: _Bytes) -> Signal:
         """Begin a frame that is wanted when none is under way; return the number of the one that is wanted."""

@@ -1,11 +1,12 @@
 """A register keeps the position at the latest tick."""
 
 from amaranth import Module, Mux, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import Box
 
-class TickPosition(wiring.Component):
+
+class TickPosition(Box):
     """Keeps `position` of the clock of the latest tick, that of a tick in this clock included.
 
     Latency: none. Where `open_sum` is the sum of all steps since, and nothing sets the position to 0, a subtraction
@@ -23,12 +24,10 @@ class TickPosition(wiring.Component):
             inputs = {"next": In(position), "open_sum": In(signed(sum_width))}
         super().__init__({"tick": In(1), "position": In(position), **inputs, "latest": Out(position)})
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         if self._sum_width:
             m.d.comb += self.latest.eq(self.next - self.open_sum)
         else:
             kept = Signal.like(self.position)
             m.d.comb += self.latest.eq(Mux(self.tick, self.position, kept))
             m.d.sync += kept.eq(self.latest)
-        return m

@@ -85,8 +85,7 @@ class UartBridge(Bridge):
             occupied=Out(1),  # an answer is sent or waits; nothing else must begin
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         at, frame = _Characters(self._bit_cycles), _Frame()
         m.submodules.sync_uart_rx = Synchronizer(self.uart_rx, at.line)
         self._time_characters(m, at)
@@ -96,7 +95,6 @@ class UartBridge(Bridge):
         self._answer(m, at, frame)
         self._reach_registers(m, at, frame)
         self._send(m, at, frame)
-        return m
 
     def _time_characters(self, m: Module, at: _Characters) -> None:
         """Set the clocks in which a bit is sampled, or begins; a start bit begins to receive."""

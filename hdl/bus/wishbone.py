@@ -13,8 +13,7 @@ class WishboneBridge(Bridge):
 
     bus = "wishbone"
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         native = self.native
         access = Signal()
         answered = Signal()
@@ -30,4 +29,3 @@ class WishboneBridge(Bridge):
             self.wb_err_o.eq(answered & self.wb_cyc_i & self.wb_stb_i & native.error),
         ]
         m.d.sync += answered.eq(access)
-        return m

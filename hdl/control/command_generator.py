@@ -1,11 +1,11 @@
 """Commands that the core makes itself: constant speeds, ramps and sines."""
 
 from amaranth import Cat, Module, Mux, Signal, Value, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.control.product import ParallelProduct, SerialProduct
+from tachometry.hdl.wires.ports import Box
 from tachometry.spec.control.form import POSITION_FRAC_BITS
 from tachometry.spec.control.generator import AMPLITUDE_WIDTH, FACTOR_BITS, MODE_WIDTH, RAMP, WORD, GeneratorForm, Scale
 
@@ -37,7 +37,7 @@ class _Course:
         self.again = Signal()
 
 
-class CommandGenerator(wiring.Component):
+class CommandGenerator(Box):
     """Makes a step at each control tick, as `GeneratorForm` has it. All inputs are taken with `tick`.
 
     The commands are those of a control tick from its clock on, for at least two clocks. The next `tick` may come
@@ -63,8 +63,7 @@ class CommandGenerator(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         at = _Course(self._form)
         product = self._multiply(m, at)
         self._take(m, at)
@@ -75,7 +74,6 @@ class CommandGenerator(wiring.Component):
             held, _ = saturate(m, product.product, (1 << (len(command) - 1)) - 1)
             with m.If(product.done & (at.stage == number)):
                 m.d.sync += command.eq(held)
-        return m
 
     def _multiply(self, m: Module, at: _Course) -> SerialProduct | ParallelProduct:
         """Return the multiplier, with word and factor of the stage."""

@@ -1,14 +1,13 @@
 """When the controller works."""
 
 from amaranth import Module, Signal
-from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import Box, only_if
 
 
-class ControlClock(wiring.Component):
+class ControlClock(Box):
     """Strobes every `period` clocks, for the first time in clock `first` after reset.
 
     - `tells`: It also tells of a tick in the clock before.
@@ -28,12 +27,10 @@ class ControlClock(wiring.Component):
         """Registers that a simulation may move on."""
         return (IdleCounter("left", -1, (0,)),)
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         left = Signal(range(max(self._first, self._period)), init=self._first - 1)
         if "coming" in self.signature.members:
             m.d.comb += self.coming.eq(left == 0)
         m.d.sync += [left.eq(left - 1), self.tick.eq(left == 0)]
         with m.If(left == 0):
             m.d.sync += left.eq(self._period - 1)
-        return m

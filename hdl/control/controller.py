@@ -5,14 +5,13 @@ from functools import reduce
 from operator import or_
 
 from amaranth import Cat, Module, Mux, Signal, Value, ValueLike, signed
-from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleProduct
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.control.product import ParallelProduct, SerialProduct
-from tachometry.hdl.wires.ports import by_name
+from tachometry.hdl.wires.ports import Box, by_name
 from tachometry.spec.control.form import GAINS, GUARD_BITS, ControlForm, Term
 from tachometry.spec.control.ports import GAIN_PORTS
 from tachometry.spec.language.units import signed_width
@@ -56,7 +55,7 @@ class _Steps:
         self.word = Signal(signed(form.word_width), reset_less=True)
 
 
-class Controller(wiring.Component):
+class Controller(Box):
     """Forms the products of `ControlForm` one by one at each control tick, and the current from them.
 
     All inputs but `n` and `current_sum` are taken with `tick`; these hold until `clear`. Every run takes the same time,
@@ -101,8 +100,7 @@ class Controller(wiring.Component):
         names = ("product.product", "product.factor", "product.left", "word")
         return (IdleProduct(*names),) if self._multiplier == "serial" else ()
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         taken, steps = _Taken(self), _Steps(self._form)
         step = self._multiply(m, steps)
         self._sequence(m, steps)
@@ -114,7 +112,6 @@ class Controller(wiring.Component):
         with m.If(steps.finish):
             m.d.sync += steps.term.eq(0)
         self._finish(m, taken, steps)
-        return m
 
     def _multiply(self, m: Module, steps: "_Steps") -> Value:
         """Form a product of word and coefficient; return it, or the word where there is no filter."""

@@ -3,14 +3,13 @@
 from collections.abc import Iterable
 
 from amaranth import Module
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.wires.ports import by_name, members
+from tachometry.hdl.wires.ports import Box, by_name, members
 from tachometry.spec.language.port import Port
 
 
-class HeldInputs(wiring.Component):
+class HeldInputs(Box):
     """Takes all inputs together in the clock before a control tick, unless they are frozen."""
 
     def __init__(self, ports: Iterable[Port]) -> None:
@@ -25,9 +24,7 @@ class HeldInputs(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         with m.If(self.coming & ~self.freeze):
             given = by_name(self, self._names, "given_{}")
             m.d.sync += [port.eq(given[name]) for name, port in by_name(self, self._names).items()]
-        return m

@@ -1,11 +1,12 @@
 """The product that all terms of the controller share."""
 
 from amaranth import Cat, Module, Mux, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import Box
 
-class _Product(wiring.Component):
+
+class _Product(Box):
     """round(word · factor / 2^p).
 
     - `factor_bits`: p.
@@ -26,8 +27,7 @@ class _Product(wiring.Component):
 class SerialProduct(_Product):
     """A bit of the factor a clock, the lowest first: `done` is high p + 1 clocks after `start`."""
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         bits = len(self.factor)
         factor = Signal(bits, reset_less=True)
         total = Signal(signed(len(self.word)), reset_less=True)
@@ -44,14 +44,12 @@ class SerialProduct(_Product):
             m.d.sync += running.eq(0)
         with m.If(self.start):
             m.d.sync += [running.eq(1), total.eq(0), factor.eq(self.factor), left.eq(bits - 1)]
-        return m
 
 
 class ParallelProduct(_Product):
     """At once, with a register behind each step: `done` is high 3 clocks after `start`."""
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         bits = len(self.factor)
         factor = Signal(bits, reset_less=True)
         whole = Signal(signed(len(self.word) + bits + 1), reset_less=True)
@@ -67,4 +65,3 @@ class ParallelProduct(_Product):
             self.done.eq(multiplied),
         ]
         m.d.comb += self.product.eq(product)
-        return m

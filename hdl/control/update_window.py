@@ -1,13 +1,13 @@
 """A window sums what happens between two updates."""
 
 from amaranth import Module, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import Box
 from tachometry.spec.control.form import ControlForm
 
 
-class UpdateWindow(wiring.Component):
+class UpdateWindow(Box):
     """Holds the velocity, counts the control ticks since the update before, and sums their currents.
 
     An update waits for the next control tick. Of several that come between two, the first is taken, as the currents of
@@ -36,8 +36,7 @@ class UpdateWindow(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         waits = Signal()
         if self._form.synchronised:
             ticked = Signal()  # before the first control tick there is no current
@@ -56,4 +55,3 @@ class UpdateWindow(wiring.Component):
             m.d.sync += [self.n.eq(self.n + 1), self.current_sum.eq(self.current_sum + self.current)]
         with m.If(self.clear):
             m.d.sync += [self.n.eq(0), self.current_sum.eq(0)]
-        return m

@@ -8,11 +8,11 @@ from tachometry.hdl.bus.bank import RegisterBank
 from tachometry.hdl.bus.interrupts import Interrupts, connect
 from tachometry.hdl.bus.native import native_port
 from tachometry.hdl.core.axes_tachometer import AxesTachometer
-from tachometry.hdl.wires.ports import by_name, drive, follow, members
+from tachometry.hdl.wires.ports import Box, by_name, drive, follow, members
 from tachometry.spec.registers.axes import AxesMap
 
 
-class AxesRegisterCore(wiring.Component):
+class AxesRegisterCore(Box):
     """Joins a core of many axes and its registers; see `RegisterCore`."""
 
     def __init__(self, registers: AxesMap) -> None:
@@ -27,8 +27,7 @@ class AxesRegisterCore(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         core, bank, spec = self.tachometer, self.bank, self._map.axes
         m.submodules.tachometer, m.submodules.bank = core, bank
         wiring.connect(m, wiring.flipped(self.bus), bank.bus)
@@ -52,4 +51,3 @@ class AxesRegisterCore(wiring.Component):
                 box.standstill.eq(Cat(by_name(core, axes, "standstill_{}").values())),
                 self.irq.eq(box.irq),
             ]
-        return m

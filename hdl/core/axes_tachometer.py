@@ -18,7 +18,7 @@ from tachometry.hdl.axes.rounds import Rounds
 from tachometry.hdl.extras import gates_of, place
 from tachometry.hdl.front_end.index_state import in_state
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import by_name, drive, follow, members
+from tachometry.hdl.wires.ports import Box, by_name, drive, follow, members
 from tachometry.hdl.wires.synchronizer import Synchronizer
 from tachometry.spec.language.port import INDEX, TICK, UPDATE
 from tachometry.spec.methods.axes import AxesSpec
@@ -28,7 +28,7 @@ from tachometry.spec.methods.track_axis import TrackAxis
 _Values = dict[str, Value]  # by their names
 
 
-class AxesTachometer(wiring.Component):
+class AxesTachometer(Box):
     """Pins of many encoders in, their positions and velocities out."""
 
     def __init__(self, spec: AxesSpec) -> None:
@@ -69,8 +69,7 @@ class AxesTachometer(wiring.Component):
         moving = idle_of({"rounds.sampling_clock": self.rounds.sampling_clock})
         return (IdleRounds("rounds.slot", self._spec.slots, moving),) if moving else ()
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         spec = self._spec
         m.submodules.rounds = rounds = self.rounds
         m.submodules.axis_counters = counters = self.axis_counters
@@ -105,7 +104,6 @@ class AxesTachometer(wiring.Component):
         self._show(m, UPDATE, "axis", datapath)
         if self.axis_index is not None:
             self._index(m, self.axis_index, at, level, known)
-        return m
 
     def _index(self, m: Module, index: AxisIndex, at: _Values, level: _Values, known: _Values) -> None:
         """Capture the position of an axis at its index."""

@@ -11,7 +11,7 @@ from tachometry.hdl.bus.uart import UartBridge
 from tachometry.hdl.bus.wishbone import WishboneBridge
 from tachometry.hdl.core.axes_registers import AxesRegisterCore
 from tachometry.hdl.core.register_core import RegisterCore
-from tachometry.hdl.wires.ports import hand_through, members
+from tachometry.hdl.wires.ports import Box, hand_through, members
 from tachometry.spec.registers.axes import AxesMap
 from tachometry.spec.registers.buses import Bus
 from tachometry.spec.registers.map import RegisterMap
@@ -28,7 +28,7 @@ def bridge_on(registers: RegisterMap, bus: Bus) -> Bridge:
     return BRIDGES[bus.name](registers, *cycles)
 
 
-class BusTachometer(wiring.Component):
+class BusTachometer(Box):
     """Puts the registers of a tachometer, maybe with a control loop, on a bus.
 
     It raises ParameterError if the clock cannot make the bits of the bus.
@@ -39,11 +39,9 @@ class BusTachometer(wiring.Component):
         self.bridge = bridge_on(registers, bus)
         super().__init__(members((*registers.core_ports, *bus.ports(registers))))
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         m.submodules.core = core = self.core
         m.submodules.bridge = bridge = self.bridge
         wiring.connect(m, bridge.native, core.bus)
         for name in self.signature.members:
             hand_through(m, self, bridge if name in bridge.signature.members else core, [name])
-        return m

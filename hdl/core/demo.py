@@ -8,14 +8,14 @@ from tachometry.hdl.bus.uart import UartBridge
 from tachometry.hdl.core.bus_tachometer import bridge_on
 from tachometry.hdl.core.emulator import EncoderEmulator
 from tachometry.hdl.core.register_core import RegisterCore
-from tachometry.hdl.wires.ports import by_name, drive, follow, hand_through, members
+from tachometry.hdl.wires.ports import Box, by_name, drive, follow, hand_through, members
 from tachometry.hdl.wires.synchronizer import Synchronizer
 from tachometry.spec.language.field import WORD
 from tachometry.spec.registers.buses import CAPTURE, Bus
 from tachometry.spec.registers.demo import ENCODER_LINES, PERIOD_WIDTH, DemoMap, demo_ports, emulated
 
 
-class Demo(wiring.Component):
+class Demo(Box):
     """A tachometer on pins or on an emulated encoder, with its registers on a bus; telemetry if that is a UART.
 
     The tachometer may have a control loop, whose current is a stream of bits.
@@ -38,8 +38,7 @@ class Demo(wiring.Component):
         self._bus_ports = [port for port in bus.ports(registers) if port.name != CAPTURE.name]
         super().__init__(members(demo_ports(registers, bus)))
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         m.submodules.core = self.core
         m.submodules.bridge = self.bridge
         m.submodules.emulator = ResetInserter(self.core.bank.restart)(self.emulator)
@@ -51,7 +50,6 @@ class Demo(wiring.Component):
         m.d.comb += self.core.capture.eq(self.capture)
         self._native(m, sends)
         self._light(m)
-        return m
 
     def _time(self, m: Module, period: Signal) -> Signal:
         """Count clocks and nominal periods, as windows of a core may last for ever; return when telemetry is due."""

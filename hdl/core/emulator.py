@@ -1,11 +1,10 @@
 """An encoder that is not there."""
 
 from amaranth import Module, Mux, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.core.line import EmulatedLine
-from tachometry.hdl.wires.ports import by_name, only_if
+from tachometry.hdl.wires.ports import Box, by_name, only_if
 from tachometry.spec.registers.emulator import (
     BOUNCE_BITS,
     BOUNCE_WIDTH,
@@ -28,7 +27,7 @@ _HALF = 1 << FINE_WIDTH - 1
 _QUARTER = 1 << FINE_WIDTH - 2
 
 
-class EncoderEmulator(wiring.Component):
+class EncoderEmulator(Box):
     """Turns a phase by a speed, the speed towards what is asked for, and makes the lines of an encoder of it.
 
     The lines follow the phase `spec.registers.emulator.LATENCY` clocks later. The random movement of the edges is
@@ -66,8 +65,7 @@ class EncoderEmulator(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         phase = Signal(PHASE_WIDTH, init=START)
         after = Signal(signed(PHASE_WIDTH + 2))
         m.d.comb += after.eq(phase + (self._speed(m) >> RATE_SHIFT))
@@ -79,7 +77,6 @@ class EncoderEmulator(wiring.Component):
         self._lines(m, fine, random, self._jitter(m, fine, random))
         if self._lines_per_rev is not None:
             self._index(m, fine, after[PHASE_WIDTH:])
-        return m
 
     def _speed(self, m: Module) -> Signal:
         """Go to the speed that is asked for in two clocks, as the sum and its comparison are long carry chains."""

@@ -1,14 +1,13 @@
 """The line of an emulated encoder bounces and drops pulses."""
 
 from amaranth import Module, Mux, Signal
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import Box, only_if
 from tachometry.spec.registers.emulator import BOUNCE_WIDTH
 
 
-class EmulatedLine(wiring.Component):
+class EmulatedLine(Box):
     """Leaves edges out, and lets the line bounce after the others.
 
     Latency: two clocks.
@@ -28,8 +27,7 @@ class EmulatedLine(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         before = Signal()
         level = Signal()
         left = Signal(BOUNCE_WIDTH)
@@ -39,4 +37,3 @@ class EmulatedLine(wiring.Component):
             m.d.sync += self.whole.eq(whole)
         with m.If((self.ideal ^ before) & ~self.drop):
             m.d.sync += [level.eq(self.ideal), left.eq(self.bounce)]
-        return m

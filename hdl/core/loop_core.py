@@ -11,7 +11,7 @@ from tachometry.hdl.control.held_inputs import HeldInputs
 from tachometry.hdl.control.sigma_delta import SigmaDelta
 from tachometry.hdl.control.update_window import UpdateWindow
 from tachometry.hdl.core.tachometer import Tachometer
-from tachometry.hdl.wires.ports import by_name, drive, follow, hand_through, members
+from tachometry.hdl.wires.ports import Box, by_name, drive, follow, hand_through, members
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.ports import GAIN_PORTS
 
@@ -19,7 +19,7 @@ _COMMANDS = ("command_position", "command_velocity", "command_acceleration")
 _DEMANDS = ("mode", "velocity", "acceleration", "amplitude", "rate")
 
 
-class LoopCore(wiring.Component):
+class LoopCore(Box):
     """Takes encoder pins and commands, gives the current, and shows all that the tachometer does."""
 
     def __init__(self, spec: LoopSpec) -> None:
@@ -44,8 +44,7 @@ class LoopCore(wiring.Component):
         boxes = {"tachometer": self.tachometer, "control_clock": self.control_clock, "controller": self.controller}
         return (IdleSum("sigma_delta.left"), IdleEcho("sigma_delta.current_pdm"), *idle_of(boxes))
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         m.submodules.tachometer = self.tachometer
         m.submodules.control_clock = self.control_clock
         m.submodules.window = self.window
@@ -54,7 +53,6 @@ class LoopCore(wiring.Component):
         hand_through(m, self, self.tachometer, members(self._spec.tachometer.ports))
         self._control(m, self._commands(m, self._held(m)))
         self._show(m)
-        return m
 
     def _held(self, m: Module) -> wiring.Component:
         """Return the box that has the inputs: this one, or what holds them between two programs."""

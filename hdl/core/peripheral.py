@@ -11,7 +11,7 @@ from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.core.bus_tachometer import BusTachometer
-from tachometry.hdl.wires.ports import by_name, hand_through
+from tachometry.hdl.wires.ports import Box, by_name, hand_through
 from tachometry.spec.control import AnySpec
 from tachometry.spec.language.field import WORD
 from tachometry.spec.language.option import ParameterError
@@ -36,7 +36,7 @@ _BEAT = {field: f"{STREAM}_t{field}" for field in ("data", "last")}
 _HANDSHAKE = {line: f"{STREAM}_t{line}" for line in ("valid", "ready")}
 
 
-class Peripheral(wiring.Component):
+class Peripheral(Box):
     """Puts a core on a bus of an Amaranth SoC.
 
     The member `bus` has the signature of amaranth-soc where that is installed, and a memory map of the registers; else
@@ -58,8 +58,7 @@ class Peripheral(wiring.Component):
         if _has_soc(bus):
             self.bus.memory_map = _memory_map(registers, in_words=bus == "csr")
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         m.submodules.core = self.core
         self._join(m, self.bus, self._lines)
         hand_through(m, self, self.core, self._alike)
@@ -67,7 +66,6 @@ class Peripheral(wiring.Component):
             records = self.m_axis
             self._join(m, records, _HANDSHAKE)
             self._join(m, records.payload, _BEAT)
-        return m
 
     def _signature(self, bus: str, width: int) -> wiring.Signature:
         """Return the signature of a bus, `width` bits of an address of bytes; amaranth-soc has two of three."""
@@ -88,7 +86,7 @@ class Peripheral(wiring.Component):
             m.d.comb += inner.eq(signal << len(inner) - len(signal)) if is_input else signal.eq(inner)
 
 
-class _Register(wiring.Component):
+class _Register(Box):
     """Stands for a register in a memory map, which takes components alone."""
 
     _MustUse__silence = True  # Amaranth does not warn that it is in no design

@@ -11,7 +11,7 @@ from tachometry.hdl.bus.tick_position import TickPosition
 from tachometry.hdl.core.loop_core import LoopCore
 from tachometry.hdl.core.sampled_tachometer import tachometer_of
 from tachometry.hdl.core.tachometer import Tachometer
-from tachometry.hdl.wires.ports import by_name, drive, follow, members
+from tachometry.hdl.wires.ports import Box, by_name, drive, follow, members
 from tachometry.spec.registers.loop import LoopMap
 from tachometry.spec.registers.map import RegisterMap
 
@@ -19,7 +19,7 @@ _MODULO = "position_modulo"
 _AT_TICK = {"position", _MODULO}
 
 
-class RegisterCore(wiring.Component):
+class RegisterCore(Box):
     """Joins a tachometer, maybe with a control loop, and its registers."""
 
     def __init__(self, registers: RegisterMap) -> None:
@@ -35,8 +35,7 @@ class RegisterCore(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         spec = self._map.spec
         core, bank = self.tachometer, self.bank
         whole = core if self.loop is None else self.loop
@@ -70,7 +69,6 @@ class RegisterCore(wiring.Component):
             self._interrupt(m, whole)
         if open_sum is not None:
             drive(m, position, {"next": core.position_counter.next, "open_sum": open_sum})
-        return m
 
     def _interrupt(self, m: Module, whole: Tachometer | LoopCore) -> None:
         """Raise the interrupt by events of the core and of its extras."""

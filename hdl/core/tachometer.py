@@ -27,13 +27,13 @@ from tachometry.hdl.output.update import update_layout
 from tachometry.hdl.output.update_age import UpdateAge
 from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput, SerialVelocityOutput
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import follow, members
+from tachometry.hdl.wires.ports import Box, follow, members
 from tachometry.spec import TachometerSpec
 from tachometry.spec.formats.displacement import DISPLACED, MAPPED
 from tachometry.spec.language.port import MISSED, TICK, UPDATE, WIDE
 
 
-class Tachometer(wiring.Component):
+class Tachometer(Box):
     """Takes encoder pins, gives position and velocity.
 
     Latencies are those of the spec: `pin_to_count`, `tick_latency`, `tick_to_velocity`, in clocks of the `sync` domain.
@@ -109,8 +109,7 @@ class Tachometer(wiring.Component):
         """Boxes with inputs that a program sets."""
         return (self.conditioner, *self.extras.values())
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         self._place_front(m)
         m.submodules.datapath = self.datapath
         if not self._spec.facts.own_ticks:
@@ -133,7 +132,6 @@ class Tachometer(wiring.Component):
                 m.d.sync += self.synced.eq(self.decoder.synced)
         if self._spec.filter_clocks:
             m.d.comb += self.filtered_edges.eq(self.conditioner.filtered_edges)
-        return m
 
     def _place_front(self, m: Module) -> None:
         """Add the boxes from the pins to the counts of a tick."""

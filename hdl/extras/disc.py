@@ -4,20 +4,19 @@ from collections.abc import Sequence
 from typing import Self
 
 from amaranth import Module, Mux, Signal, Value, signed
-from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.extras.sectors import SectorTable
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import Box, only_if
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.disc import SLIPS_BITS, DiscMap
 from tachometry.spec.formats.displacement import DISPLACED, ENTRY_BITS, MAPPED, Displacement
 from tachometry.spec.formats.sectors import Sectors
 
 
-class Gates(wiring.Component):
+class Gates(Box):
     """A table of the edges, the place in the turn that says which edge a step passes, and trust in that place.
 
     Latency: `displaced` is valid 2 clocks after its `step`, and 0 in clocks without one; `displaced_before` is
@@ -56,8 +55,7 @@ class Gates(wiring.Component):
         place, form = extra.index_place(spec), extra.displacement(spec)
         return cls(table, place, form, writable=extra.writable, looks=spec.facts.update_by != "count")
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         step = self.step
         writes = Signal()
         if self._writable:
@@ -70,7 +68,6 @@ class Gates(wiring.Component):
         with m.If(~(self.disc_used & (counted | self._looks))):  # the reset of a flip-flop is free
             m.d.sync += self.displaced.eq(0)
         m.d.comb += [self.displaced_before.eq(Mux(shows, self.displaced, latest)), self.mapped.eq(self.disc_used)]
-        return m
 
     def _read(self, m: Module, edge: Value, writes: Value, entries: Sequence[int]) -> Value:
         """Return the entry of the edge of the clock before; what is read while it is written is not used."""

@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from amaranth import C, Cat, Module, Mux, Signal, Value, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Member, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, idle_of
 from tachometry.hdl.front_end.open_circuit import OpenCircuit
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
-from tachometry.hdl.wires.ports import by_name
+from tachometry.hdl.wires.ports import Box, by_name
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.health import (
     FAULT_WIDTH,
@@ -39,7 +38,7 @@ def _keep(m: Module, box: "Gates | ReadGates", code: Value) -> None:
         m.d.sync += [box.health.eq(0), box.faults.eq(0)]
 
 
-class ReadGates(wiring.Component):
+class ReadGates(Box):
     """Faults of an encoder that is read: `read_fault` has one in each clock in which it is not 0, see `Gates`."""
 
     def __init__(self, counts: Sequence[str]) -> None:
@@ -48,8 +47,7 @@ class ReadGates(wiring.Component):
         outputs |= dict.fromkeys(counts, Out(READ_COUNT_WIDTH))
         super().__init__({"read_fault": In(READ_FAULT_BITS), "clear": In(1), **outputs})
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         m.d.comb += self.seen.eq(self.read_fault.any())
         _keep(m, self, self.read_fault + READ_FAULTS)
         for name, count in by_name(self, self._counts).items():
@@ -57,7 +55,6 @@ class ReadGates(wiring.Component):
                 m.d.sync += count.eq(count + 1)
             with m.If(self.clear):
                 m.d.sync += count.eq(0)
-        return m
 
 
 @dataclass(frozen=True)
@@ -70,7 +67,7 @@ class Turn:
     presets: bool = False  # an input sets the position
 
 
-class Gates(wiring.Component):
+class Gates(Box):
     """A fault in clock c makes `seen` high in clock c, and is at the outputs in clock c + 1, until `clear`.
 
     Counts that are wrong between two indices are seen in the clock after `index_valid`. Edges and errors are counted
@@ -132,8 +129,7 @@ class Gates(wiring.Component):
         """The times within a second and of equal lines, which a simulation may move on."""
         return idle_of({"window": self.window} | {f"open_{line}": box for line, box in self.open.items()})
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         m.submodules.window = self.window
         a_stands, b_stands = self._standing(m)
         seen = {Fault.A_STANDS: a_stands, Fault.B_STANDS: b_stands, Fault.ILLEGAL: self._illegal(m)}
@@ -150,7 +146,6 @@ class Gates(wiring.Component):
             code = Mux(seen[fault], C(fault, FAULT_WIDTH), code)
         m.d.comb += self.seen.eq(Cat(seen.values()).any())
         _keep(m, self, code)
-        return m
 
     def _standing(self, m: Module) -> tuple[Value, Value]:
         """Return whether A stands, and whether B stands: the other line has had the edges of a fault alone."""

@@ -3,14 +3,14 @@
 from typing import Self
 
 from amaranth import Module, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import Box
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.over_speed import OverSpeed
 
 
-class Gates(wiring.Component):
+class Gates(Box):
     """An update in clock c that is beyond the limit trips in clock c + 1; `beyond` is high in clock c.
 
     `clear` wins over an update in the same clock.
@@ -26,12 +26,10 @@ class Gates(wiring.Component):
         """Return the gates of this core."""
         return cls(extra.greatest(spec), spec.velocity.width)
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         above, below = self.velocity > self._limit, self.velocity < -self._limit
         m.d.comb += self.beyond.eq(self.velocity_valid & (above | below))
         with m.If(self.beyond):
             m.d.sync += self.over_speed.eq(1)
         with m.If(self.clear):
             m.d.sync += self.over_speed.eq(0)
-        return m

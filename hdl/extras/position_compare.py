@@ -3,14 +3,14 @@
 from typing import Any
 
 from amaranth import Module, Mux, ResetInserter, Signal, Value, signed
-from amaranth.lib import data, wiring
+from amaranth.lib import data
 from amaranth.lib.fifo import SyncFIFOBuffered
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
 from tachometry.hdl.output.velocity_output import SerialVelocityOutput
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import Box, only_if
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.position_compare import (
     BACKWARD,
@@ -26,7 +26,7 @@ from tachometry.spec.formats.carrying import FASTER_BITS, Carrying
 Awaited = tuple[Value, Value, list[Any]]
 
 
-class Gates(wiring.Component):
+class Gates(Box):
     """Makes a pulse when a step in the right direction leads to a position, and waits for the next one.
 
     A shaft that turns back over a position, and comes again, makes no second pulse there. A pulse that begins while
@@ -80,8 +80,7 @@ class Gates(wiring.Component):
         """The time that is left of a pulse, which a simulation may move on."""
         return (IdleCounter("left", -1, (1,)),) if self._clocks > 2 else ()
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         reached = Signal()
         awaited, there, moves = self._awaited(m, reached)
         left = Signal(range(self._clocks + 1))
@@ -97,7 +96,6 @@ class Gates(wiring.Component):
                 self.position_compare_position.eq(awaited),
                 self.position_compare_count.eq(self.position_compare_count + 1),
             ]
-        return m
 
     def _awaited(self, m: Module, reached: Signal) -> Awaited:
         """Return the positions that are awaited in this clock."""

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import Self
 
 from amaranth import Cat, Module, Mux, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import Box
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.probe import Probe, packed
 
@@ -23,7 +23,7 @@ class FinePosition:
     latency: int  # clocks from the end of a period to the update with its fine position
 
 
-class Gates(wiring.Component):
+class Gates(Box):
     """An edge of `level_probe` in clock c is in `probe_valid` in clock c + `latency`.
 
     With it are the sum of all steps through clock c and the clocks since the latest of them, and, with a fine position,
@@ -77,8 +77,7 @@ class Gates(wiring.Component):
         widths = {"since": self._time_width, "age": self._fine.age_width if self._fine else 0}
         return tuple(IdleCounter(name, 1, ((1 << width) - 1,)) for name, width in widths.items() if width)
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         level, ready, step = delay(m, self.level_probe, self.ready_probe, self.step[0], clocks=self._latency - 2)
         since = Signal(self._time_width, init=-1)  # of the clock before
         now = Signal.like(since)
@@ -104,4 +103,3 @@ class Gates(wiring.Component):
         for k in range(self._probes):
             with m.If(latches[k]):
                 m.d.sync += [getattr(self, f"probe_{name}_{k}").eq(value) for name, value in latched.items()]
-        return m

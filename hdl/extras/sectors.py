@@ -1,14 +1,14 @@
 """A table of sectors: displacements of edges from the slopes of a line."""
 
 from amaranth import Array, Module, Mux, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import Box
 from tachometry.spec.formats.sectors import SLOPE_BITS, Sectors
 
 
-class SectorTable(wiring.Component):
+class SectorTable(Box):
     """Follows the value of the edge below the place, see `Sectors`, by an addition for each step.
 
     Latency: `entry` is that of the edge that a step passes, or would pass, a clock later.
@@ -29,8 +29,7 @@ class SectorTable(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         table = self._table
         values, half = table.values, 1 << table.fine - 1
         depth = 1 << (len(table.slopes) - 1).bit_length()
@@ -55,4 +54,3 @@ class SectorTable(wiring.Component):
             m.d.sync += quarter.eq(Array(table.quarters)[(self.place + ~self.back)[:2]])
             shown += quarter
         m.d.comb += self.entry.eq(shown)
-        return m

@@ -4,12 +4,11 @@ from collections.abc import Sequence
 from typing import Self
 
 from amaranth import Cat, Module, Shape, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import by_name
+from tachometry.hdl.wires.ports import Box, by_name
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.stream import OVERRUNS_WIDTH, Part, Stream, size_of
 from tachometry.spec.language.port import TICK, UPDATE
@@ -17,7 +16,7 @@ from tachometry.spec.language.port import TICK, UPDATE
 _EVENTS = {"tick": TICK, "update": UPDATE, "edge": "step"}
 
 
-class Gates(wiring.Component):
+class Gates(Box):
     """An event in clock c is in `m_axis_tvalid` in clock c + 1, if the record before is taken until clock c.
 
     An event while a record waits is dropped and counted. A value is that of its port in the clock of the event.
@@ -52,8 +51,7 @@ class Gates(wiring.Component):
         """The time, which a simulation may move on."""
         return (IdleCounter("clocks", 1),)
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         clocks = Signal(32)
         lost = Signal()
         free = Signal()
@@ -80,4 +78,3 @@ class Gates(wiring.Component):
             m.d.sync += self.overruns.eq(self.overruns + 1)
         with m.If(self.clear):
             m.d.sync += self.overruns.eq(0)
-        return m

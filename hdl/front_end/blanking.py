@@ -1,13 +1,13 @@
 """Against echoes and bounce."""
 
 from amaranth import Module, Mux, Signal
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
+from tachometry.hdl.wires.ports import Box
 
 
-class Blanking(wiring.Component):
+class Blanking(Box):
     """Holds the level of a line for `clocks` clocks after a change, then takes the level that the line has.
 
     Latency: none.
@@ -34,8 +34,7 @@ class Blanking(wiring.Component):
         """The time that is left; a simulation may move it on."""
         return (IdleCounter("left", -1, (0,)),)
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         past = Signal()
         left = Signal(range(self._clocks))
         m.d.comb += self.held.eq(Mux(left.any(), past, self.level))
@@ -45,4 +44,3 @@ class Blanking(wiring.Component):
             m.d.sync += left.eq(left - 1)
         with m.Elif(self.ready & starts):
             m.d.sync += left.eq(self._clocks - 1)
-        return m

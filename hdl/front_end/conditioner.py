@@ -4,17 +4,16 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from amaranth import Cat, Module, Signal
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, idle_of
 from tachometry.hdl.front_end.blanking import Blanking
 from tachometry.hdl.front_end.glitch_filter import GlitchFilter
-from tachometry.hdl.wires.ports import by_name
+from tachometry.hdl.wires.ports import Box, by_name
 from tachometry.hdl.wires.synchronizer import Synchronizer
 
 
-class InputConditioner(wiring.Component):
+class InputConditioner(Box):
     """Brings the encoder's lines into the clock domain, and keeps glitches out of it.
 
     Latency: a level that is sampled at clock edge c is at the output in clock c + 2 + `filter_clocks`.
@@ -55,8 +54,7 @@ class InputConditioner(wiring.Component):
         blanked = {f"blanking_{name}": box for name, box in self._blanked.items()}
         return idle_of({f"filter_{name}": box for name, box in self._filters.items()} | blanked)
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         # Two clocks for the synchroniser, one for the decoder's memory of the level before.
         clocks_since_reset = Signal(3)
         m.d.sync += clocks_since_reset.eq((clocks_since_reset << 1) | 1)
@@ -87,7 +85,6 @@ class InputConditioner(wiring.Component):
                 m.d.sync += glitches.eq(0x7FFF)
             with m.If(self.clear):
                 m.d.sync += glitches.eq(0)
-        return m
 
 
 def _blank(m: Module, name: str, box: Blanking, level: Signal, ready: Signal) -> Signal:

@@ -1,17 +1,16 @@
 """From levels to counts."""
 
 from amaranth import Cat, Module, Signal, Value, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.front_end.tooth_wheel import wheel_of
-from tachometry.hdl.wires.ports import by_name, only_if
+from tachometry.hdl.wires.ports import Box, by_name, only_if
 from tachometry.spec.core.encoder import Encoder
 from tachometry.spec.core.sensors import Levels, changes, packed_levels
 from tachometry.spec.core.tooth_wheel import ToothWheel
 
 
-class QuadratureDecoder(wiring.Component):
+class QuadratureDecoder(Box):
     """Decodes quadrature, x1, x2 or x4: gives a step of −1, 0 or +1 per clock, without latency.
 
     Forward is A before B: (A, B) = 00, 10, 11, 01. x4 counts every edge; x2 both edges of A; x1 the edges of A while B
@@ -36,8 +35,7 @@ class QuadratureDecoder(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         past_a = Signal()
         past_b = Signal()
         m.d.sync += [past_a.eq(self.level_a), past_b.eq(self.level_b)]
@@ -48,7 +46,6 @@ class QuadratureDecoder(wiring.Component):
             self.step.eq(Cat(count, count & (~backward if self._reverse else backward))),
             self.decode_error.eq(self.ready & illegal),
         ]
-        return m
 
 
 def transition(
@@ -62,7 +59,7 @@ def transition(
     return counted, backward, change_a & change_b
 
 
-class SensorDecoder(wiring.Component):
+class SensorDecoder(Box):
     """Decodes any sensor: gives a step of −1, 0 or +1 per clock, without latency.
 
     It looks up what a change of the lines counts, see `Sensor.change`. Levels that no sensor has, as of halls that are
@@ -83,8 +80,7 @@ class SensorDecoder(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         encoder, sensor = self._encoder, self._encoder.kind
         level = Cat(by_name(self, sensor.lines, "level_{}").values())
         past = Signal(len(level))
@@ -114,12 +110,11 @@ class SensorDecoder(wiring.Component):
                 self.index.eq(filler.index),
                 self.synced.eq(filler.synced),
             ]
-            return m
+            return
         m.d.comb += [
             self.step.eq(Cat(self.ready & (forward | backward), self.ready & backward)),
             self.decode_error.eq(self.ready & wrong),
         ]
-        return m
 
 
 def _looked_up(m: Module, pairs: set[tuple[Levels, Levels]], level: Value, past: Value) -> Value:

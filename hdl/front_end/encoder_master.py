@@ -3,10 +3,9 @@
 from typing import Any
 
 from amaranth import Module, Mux, Signal, Value
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.wires.ports import by_name, members
+from tachometry.hdl.wires.ports import Box, by_name, members
 from tachometry.hdl.wires.synchronizer import Synchronizer
 from tachometry.spec.core.reads import NO_ANSWER, Reads
 
@@ -21,7 +20,7 @@ class Frame:
         self.done = Signal()
 
 
-class EncoderMaster(wiring.Component):
+class EncoderMaster(Box):
     """Reads a position once for each `start`; see `Reads`.
 
     A read that is due while another one runs, or while the lines rest, is left out and reported as not answered.

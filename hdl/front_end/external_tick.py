@@ -1,14 +1,14 @@
 """The sampling period comes from outside."""
 
 from amaranth import Const, Module, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import Box
 from tachometry.hdl.wires.synchronizer import Synchronizer
 
 
-class ExternalTick(wiring.Component):
+class ExternalTick(Box):
     """Ends a window when `tick_in` rises, as a PWM carrier or a fieldbus sync does.
 
     A rise that comes too early for the datapath is ignored, and its window goes on. If no rise has come for
@@ -39,8 +39,7 @@ class ExternalTick(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         level = Signal()
         past = Signal()
         if self._synchronous:
@@ -68,4 +67,3 @@ class ExternalTick(wiring.Component):
             m.d.sync += enough.eq(1)
         with m.If(self.last):
             m.d.sync += [left.eq(start), enough.eq(0)]
-        return m

@@ -1,13 +1,13 @@
 """Against glitches."""
 
 from amaranth import Module, Mux, Signal
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
+from tachometry.hdl.wires.ports import Box
 
 
-class GlitchFilter(wiring.Component):
+class GlitchFilter(Box):
     """Passes a level when it has held for `clocks` consecutive clocks.
 
     Until the first level has held for so long, nothing is known of the line.
@@ -36,8 +36,7 @@ class GlitchFilter(wiring.Component):
         """The time that a level has held; a simulation may move it on."""
         return (IdleCounter("held", 1, (self._clocks - 1,)),)
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         held = Signal(range(max(self._clocks, 2)))  # no signal is without a bit
         differs = self.level ^ self.filtered
         first = int(self._clocks > 1)  # clocks that a first level has held with its first, if these are not enough
@@ -52,4 +51,3 @@ class GlitchFilter(wiring.Component):
                 m.d.sync += [self.filtered.eq(self.level), self.known.eq(1), held.eq(0)]
             with m.Else():
                 m.d.sync += held.eq(held + 1)
-        return m

@@ -1,14 +1,13 @@
 """A register keeps the position at the index."""
 
 from amaranth import Module, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import Box, only_if
 
 
-class IndexCapture(wiring.Component):
+class IndexCapture(Box):
     """Captures the position when the index line Z rises.
 
     Latency: if `level_z` rises in clock c, `index_valid` is high in clock c + `latency`, and `index_position` is the
@@ -36,8 +35,7 @@ class IndexCapture(wiring.Component):
         self.seen = Signal(name="seen") if once else self.rises
         self.first = Signal(name="first") if early and latency > 2 else self.seen
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         level, ready = delay(m, self.level_z, self.ready, clocks=0 if self._early else self._late)
         past_z = Signal()
         m.d.sync += [past_z.eq(level), self.first.eq(level & ~past_z & ready), self.index_valid.eq(self.rises)]
@@ -52,4 +50,3 @@ class IndexCapture(wiring.Component):
                 m.d.sync += [armed.eq(0), self.homed.eq(1)]
         with m.If(self.rises):
             m.d.sync += self.index_position.eq(self.position)
-        return m

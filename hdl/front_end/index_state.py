@@ -3,14 +3,14 @@
 from collections.abc import Sequence
 
 from amaranth import Cat, Module, Mux, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import Box
 from tachometry.spec.core.sensors import Levels, packed_levels
 
 
-class IndexState(wiring.Component):
+class IndexState(Box):
     """Lets the index Z through in one state of the lines alone, which is one place of a period in both directions.
 
     An index that is wider than a period meets the state twice. So Z that stays high while the lines leave the state on
@@ -38,8 +38,7 @@ class IndexState(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         here = Signal()  # in the state
         beyond = Signal()  # on its far side
         was_here = Signal()
@@ -62,7 +61,6 @@ class IndexState(wiring.Component):
             through.eq(self.ready & self.level_z & (leaves | through)),  # Z since the state was left
             left_beyond.eq(Mux(leaves, beyond, left_beyond)),
         ]
-        return m
 
     def _pass(self, m: Module) -> None:
         """Detect that Z has come and gone without the state."""

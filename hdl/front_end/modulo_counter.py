@@ -4,13 +4,13 @@ import math
 from fractions import Fraction
 
 from amaranth import Module, Mux, Signal, Value, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import Box
 
 
-class ModuloCounter(wiring.Component):
+class ModuloCounter(Box):
     """Counts the steps since the latest multiple of N, rounded up to a whole count.
 
     Latency: that of `PositionCounter`.
@@ -29,8 +29,7 @@ class ModuloCounter(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         (late,) = delay(m, self.step, clocks=self._latency - 1)
         ends = Signal()
         counts, parts = self._modulus.as_integer_ratio()
@@ -40,7 +39,6 @@ class ModuloCounter(wiring.Component):
             m.d.sync += self.count.eq(Mux(ends, Mux(late[1], last, 0), self.count + late))
         with m.If(self.clear):
             m.d.sync += self.count.eq(0)
-        return m
 
     def _last(self, m: Module, back: Value, ends: Value) -> Value:
         """Return the last count of the present part, or backward of the part before it; `ends` leaves the part."""

@@ -1,13 +1,13 @@
 """Against wires that are open."""
 
 from amaranth import Module, Signal
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
+from tachometry.hdl.wires.ports import Box
 
 
-class OpenCircuit(wiring.Component):
+class OpenCircuit(Box):
     """Pulse when a line has equalled its complement for longer than `clocks`, once until they differ again.
 
     - `clear`: What lasts is told again.
@@ -23,12 +23,10 @@ class OpenCircuit(wiring.Component):
         """The time for which they have been equal; a simulation may move it on."""
         return (IdleCounter("since", 1, (self._clocks, self._clocks + 1)),)
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         since = Signal(range(self._clocks + 2))
         m.d.comb += self.open.eq(self.equal & (since == self._clocks))
         with m.If(~self.equal | self.clear):
             m.d.sync += since.eq(0)
         with m.Elif(since <= self._clocks):
             m.d.sync += since.eq(since + 1)
-        return m

@@ -1,13 +1,13 @@
 """Rises of an input."""
 
 from amaranth import Module, Signal
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import Box
 
 
-class PinRise(wiring.Component):
+class PinRise(Box):
     """Pulse when an input rises, or when a program asks for the same.
 
     Latency: if `level` rises in clock c, `rises` is high in clock c + `latency` - 1, in which the position takes the
@@ -27,11 +27,9 @@ class PinRise(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         level, ready = delay(m, self.level, self.ready, clocks=self._latency - 2)
         past = Signal()
         seen = Signal()
         m.d.sync += [past.eq(level), seen.eq(level & ~past & ready)]
         m.d.comb += self.rises.eq(seen | self.asked)
-        return m

@@ -1,14 +1,13 @@
 """A counter sums steps to the position."""
 
 from amaranth import Module, Mux, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import Box, only_if
 
 
-class PositionCounter(wiring.Component):
+class PositionCounter(Box):
     """Adds up all steps; wraps in two's complement.
 
     Latency: a step in clock c is in `position` from clock c + `latency` on, as late as `PulseCounter` shows it, so that
@@ -36,8 +35,7 @@ class PositionCounter(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         (late,) = delay(m, self.step, clocks=self._latency - 1)
         step = Signal.like(self.position)
         m.d.comb += step.eq(late)
@@ -46,4 +44,3 @@ class PositionCounter(wiring.Component):
         m.d.sync += self.position.eq(self.next)
         with m.If(self.clear):
             m.d.sync += self.position.eq(0)
-        return m

@@ -1,15 +1,14 @@
 """A counter finds m_e, the pulse number of a tick."""
 
 from amaranth import Const, Module, Mux, Signal, Value, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.saturate import raised_for, saturate_raised
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import Box, only_if
 
 
-class PulseCounter(wiring.Component):
+class PulseCounter(Box):
     """Adds up the steps of a tick: m_e of Tsuji 2009, Sec. IV-A.
 
     Latency: `tick` is high two clocks after the window's last clock, or four. A step in the clock of the hand-over
@@ -49,8 +48,7 @@ class PulseCounter(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         most = self._max_count + 1 if self._stretched else self._tick_cycles
         start = 0 if self._stretched else raised_for(self._tick_cycles, self._max_count)
         count = Signal(signed(most.bit_length() + 1))
@@ -81,7 +79,6 @@ class PulseCounter(wiring.Component):
         m.d.comb += [self.coming.eq(coming), self.next_count.eq(held)]
         with m.If(coming):
             m.d.sync += [self.pulse_count.eq(held), self.overflow.eq(overflow)]
-        return m
 
     def _stay(self, m: Module, count: Signal, step: Signal, complete: Signal) -> tuple[Value, Value]:
         """Let the sum stay beyond its bound, which a register knows, so that nothing waits for a comparison."""

@@ -1,16 +1,15 @@
 """Positions that are read once a tick, in place of a decoder and its counters."""
 
 from amaranth import C, Cat, Module, Mux, Signal, Value, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.saturate import saturate
-from tachometry.hdl.wires.ports import by_name, only_if
+from tachometry.hdl.wires.ports import Box, by_name, only_if
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.sampled import Reach
 
 
-class SampledPosition(wiring.Component):
+class SampledPosition(Box):
     """Takes the last good read of each tick: gives the position, and its difference from the read before as m_e.
 
     Latency: `tick` is high two clocks after the window's last clock, as in `PulseCounter`; a read in that last clock
@@ -58,8 +57,7 @@ class SampledPosition(wiring.Component):
         self.anew = Signal()  # all that was known is not: a read of the window is far from those before it
         self.turns = Signal(signed(max(spec.position_width - sampled.width, 1)))
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         sampled = self._sampled
         age = by_name(self, ("sample_age",))["sample_age"] if sampled.age is None else sampled.age
         good = Signal()
@@ -84,7 +82,6 @@ class SampledPosition(wiring.Component):
             with m.If(self.coming):
                 m.d.sync += [self.length.eq(length), length.eq(1)]
         self._close(m)
-        return m
 
     def _find_jumps(self, m: Module, reach: Reach, good: Value, read: Value) -> None:
         """Refuse a good read out of reach of the last one, unless it is within reach of one that was just refused."""

@@ -1,11 +1,10 @@
 """A counter divides the clock into sampling periods."""
 
 from amaranth import Cat, Const, Module, Signal, Value, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import Box, only_if
 
 # Bits whose parity makes a shift register of so many bits go through all states but one (Alfke, XAPP 052).
 _TAPS = {5: (5, 3), 6: (6, 5), 7: (7, 6), 8: (8, 6, 5, 4), 9: (9, 5), 10: (10, 7), 11: (11, 9), 12: (12, 6, 4, 1)}
@@ -30,7 +29,7 @@ def state_after(state: Value) -> Value:
     return Cat(~Cat(state[tap - 1] for tap in _TAPS[len(state)]).xor(), state[:-1])
 
 
-class SamplingClock(wiring.Component):
+class SamplingClock(Box):
     """Divides time into windows of `tick_cycles` clocks by a shift register with feedback, or else by a counter.
 
     The first window begins with the first clock after reset. Nothing needs its clocks counted, and the shift register
@@ -64,11 +63,10 @@ class SamplingClock(wiring.Component):
         # Of two clocks none is worth skipping, and one bit goes by the name of what it is connected to.
         return (IdleCounter("left", -1, (-1,)),) if self._tick_cycles > 2 else ()
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         if self._tick_cycles == 1:
             m.d.comb += self.last.eq(1)
-            return m
+            return
         if states := self.states:
             bits = states[-1].bit_length() + 1
             first = states[-self._tick_cycles]
@@ -80,7 +78,7 @@ class SamplingClock(wiring.Component):
                 m.d.comb += self.early.eq(state == states[-1 - self._lead])
             with m.If(self.last):
                 m.d.sync += state.eq(first)
-            return m
+            return
         # Counts down to −1: the sign is the flag, so nothing has to be compared.
         start = self._tick_cycles - 2
         left = Signal(signed(start.bit_length() + 1), init=start)
@@ -90,4 +88,3 @@ class SamplingClock(wiring.Component):
             m.d.comb += self.early.eq(left == self._lead - 1)
         with m.If(self.last):
             m.d.sync += left.eq(start)
-        return m

@@ -33,8 +33,7 @@ class SerialEncoder(EncoderMaster):
         self._reads = reads
         super().__init__(reads)
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         frame, reads = _Frame(self._reads), self._reads
         self._synchronise(m, reads, frame)
         m.d.sync += [frame.at.eq(Mux(frame.beat, 2 * reads.half - 1, frame.at - 1)), frame.time.eq(frame.time + 1)]
@@ -67,7 +66,6 @@ class SerialEncoder(EncoderMaster):
             wrong |= frame.check != self._reads.residue
         reason = Mux(wrong, WRONG_CHECK, Mux(~frame.flags[1], ERROR_BIT, 0))
         self._report(m, frame, reason, ~frame.flags[0], frame.time)
-        return m
 
     def _run_clock(self, m: Module, frame: _Frame) -> None:
         """Let the clock fall at the start, and stop it at a rise."""

@@ -30,8 +30,8 @@ class SpiEncoder(EncoderMaster):
         self._reads = reads
         super().__init__(reads)
 
-    def elaborate(self, platform: object) -> Module:
-        m, reads = Module(), self._reads
+    def build(self, m: Module) -> None:
+        reads = self._reads
         frame = _Frame(max(reads.setup, 2 * reads.half, reads.rest))
         self._synchronise(m, reads, frame)
         m.d.comb += [self.spi_sck.eq(frame.sck), self.spi_cs_n.eq(frame.cs_n)]
@@ -67,7 +67,6 @@ class SpiEncoder(EncoderMaster):
             m.d.comb += self.spi_mosi.eq(0)
         m.d.comb += self.sample.eq(frame.word[POSITION_BITS - reads.width : POSITION_BITS])
         self._report(m, frame, Mux(wrong, WRONG_CHECK, Mux(error, ERROR_BIT, 0)), Value.cast(0), age)
-        return m
 
     def _read_bit(self, m: Module, frame: _Frame) -> None:
         reads = self._reads

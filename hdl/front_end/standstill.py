@@ -1,14 +1,13 @@
 """Detector of a shaft that rests."""
 
 from amaranth import EnableInserter, Module, Mux, ResetInserter, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import Box, only_if
 
 
-class Standstill(wiring.Component):
+class Standstill(Box):
     """Reports rest when the ticks in a row that counted nothing are together longer than `max_ticks` nominal ones.
 
     The tick before the first one counts as empty. Latency: none.
@@ -28,8 +27,7 @@ class Standstill(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         differs = "shift" in self.signature.members
         shown = Signal()
         silent = ~self.m_e[:-1].any()  # only the least number has nothing but its sign
@@ -53,4 +51,3 @@ class Standstill(wiring.Component):
                 m.d.sync += was_silent.eq(silent)
         m.d.comb += self.standstill.eq(Mux(self.tick, none, shown))
         m.d.sync += shown.eq(self.standstill)
-        return m

@@ -42,8 +42,8 @@ class TformatEncoder(EncoderMaster):
         self._reads = reads
         super().__init__(reads)
 
-    def elaborate(self, platform: object) -> Module:
-        m, reads = Module(), self._reads
+    def build(self, m: Module) -> None:
+        reads = self._reads
         frame = _Frame(reads)
         word = Signal(reads.width)
         self._synchronise(m, reads, frame)
@@ -76,7 +76,6 @@ class TformatEncoder(EncoderMaster):
         self._recover(m, machine)
         reason = Mux(frame.wrong | frame.check.any(), WRONG_CHECK, Mux(frame.error, ERROR_BIT, 0))
         self._report(m, frame, reason, frame.warning, frame.time)
-        return m
 
     def _request(self, m: Module, frame: _Frame) -> None:
         """Send the request."""

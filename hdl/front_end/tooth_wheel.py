@@ -3,13 +3,13 @@
 import itertools
 
 from amaranth import Cat, Module, Mux, Signal, Value
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import Box
 from tachometry.spec.core.tooth_wheel import ToothWheel
 
 
-class _Wheel(wiring.Component):
+class _Wheel(Box):
     def __init__(self, wheel: ToothWheel) -> None:
         self._wheel = wheel
         super().__init__(
@@ -30,8 +30,7 @@ class GapFiller(_Wheel):
     the one before as the latest two teeth in a row before the gap were apart.
     """
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         wheel = self._wheel
         since = Signal(wheel.width, init=wheel.longest)  # clocks from the latest tooth on, at their end before any
         period = Signal.like(since, init=0)
@@ -61,7 +60,6 @@ class GapFiller(_Wheel):
                 m.d.sync += known.eq(~long)
         with m.Elif(ends):
             m.d.sync += [left.eq((period + ~halves[0]) >> 1), halves.eq(halves + (halves != wheel.most_halves))]
-        return m
 
     def _one_gap(self, m: Module, here: Signal, late: Signal, halves: Signal) -> tuple[int, int]:
         """Return the teeth that are missing, and the half periods that the gap has at least; `late` is the index."""
@@ -106,8 +104,7 @@ class GapFiller(_Wheel):
 class ExtraDropper(_Wheel):
     """Finds the extra tooth of a wheel and leaves it out, see `ToothWheel`. Latency: none."""
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         wheel = self._wheel
         since = Signal(wheel.width, init=wheel.longest)  # clocks from the latest tooth on that counts
         period = Signal(wheel.width)
@@ -136,7 +133,6 @@ class ExtraDropper(_Wheel):
             m.d.sync += [place.eq(Mux(after, wheel.teeth - 1, place - 1)), known.eq(Mux(long, 0, known << 1 | 1))]
             with m.If(~long):
                 m.d.sync += period.eq(since)
-        return m
 
 
 def wheel_of(wheel: ToothWheel) -> GapFiller | ExtraDropper:

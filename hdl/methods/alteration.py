@@ -1,11 +1,12 @@
 """When the pulse number alters."""
 
 from amaranth import Module, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import Box
 
-class AlterationDetector(wiring.Component):
+
+class AlterationDetector(Box):
     """Pulse alteration of Tsuji 2009, Sec. V-A: an occasional pulse upon a constant offset, Fig. 4(c).
 
     A tick alters when m_e(i) differs from m_e(i−1) and from b, the pulse number of the last tick that did not alter.
@@ -29,8 +30,7 @@ class AlterationDetector(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         offset = Signal.like(self.pulse_count)
         regular = self.tick & ~self.alteration  # b is the number of this tick
         with m.If(regular):
@@ -40,4 +40,3 @@ class AlterationDetector(wiring.Component):
             differs |= regular
         with m.If(self.coming):
             m.d.sync += self.alteration.eq((self.next_count != self.pulse_count) & differs)
-        return m

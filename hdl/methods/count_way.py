@@ -1,13 +1,13 @@
 """Which way a count leads."""
 
 from amaranth import Module, Mux, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import Box
 from tachometry.spec.formats.displacement import Displacement
 
 
-class CountWay(wiring.Component):
+class CountWay(Box):
     """The way from the edge of the last count to that of a count; two counts of opposite sign are from one edge.
 
     It looks a clock ahead, so that all comes from registers, and distances can be added at once. Where the velocity
@@ -35,8 +35,7 @@ class CountWay(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         # Bit 0 of a step tells that it is one, bit 1 its sign.
         counts, negative = self.step_before
         m.d.comb += self.moves_before.eq(counts & (negative == self.negative if self._reversals else 1))
@@ -50,4 +49,3 @@ class CountWay(wiring.Component):
                 m.d.sync += self.way.eq(Mux(self.negative_before, -3 * self._half, 3 * self._half))
         with m.If(counts):
             m.d.sync += self.negative.eq(negative)
-        return m

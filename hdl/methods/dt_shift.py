@@ -3,13 +3,13 @@
 from collections.abc import Callable
 
 from amaranth import Array, Cat, Module, Mux, Signal, Value
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import Box
 from tachometry.spec import RairanTachometer
 
 
-class DtShift(wiring.Component):
+class DtShift(Box):
     """k of dt·2^k, and the end of dt from those of nominal ones.
 
     Latency: k and `last` are those of the new window in the clock after `opens`.
@@ -31,8 +31,7 @@ class DtShift(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         spec, rule = self._spec, self._spec.form.adaptive_dt
         # 2^k − 1 has no register of its own: after an upset that could belong to another k.
         mask = self._soon(m, Cat(self.shift > k for k in range(spec.times.max_tick_shift)))
@@ -63,7 +62,6 @@ class DtShift(wiring.Component):
                 m.d.sync += self.shift.eq(self.shift - 1)
             with m.Elif(up & ~mask[-1]):
                 m.d.sync += self.shift.eq(self.shift + 1)
-        return m
 
     def of(self, constant: Callable[[int], int]) -> Value:
         """Return a constant that depends on k."""

@@ -1,11 +1,12 @@
 """A timer measures the time since the last count."""
 
 from amaranth import Cat, Module, Mux, Signal, Value
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import Box
 
-class GapTimer(wiring.Component):
+
+class GapTimer(Box):
     """Counts timer periods from count to count, and reports when too many periods have had no count.
 
     Reset is treated as a count in the period before the first one; this count opens no window. Without latency: it
@@ -31,8 +32,7 @@ class GapTimer(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         tick = Signal()
         ends = self.count | self.overdue
         with m.If(self.period):
@@ -56,7 +56,6 @@ class GapTimer(wiring.Component):
             last_but_one = has_reached(self.age, self._max_periods - 2) & ~nearly
             m.d.sync += [earlier.eq(counted), nearly.eq(last_but_one & ~ends)]
         m.d.comb += self.overdue_before.eq(longest & ~self.count_before)
-        return m
 
 
 def has_reached(counter: Value, number: int) -> Value:

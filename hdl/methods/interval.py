@@ -1,11 +1,12 @@
 """The window of a measurement: its length and the pulse numbers at its ends."""
 
 from amaranth import Const, Module, Mux, Signal, Value, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import Box
 
-class IntervalAccumulator(wiring.Component):
+
+class IntervalAccumulator(Box):
     """Follows the window from its opening tick a to the present tick i, m_s = i − a.
 
     Inside a window every m_e but the first and the last is the same number, m_e(i−1): that is what "no alteration"
@@ -48,8 +49,7 @@ class IntervalAccumulator(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         last = self.pulse_count
         longest = Signal()
         after_forced = self._kept_ticks + 1
@@ -77,7 +77,6 @@ class IntervalAccumulator(wiring.Component):
         domain += known.eq((opening if self._seldom else opens) - (last << 1) if self._cancel else -last)
         m.d.comb += self.numerator.eq(known + self.next_count)
         self._rest(m, longest & ~opening.any())
-        return m
 
     def _rest(self, m: Module, longest: Value) -> None:
         """Report rest from the tick on in which it is certain; `longest`: a longest window opened without a count."""

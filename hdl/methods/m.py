@@ -1,18 +1,19 @@
 """The M method."""
 
 from amaranth import Module, Mux, Signal, Value, signed
-from amaranth.lib import data, wiring
+from amaranth.lib import data
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.quotient import Quotient
 from tachometry.hdl.methods.datapath import datapath_members, quotients, stamped
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import Box
 from tachometry.hdl.wires.registers import registers
 from tachometry.spec import MTachometer
 
 
-class MovingSum(wiring.Component):
+class MovingSum(Box):
     """Sums the last n pulse numbers, the present one included.
 
     It is the difference of two totals modulo 2^sum_width: all counts up to now, and all counts up to n ticks ago. n
@@ -32,25 +33,23 @@ class MovingSum(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         if self._length == 1:
             m.d.comb += self.total.eq(self.m_e)
-            return m
+            return
         last = self._length - 1
         if last == 1:
             previous = Signal.like(self.m_e)
             with m.If(self.tick):
                 m.d.sync += previous.eq(self.m_e)
             m.d.comb += self.total.eq(previous + self.m_e)
-            return m
+            return
         # All numbers up to the last tick, and up to this one.
         before = Signal.like(self.total)
         through = Signal.like(self.total)
         m.d.comb += [through.eq(before + self.m_e), self.total.eq(through - self._earlier(m, before, last))]
         with m.If(self.tick):
             m.d.sync += before.eq(through)
-        return m
 
     def _earlier(self, m: Module, value: Signal, last: int) -> Value:
         """Return what `value` was `last` ticks ago, valid with `tick`."""
@@ -72,7 +71,7 @@ class MovingSum(wiring.Component):
         return Mux(full, read.data, 0)
 
 
-class MMethod(wiring.Component):
+class MMethod(Box):
     """M-method datapath, eq. (6) of Tsuji 2009: the mean of the last n pulse numbers, every tick.
 
     A mean over a power of two is a shift; otherwise the sum is multiplied by a constant, as in the S method, and
@@ -105,8 +104,7 @@ class MMethod(wiring.Component):
         """Signals of the inside that a waveform should show."""
         return {"sum": self.moving_sum.total}
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         spec = self._spec
         m.submodules.moving_sum = moving_sum = self.moving_sum
         known = Signal(self._tag)
@@ -126,7 +124,6 @@ class MMethod(wiring.Component):
         valid, new = self._divided(m, known)
         m.d.comb += self.updates.valid.eq(valid)
         m.d.comb += [self.updates.p[name].eq(new[name]) for name in new.shape().members]
-        return m
 
     def _divided(self, m: Module, known: data.View) -> tuple[Signal, data.View]:
         """Return the mean and its bounds, with what is known of the sum."""

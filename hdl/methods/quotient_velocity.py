@@ -1,13 +1,13 @@
 """Velocity as a quotient of distance and time."""
 
 from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
-from amaranth.lib import data, wiring
+from amaranth.lib import data
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.divider import Divider
 from tachometry.hdl.methods.datapath import stamped
 from tachometry.hdl.output.update import update_layout, update_stream
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import Box, only_if
 from tachometry.hdl.wires.registers import registers
 from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.methods.timed import TimedTachometer
@@ -22,7 +22,7 @@ def _bound_divider(spec: TimedTachometer) -> Divider:
     )
 
 
-class QuotientVelocity(wiring.Component):
+class QuotientVelocity(Box):
     """Divides distance by time, rounds, and holds the result; between measurements the velocity may decay.
 
     A measurement may begin when `free_before` is high. When `silent_before` is high and the divider is idle, it finds
@@ -71,8 +71,7 @@ class QuotientVelocity(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         spec = self._spec
         new = registers(self.updates.p.shape(), "new")
         m.d.comb += self.updates.p.eq(new)
@@ -94,7 +93,6 @@ class QuotientVelocity(wiring.Component):
                 m.d.sync += new.stamp.eq(stamp)
         if spec.bounds:
             self._bounds(m, new, update)
-        return m
 
     def _start(self, m: Module) -> tuple[Signal, Signal, Signal]:
         """Start the divider; return whether it measures, whether a 0 is forced, and whether the speed is too high."""

@@ -1,7 +1,7 @@
 """The method of Rairán 2013."""
 
 from amaranth import Cat, Const, Module, Mux, Signal, Value, signed
-from amaranth.lib import data, wiring
+from amaranth.lib import data
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
@@ -9,12 +9,12 @@ from tachometry.hdl.arithmetic.idle import Idle, IdleCounter
 from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.rairan_counters import RairanCounters
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import Box, only_if
 from tachometry.hdl.wires.registers import registers
 from tachometry.spec import RairanTachometer
 
 
-class RairanMethod(wiring.Component):
+class RairanMethod(Box):
     """Datapath of Rairán 2013: from steps to velocity with a table, without a divider and without a multiplier.
 
     Latency: an update comes four clocks after the count or the end of dt that causes it, and that is
@@ -50,8 +50,7 @@ class RairanMethod(wiring.Component):
         """Counters that a simulation may skip: `IdleCounter`."""
         return (IdleCounter("counters.left", -1, (-1,)),) if self._spec.timing.tick_cycles > 1 else ()
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         spec = self._spec
         m.submodules.counters = counters = self.counters
         tag = [counters.n, counters.high, counters.backward, counters.forced, counters.at_rest]
@@ -88,7 +87,6 @@ class RairanMethod(wiring.Component):
                 m.d.sync += new.rests.eq(at_rest)
         if spec.bounds:
             self._bounds(m, new, shown=shown, backward=backward)
-        return m
 
     def _entry(self, m: Module) -> Signal:
         """Return the entry of the table, two clocks after the counters have changed."""

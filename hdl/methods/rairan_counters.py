@@ -3,15 +3,14 @@
 from collections.abc import Callable
 
 from amaranth import Const, Module, Mux, Signal, Value, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.methods.dt_shift import DtShift
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import Box, only_if
 from tachometry.spec import RairanTachometer
 
 
-class RairanCounters(wiring.Component):
+class RairanCounters(Box):
     """Table 1 of Rairán 2013 at every clock: Cep, Cdt, the clock of dt, and what they make of Nep1 and Ndt1.
 
     Latency: `update` is high in the clock after the count, or the end of dt, that causes it.
@@ -47,8 +46,7 @@ class RairanCounters(wiring.Component):
         self.longest = Signal()
         self.dt = DtShift(spec, len(self.n)) if spec.adaptive else None
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         pulse = Signal()
         opens = Signal()
         exact = self._spec.paper_exact
@@ -68,9 +66,8 @@ class RairanCounters(wiring.Component):
             with m.Elif(pulse):
                 m.d.sync += late.eq(0)
             self._update_to_the_letter(m, opens)
-            return m
+            return
         self._count_windows(m, pulse, opens, late, due)
-        return m
 
     def _count_windows(self, m: Module, pulse: Signal, opens: Signal, late: Signal, due: Value) -> None:
         """Open a window at the first count after dt, and at one of the other sign."""

@@ -1,7 +1,7 @@
 """The S method."""
 
 from amaranth import Module, Signal, Value, signed
-from amaranth.lib import data, wiring
+from amaranth.lib import data
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleDivision
@@ -10,7 +10,7 @@ from tachometry.hdl.methods.alteration import AlterationDetector
 from tachometry.hdl.methods.datapath import datapath_members, quotients, stamped
 from tachometry.hdl.methods.interval import IntervalAccumulator
 from tachometry.hdl.methods.window_ends import WindowEnds
-from tachometry.hdl.wires.ports import follow
+from tachometry.hdl.wires.ports import Box, follow
 from tachometry.spec import STachometer
 from tachometry.spec.formats.displacement import DISPLACED
 from tachometry.spec.formats.reciprocal import DividedReciprocal
@@ -18,7 +18,7 @@ from tachometry.spec.formats.reciprocal import DividedReciprocal
 _OF_EDGES = (*DISPLACED, "step_before")
 
 
-class SMethod(wiring.Component):
+class SMethod(Box):
     """S-method datapath, eqs. (17) and (21) of Tsuji 2009: from pulse numbers to velocity without a divider.
 
     Latency: an update comes `spec.latency.datapath` clocks after `tick`. The velocity is correctly rounded: within half
@@ -74,8 +74,7 @@ class SMethod(wiring.Component):
         box = "quotient.reciprocal"
         return (IdleDivision(f"{box}.digits", f"{box}.less_one", "interval.m_s", found.steps),)
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         m.submodules.alteration = alteration = self.alteration
         m.submodules.interval = interval = self.interval_accumulator
         m.submodules.quotient = quotient = self.quotient
@@ -112,7 +111,6 @@ class SMethod(wiring.Component):
             with m.If(moves & interval.closes):
                 m.d.sync += later.eq(1)
             m.d.comb += quotient.tag.bounds_valid.eq(later)
-        return m
 
     def _displaced(self, m: Module, numerator: Value) -> Value:
         """Return a numerator with the displacements of the edges at both ends of the window."""

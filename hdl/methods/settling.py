@@ -1,13 +1,13 @@
 """A place that waits for a count goes to the middle of its count."""
 
 from amaranth import Module, Mux, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import Box
 from tachometry.spec.formats.settling import Settling
 
 
-class SettlingPlace(wiring.Component):
+class SettlingPlace(Box):
     """Gives the place of an update, which stays in its count as the velocity falls.
 
     A place that is 3/8 count away begins to wait when the velocity has fallen to half of that at the last count.
@@ -21,8 +21,7 @@ class SettlingPlace(wiring.Component):
         ports = {"velocity": In(signed(velocity_width)), "forced": In(1), "taken": In(1)}
         super().__init__({**ports, "between": In(place), "settled": Out(place)})
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         half = self._settling.half
         velocity = self.velocity >> self._settling.speed_shift
         near = self.between[: self._settling.place_bits]
@@ -49,4 +48,3 @@ class SettlingPlace(wiring.Component):
                 m.d.sync += [limit.eq(half), mark.eq(size >> 1)]
             with m.Elif(slow):
                 m.d.sync += [limit.eq(now), mark.eq(mark >> 1)]
-        return m

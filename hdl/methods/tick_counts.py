@@ -3,10 +3,10 @@
 from itertools import accumulate
 
 from amaranth import C, Cat, Module, Mux, Shape, Signal, Value, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Member, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleSum
+from tachometry.hdl.wires.ports import Box
 from tachometry.spec.formats.displacement import DISPLACED
 from tachometry.spec.formats.tracking import Tracking
 
@@ -25,7 +25,7 @@ def _sums(*sums: tuple[Value, Value, Value]) -> list[Value]:
     return [total[end - len(left) : end] for end, (left, _, _) in zip(ends, sums, strict=True)]
 
 
-class TickCounts(wiring.Component):
+class TickCounts(Box):
     """Adds up times and places of the counts of each tick, valid from two clocks after it until the next ends."""
 
     def __init__(self, form: Tracking, max_ticks: int) -> None:
@@ -70,8 +70,7 @@ class TickCounts(wiring.Component):
         names = ("open_last", "open_times", *("open_length",) * self._form.external)
         return tuple(IdleSum(name) for name in names)
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         number, moved, places = self.open_number, self.open_moved, self.open_places
         fresh = Signal()
         position = Signal(2)
@@ -109,7 +108,6 @@ class TickCounts(wiring.Component):
             ]
         self._show(m, fresh, position)
         self._displace(m, counts, takes)
-        return m
 
     def _displace(self, m: Module, counts: Value, takes: Value) -> None:
         """Add up the displacements of the counts, and keep those of the edges about the end of the tick."""

@@ -10,12 +10,12 @@ from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.gap_timer import GapTimer
 from tachometry.hdl.methods.quotient_velocity import QuotientVelocity
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import Box, only_if
 from tachometry.spec.formats.displacement import DISPLACED
 from tachometry.spec.methods.timed import TimedTachometer
 
 
-class TimedDatapath(wiring.Component):
+class TimedDatapath(Box):
     """From counts to velocities; `_window` of a method says when a measurement ends (docs/concepts/timed.md).
 
     Latency: an update comes `spec.latency.datapath` clocks after the `step`, or the `tick`, that causes it. `interval`
@@ -78,8 +78,7 @@ class TimedDatapath(wiring.Component):
         """The way of this count, times the timer periods in a tick."""
         return self._moved >> 1
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         spec = self._spec
         m.submodules.gap_timer = timer = self.gap_timer
         m.submodules.quotient_velocity = quotient = self.quotient_velocity
@@ -110,7 +109,6 @@ class TimedDatapath(wiring.Component):
                 quotient.was_negative.eq(was_negative),
                 quotient.known.eq(~quotient.beyond_in & (begun | timer.opened) & mapped),
             ]
-        return m
 
     def _added(self, m: Module) -> tuple[Value, Value]:
         """Return the part of the dividend that is known last, in half counts, and the sign of the last count."""

@@ -3,7 +3,6 @@
 from typing import Any
 
 from amaranth import Module, Mux, ResetInserter, Signal, Value, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleBox, idle_of
@@ -12,7 +11,7 @@ from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.settling import SettlingPlace
 from tachometry.hdl.methods.tick_counts import TickCounts
 from tachometry.hdl.methods.track_machine import TrackMachine
-from tachometry.hdl.wires.ports import drive, follow, only_if
+from tachometry.hdl.wires.ports import Box, drive, follow, only_if
 from tachometry.spec import TrackTachometer
 from tachometry.spec.formats.displacement import DISPLACED
 from tachometry.spec.formats.tracking_code import SMOOTH_DELAY_BITS
@@ -25,7 +24,7 @@ def delay_of(shown: Value, time_bits: int) -> Value:
     return (clocks | clocks[SMOOTH_DELAY_BITS:].any().replicate(SMOOTH_DELAY_BITS))[:SMOOTH_DELAY_BITS]
 
 
-class TrackMethod(wiring.Component):
+class TrackMethod(Box):
     """Tracking datapath: least squares over a memory that finds its own length (after Tsuji 2009, eq. (22)).
 
     Latency: an update comes `spec.latency.datapath` clocks after every `tick`, and the filter has taken it before the
@@ -70,8 +69,7 @@ class TrackMethod(wiring.Component):
         boxes = {"tick_counts": self.tick_counts, "left": self.left, "machine": self.machine}
         return (IdleBox("machine"), *idle_of(boxes))
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         spec = self._spec
         m.submodules.machine = machine = self.machine
         position = Signal.like(self.position)
@@ -103,7 +101,6 @@ class TrackMethod(wiring.Component):
                 new.forced.eq(~machine.number.any()),
                 new.standstill.eq(machine.standstill & ~(self.number if self._reads else machine.number.any())),
             ]
-        return m
 
     def _fine(self, m: Module, position: Value, taken: Value) -> Value:
         """Return the position between counts."""

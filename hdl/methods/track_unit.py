@@ -6,11 +6,10 @@ for the bits behind; a power is a table entry, shifted.
 """
 
 from amaranth import C, Cat, Module, Mux, Signal, Value, signed
-from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import Box, only_if
 from tachometry.spec.formats.tracking import (
     CHANCE_BITS,
     EXP_INDEX,
@@ -30,7 +29,7 @@ from tachometry.spec.formats.tracking_units import BLOCK, Start
 _GAIN_LOW = LOG_BITS - (GAIN_STEPS - 1).bit_length()
 
 
-class Unit(wiring.Component):
+class Unit(Box):
     """Ports and table of a unit; `_work` of a subclass adds the rest."""
 
     def __init__(self, program: Program) -> None:
@@ -60,8 +59,7 @@ class Unit(wiring.Component):
         self.tables = Memory(shape=TABLE_BITS, depth=1 << (len(values) - 1).bit_length(), init=values)
         self.table = self.tables.read_port()
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         m.d.sync += [self.doing.eq(self.start), self.how_done.eq(self.how)]
         with m.If(self.begin):
             m.d.sync += self.chance.eq(1 << CHANCE_BITS - 1)
@@ -69,7 +67,6 @@ class Unit(wiring.Component):
             m.d.sync += self.chance.eq(Cat(reversed(self.sum[:CHANCE_BITS])))
         m.submodules.tables = self.tables
         self._work(m)
-        return m
 
     @property
     def factor_bits(self) -> int:

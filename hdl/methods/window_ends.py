@@ -1,14 +1,14 @@
 """The displacements of the edges at the ends of a window."""
 
 from amaranth import Module, Mux, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import Box
 from tachometry.spec.formats.displacement import DISPLACED, Displacement
 
 
-class WindowEnds(wiring.Component):
+class WindowEnds(Box):
     """How far the edges at the end of a window are off their places, less that of its opening.
 
     Eq. (21) of Tsuji 2009 places both ends in the middle of a tick. A tick of more counts than the one before has
@@ -38,8 +38,7 @@ class WindowEnds(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         pair = signed(self._form.width + 1)
         end, opening, kept = (Signal(pair, name=name) for name in ("end", "opening", "kept"))
         above, below, above_was, below_was = (
@@ -63,4 +62,3 @@ class WindowEnds(wiring.Component):
         # With this tick the half of a window opens that a forced update keeps.
         with m.If(self.tick & ((self.m_s == self._moved_on) | (self.forced if self._is_next else 0))):
             m.d.sync += kept.eq(end)
-        return m

@@ -4,12 +4,13 @@ from contextlib import nullcontext
 from typing import Any
 
 from amaranth import Cat, Const, Module, Mux, Signal, signed
-from amaranth.lib import data, wiring
+from amaranth.lib import data
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.output.update import update_stream
 from tachometry.hdl.output.update_age import UpdateAge
+from tachometry.hdl.wires.ports import Box
 from tachometry.hdl.wires.registers import registers
 from tachometry.spec.formats import low_pass
 
@@ -41,7 +42,7 @@ class _Working:
         self.second = Signal(reset_less=True)  # of two factors
 
 
-class LowPass(wiring.Component):
+class LowPass(Box):
     """y ← u + E·(y − u), E = e^(−G·m·T): eq. (22) of Tsuji 2009, with E from a table, multiplied by one bit per clock.
 
     m is the number of ticks since the update before, so that the overlap of two windows is not filtered twice.
@@ -65,8 +66,7 @@ class LowPass(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         layout = self.updates.p.shape()
         filtered = registers(layout, "filtered")
         m.d.comb += self.filtered.p.eq(filtered)
@@ -78,7 +78,6 @@ class LowPass(wiring.Component):
         next_one = _Waiting(layout, elapsed)
         self._wait(m, next_one, elapsed)
         self._filter(m, next_one, filtered)
-        return m
 
     def _wait(self, m: Module, next_one: _Waiting, elapsed: UpdateAge) -> None:
         """Keep the update that waits; one that comes meanwhile takes its place, and its ticks are added."""

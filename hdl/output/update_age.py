@@ -1,13 +1,12 @@
 """How old the velocity is."""
 
 from amaranth import Module, Mux, Signal, Value
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.wires.ports import only_if
+from tachometry.hdl.wires.ports import Box, only_if
 
 
-class UpdateAge(wiring.Component):
+class UpdateAge(Box):
     """Counts the ticks since the cause of the update, or from reset, on, up to `max_age`.
 
     Latency: none; in the clock of an update the age is `fresh`, and a tick in this clock counts already.
@@ -28,8 +27,7 @@ class UpdateAge(wiring.Component):
             }
         )
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         fresh: Value | int = 0
         if self._fresh_width:
             most = self._max_age
@@ -38,4 +36,3 @@ class UpdateAge(wiring.Component):
         m.d.comb += age.eq(Mux(self.update, fresh, self.before))
         m.d.comb += self.age.eq(age + (self.tick & (age != self._max_age)))
         m.d.sync += self.before.eq(self.age)
-        return m

@@ -7,17 +7,18 @@ adder for each digit of the multiplier's canonical form, and accepts any update 
 """
 
 from amaranth import Const, Module, Mux, Signal, Value, signed
-from amaranth.lib import data, wiring
+from amaranth.lib import data
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.output.update import VELOCITIES, shown_layout, update_stream
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import Box
 from tachometry.hdl.wires.registers import registers
 from tachometry.spec.formats import velocity_output
 
 
-class _VelocityOutput(wiring.Component):
+class _VelocityOutput(Box):
     """Holds the parts that both share.
 
     - `layout`: Of an update in counts per tick. All its velocities become those of the unit, bounds rounded outward;
@@ -61,8 +62,7 @@ class SerialVelocityOutput(_VelocityOutput):
     come then.
     """
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         output, update = self._output, self.updates.p
         bits = output.multiplier.bit_length()
         running = Signal()
@@ -99,7 +99,6 @@ class SerialVelocityOutput(_VelocityOutput):
         m.d.comb += self.shown.p.eq(new)
         with m.If(complete):
             m.d.sync += new.eq(shown)
-        return m
 
 
 class PipelinedVelocityOutput(_VelocityOutput):
@@ -109,8 +108,7 @@ class PipelinedVelocityOutput(_VelocityOutput):
     rounded), and one to hold.
     """
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         valid, update = self.updates.valid, self.updates.p
         (place, sign), *others = self._output.digits
         totals, widths = {}, {}
@@ -137,4 +135,3 @@ class PipelinedVelocityOutput(_VelocityOutput):
         new = registers(self.shown.p.shape(), "new")
         m.d.comb += self.shown.p.eq(new)
         m.d.sync += [self.shown.valid.eq(valid), new.eq(self._show(m, update, totals))]
-        return m

@@ -1,4 +1,4 @@
-"""Ports of the exported core as members of a component, and ports of boxes that have the same names."""
+"""Boxes; ports of the exported core as members of a component, and ports of boxes that have the same names."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
@@ -11,6 +11,18 @@ from tachometry.spec import Port
 
 _Name = TypeVar("_Name", str, int)
 _FLOW = {"input": In, "output": Out}
+
+
+class Box(wiring.Component):
+    """Component that fills its own module."""
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        self.build(m)
+        return m
+
+    def build(self, m: Module) -> None:
+        """Add statements and inner boxes to the module."""
 
 
 def members(ports: Iterable[Port]) -> dict[str, Any]:
