@@ -31,13 +31,9 @@ class LoopClient(Client):
         if "loop" not in manifest:
             raise ValueError("manifest must be that of a core with a control loop, which --loop makes")
         super().__init__(read, write, manifest)
-        fields = [(one["name"], field) for one in manifest["registers"]["map"] for field in one["fields"]]
-        # Registers of each setting, the lowest word first.
-        self._parts: dict[str, list[tuple[str, Mapping[str, Any]]]] = {}
-        for name, field in fields:
-            if field["access"] == "rw" and field["port"] and name != "LOOP":
-                self._parts.setdefault(field["port"], []).append((name, field))
-        self._scales = {name: scale for name, scale in _scales(manifest["loop"]) if name in self._parts}
+        fields = (field for one in manifest["registers"]["map"] for field in one["fields"])
+        written = {field["port"] for field in fields if field["access"] == "rw"}
+        self._scales = {name: scale for name, scale in _scales(manifest["loop"]) if name in written}
 
     @property
     def settings(self) -> tuple[str, ...]:
@@ -53,20 +49,9 @@ class LoopClient(Client):
             raise KeyError(f"there is no setting {name!r}; there are {', '.join(self.settings)}")
         if not math.isfinite(value):
             raise ValueError(f"{name} must be a finite number, not {value}")
-        lsb, (_, upper) = self._scales[name], self._parts[name][-1]
-        raw, shift = round(value / lsb), upper["shift"]
-        width = upper["width"]
-        least, most = (-(1 << width - 1), (1 << width - 1) - 1) if upper["signed"] else (0, (1 << width) - 1)
-        if "most" in upper:
-            least, most = upper["least"], upper["most"]
-        elif upper["port_width"] < width + shift:
-            most = (1 << upper["port_width"] - shift - 1) - 1
-            least = -most - 1
-        if not least << shift <= raw < (most + 1) << shift:
-            raise ValueError(
-                f"{name} must be from {(least << shift) * lsb:.9g} to {((most + 1 << shift) - 1) * lsb:.9g}, "
-                f"not {value:.9g}"
-            )
+        lsb, (_, least, most) = self._scales[name], self.registers.limits(name.upper())
+        if not least <= (raw := round(value / lsb)) <= most:
+            raise ValueError(f"{name} must be from {least * lsb:.9g} to {most * lsb:.9g}, not {value:.9g}")
         return raw
 
     def set(self, *, mode: int | None = None, **values: float) -> None:
@@ -79,15 +64,13 @@ class LoopClient(Client):
         if mode not in (None, *range(_MODES)):
             raise ValueError(f"mode must be from 0 to {_MODES - 1}, not {mode!r}")
         raws = {name: self.raw(name, value) for name, value in values.items()}
-        frozen = {"freeze": 1}
         done = {"freeze": 0} | ({} if mode is None else {"mode": mode})
         word = self._word("LOOP")
         loop = self.registers.offset("LOOP")
         after = self.registers.with_fields("LOOP", word, done)
-        self._write(loop, self.registers.with_fields("LOOP", word, frozen))
+        self._write(loop, self.registers.with_fields("LOOP", word, {"freeze": 1}))
         for name, raw in raws.items():
-            for register, field in self._parts[name]:
-                self._write(self.registers.offset(register), raw >> field["shift"] & self.registers.word_mask)
+            self.write(name.upper(), raw)
         self._write(loop, after)
 
     def enable(self, on: bool) -> None:

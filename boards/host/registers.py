@@ -69,17 +69,24 @@ class HostRegisters:
         """Return offsets and words to be written for a value of a register, or of two; KeyError if there is none,
         ValueError if it does not fit.
         """
-        parts = [self._registers[part] for part in (name, f"{name}_LOW", f"{name}_HIGH") if part in self._registers]
-        if not parts or (last := parts[-1]["fields"][-1])["access"] == "ro":
-            raise KeyError(f"there is no register {name!r} that is written")
-        bits = last["low"] + last["width"]
-        if bits == self.word_mask.bit_length():
-            bits = last["port_width"]
-        least, most = (-(1 << bits - 1), (1 << bits - 1) - 1) if last["signed"] else (0, (1 << bits) - 1)
-        least, most = last.get("least", least), last.get("most", most)
+        parts, least, most = self.limits(name)
         if not least <= value <= most:
             raise ValueError(f"{name} must be from {least} to {most}, not {value}")
         return [(part["offset"], value >> part["fields"][0]["shift"] & self.word_mask) for part in parts]
+
+    def limits(self, name: str) -> tuple[list[Mapping[str, Any]], int, int]:
+        """Return a register that is written, or two of its name, the least and the greatest value; KeyError if there
+        is none.
+        """
+        parts = [self._registers[part] for part in (name, f"{name}_LOW", f"{name}_HIGH") if part in self._registers]
+        if not parts or (last := parts[-1]["fields"][-1])["access"] == "ro":
+            raise KeyError(f"there is no register {name!r} that is written")
+        if "most" in last:  # of the upper word
+            return parts, last["least"] << last["shift"], (last["most"] + 1 << last["shift"]) - 1
+        bits = last["low"] + last["width"]
+        if bits == self.word_mask.bit_length():
+            bits = last["port_width"]
+        return parts, *((-(1 << bits - 1), (1 << bits - 1) - 1) if last["signed"] else (0, (1 << bits) - 1))
 
     def snapshot(self, words: Sequence[int]) -> Snapshot:
         """Return what the captured registers say that show these words, in the order of their offsets."""
