@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from tachometry.boards.host.demo import DemoBoard
 from tachometry.boards.host.link import Counts, NoAnswer, Port
@@ -16,6 +16,7 @@ _SILENCE = 2.0  # seconds without telemetry, beyond those of a few frames
 _FRAMES = 5
 _FOREIGN = 8  # bytes that are no frames and no glitches of a line that is being plugged in either
 _WRAP = 1 << 32  # clocks
+_Answer = TypeVar("_Answer")
 
 
 class ClosablePort(Port, Protocol):
@@ -82,18 +83,13 @@ class Session:
         self._latest: int | None = None  # time of the latest frame of this connection
         self._heard = time.monotonic()  # when the latest frame came,
         self._patient_since = self._heard  # or the connection was made
-        self._waits_for = ""
+        self.waits_for = ""  # why there is no telemetry; empty: there is
         self.connections = 0
 
     @property
     def counts(self) -> Counts:
         """The sum over all connections."""
         return self._before if self._board is None else _sum(self._before, self._board.link.receiver.counts)
-
-    @property
-    def waits_for(self) -> str:
-        """Why there is no telemetry; empty: there is."""
-        return self._waits_for
 
     def poll(self) -> Sequence[Frame]:
         """Return telemetry that has come since the last call; connects, and waits for a short time if nothing is there.
@@ -121,25 +117,21 @@ class Session:
     def set(self, settings: Mapping[str, int]) -> None:
         """Change settings of the emulator, now and after each connection from now on."""
         self._settings |= settings
-        if self._board is not None:
-            try:
-                self._board.set(**settings)
-            except NoAnswer:
-                self._disconnect("nothing answers")
-            except Unplugged as error:
-                self._disconnect(error.why)
+        self._asked(lambda board: board.set(**settings))
 
     def counters(self) -> dict[str, int]:
         """Return what the core has counted; empty if it cannot be asked now."""
-        if self._board is None:
-            return {}
+        return self._asked(lambda board: board.client.counters()) or {}
+
+    def _asked(self, ask: Callable[[DemoBoard], _Answer]) -> _Answer | None:
+        """Return what the board answers; None if it cannot be asked now."""
         try:
-            return self._board.client.counters()
+            return None if self._board is None else ask(self._board)
         except NoAnswer:
             self._disconnect("nothing answers")
         except Unplugged as error:
             self._disconnect(error.why)
-        return {}
+        return None
 
     def close(self) -> None:
         """End the telemetry, and give the port back."""
@@ -171,9 +163,9 @@ class Session:
         else:
             self._board, self._latest = board, None
             self.connections += 1
-            if self.connections == 1 or self._waits_for:
+            if self.connections == 1 or self.waits_for:
                 self._told(f"connected to {self._name}")
-            self._waits_for = ""
+            self.waits_for = ""
             self._patient_since = time.monotonic()
             return True
         self._give_back()
@@ -186,9 +178,9 @@ class Session:
             self._wait(why)
 
     def _wait(self, why: str) -> None:
-        if why != self._waits_for:
+        if why != self.waits_for:
             self._told(f"waiting for {self._name}: {why}")
-        self._waits_for = why
+        self.waits_for = why
 
     def _give_back(self) -> None:
         if self._port is not None:
