@@ -35,24 +35,20 @@ class AxesMap(RegisterMap):
 
     @property
     def core(self) -> AxesSpec:
-        """The spec of the core, as of `RegisterMap.core`."""
         return self.axes
 
     @cached_property
     def ports(self) -> tuple[Port, ...]:
-        """Ports with the registers, as of `RegisterMap.ports`."""
         live = [port for port in super().ports if port.name not in _WHOSE]
         # The ports of the core are those of a value, for each axis.
         return tuple(port for axis in range(self.axes.axes) for port in live[axis :: self.axes.axes])
 
     @property
     def strobes(self) -> tuple[str, ...]:
-        """Strobes that the bank follows, as of `RegisterMap.strobes`."""
         return tuple(self.axes.ports.strobes)
 
     @cached_property
     def counted(self) -> dict[str, str]:
-        """Fields of COUNTERS, as of `RegisterMap.counted`: of all axes together."""
         found = {"decode_errors": "Clocks in which both lines of an axis changed at once."}
         found["overflows"] = "Ticks of an axis whose pulse_count was saturated."
         if self.axes.tachometer.external_tick:
@@ -66,7 +62,6 @@ class AxesMap(RegisterMap):
 
     @cached_property
     def events(self) -> dict[str, str]:
-        """Flags of events, as of `RegisterMap.events`, each with the input of the bank that says it."""
         kinds = ("updated", "indexed") if self.axes.tachometer.index else ("updated",)
         return {f"{kind}_{axis}": f"{kind}_now_{axis}" for axis in range(self.axes.axes) for kind in kinds}
 

@@ -40,18 +40,15 @@ class LoopMap(RegisterMap):
 
     @property
     def core(self) -> LoopSpec:
-        """The spec of the core, as of `RegisterMap.core`."""
         return self.loop
 
     @cached_property
     def ports(self) -> tuple[Port, ...]:
-        """Ports with the registers, as of `RegisterMap.ports`."""
         shown = (port for port in self.loop.ports.outputs if port.held_by in (CONTROL, CURRENT) and not port.is_strobe)
         return (*super().ports, *shown)
 
     @property
     def quantities(self) -> tuple[tuple[str, float, str], ...]:
-        """Quantities, as of `RegisterMap.quantities`."""
         entries = loop_entries(self.loop)
         units = {
             "current": ("amperes_per_lsb", "AMPERES_PER_LSB", "A"),

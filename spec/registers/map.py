@@ -139,12 +139,8 @@ class RegisterMap:
     @property
     def live(self) -> tuple[Field, ...]:
         """Fields that show a port of what is around the bank as it is, without a capture."""
-        return tuple(
-            field
-            for register in self.registers
-            for field in register.fields
-            if field.port and not field.writable and not register.captured
-        )
+        fields = (field for register in self.registers if not register.captured for field in register.fields)
+        return tuple(field for field in fields if field.port and not field.writable)
 
     @cached_property
     def counted(self) -> dict[str, str]:
@@ -192,34 +188,19 @@ class RegisterMap:
         }
 
     def _head(self) -> Iterable[Draft]:
-        yield (
-            "IDENTIFICATION",
-            "Says that a tachometer answers: the letters TACH.",
-            (_constant(IDENTIFICATION),),
-            {"constant": True},
-        )
-        yield (
-            "CONFIGURATION",
-            "Says which core it is: a hash of all that a driver relies on, as the manifest has it.",
-            (_constant(self.configuration),),
-            {"constant": True},
-        )
+        help, more = "Says that a tachometer answers: the letters TACH.", {"constant": True}
+        yield "IDENTIFICATION", help, (Field("value", WORD, reset=IDENTIFICATION),), more
+        help = "Says which core it is: a hash of all that a driver relies on, as the manifest has it."
+        yield "CONFIGURATION", help, (Field("value", WORD, reset=self.configuration),), more
         clear = "Writing 1 sets all counters to 0."
         hold = "Reading the velocity does not capture; the input capture still does."
-        yield (
-            "CONTROL",
-            "What a driver may change.",
-            (
-                Field("clear", 1, 0, clear, writable=True, single=True),
-                Field("hold", 1, 1, hold, writable=True),
-                *(
-                    Field(name, 1, place, help, writable=True, single=True, port=f"{name}_now")
-                    for place, (name, help) in enumerate(_CONTROLS.items(), 2)
-                    if name in self.spec.front_end.controls
-                ),
-            ),
-            {},
+        fields = [Field("clear", 1, 0, clear, writable=True, single=True), Field("hold", 1, 1, hold, writable=True)]
+        fields += (
+            Field(name, 1, place, help, writable=True, single=True, port=f"{name}_now")
+            for place, (name, help) in enumerate(_CONTROLS.items(), 2)
+            if name in self.spec.front_end.controls
         )
+        yield "CONTROL", "What a driver may change.", tuple(fields), {}
         counters = (
             Field(name, COUNTER_WIDTH, place * COUNTER_WIDTH, f"{help} It stays at {(1 << COUNTER_WIDTH) - 1}.")
             for place, (name, help) in enumerate(self.counted.items())
@@ -234,7 +215,6 @@ class RegisterMap:
         ports = tuple(ports)
         values = [port for port in ports if port.width > 1]
         for port in values:
-            more = {"captured": True}
             words = range(0, port.width, WORD)
             for word in words:
                 name = port.name.upper() + ("_HIGH" if word else "_LOW" if len(words) > 1 else "")
@@ -243,10 +223,10 @@ class RegisterMap:
                     "value", WORD, help=port.help, signed=port.signed, unit=port.unit, port=port.name, shift=word
                 )
                 first = port is values[0] and not word
-                yield name, f"{low}{port.help}", (field,), {**more, "captures": first and captures}
+                yield name, f"{low}{port.help}", (field,), {"captured": True, "captures": first and captures}
             if port is values[0]:
                 flags = tuple(self._flags(ports, suffix))
-                yield f"STATUS{suffix}", "Flags of what was captured.", flags, more
+                yield f"STATUS{suffix}", "Flags of what was captured.", flags, {"captured": True}
 
     def _placing(self) -> Iterable[Draft]:
         """Return what the position is set to, and by how much the place within a modulus is moved."""
@@ -277,15 +257,11 @@ class RegisterMap:
             ("INTERRUPT_CLEAR", "Writing 1 clears an event.", "clear", {"writable": True, "single": True}),
         )
         for register, help, kind, more in kinds if self.irq else ():
-            yield (
-                register,
-                help,
-                tuple(
-                    Field(event, 1, place, meaning, port=f"irq_{kind}_{event}", **more)
-                    for place, (event, meaning) in enumerate(self.interrupts.items())
-                ),
-                {},
+            fields = (
+                Field(event, 1, place, meaning, port=f"irq_{kind}_{event}", **more)
+                for place, (event, meaning) in enumerate(self.interrupts.items())
             )
+            yield register, help, tuple(fields), {}
 
     def _flags(self, ports: Iterable[Port], suffix: str) -> Iterable[Field]:
         events = {f"updated{suffix}": "There was an update of the velocity since the capture before."}
@@ -296,7 +272,3 @@ class RegisterMap:
         flags += [(port.name, port.help) for port in ports if port.width == 1]
         for place, (name, help) in enumerate(flags):
             yield Field(name, 1, place, help, port="" if name in events else name)
-
-
-def _constant(value: int) -> Field:
-    return Field("value", WORD, reset=value)
