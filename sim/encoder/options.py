@@ -58,6 +58,16 @@ def _fault(help: str, metavar: str, parse: Callable[[str, str], float], name: st
 
 _MOST_NOISE = 1000  # LSB
 
+_VIBRATION = """Sinusoidal vibration of the shaft, such as 1mrad:50Hz. In rad, mrad or deg; Hz, kHz, MHz or GHz. It is \
+part of the true motion."""
+_BOUNCE = """Contact bounce, such as 3:500us. After an edge the line falls back COUNT times within TIME (s, ms, us or \
+ns), or within half the way to the next edge."""
+_BROKEN = "A broken wire, such as b:200ms: high from then on. Line a, b, z, c of halls, or a complement as a_n."
+_STUCK = "A shorted wire, such as a:200ms: constant from then on. Line a, b, z, c of halls, or a complement as a_n."
+_INDEX_SKEW_S = """Delay of the index after A and B, such as 3us or -3us. In s, ms, us or ns; the index is then not \
+gated."""
+_INTERPOLATION = "Interpolation error of sampled positions, such as 0.15:1024. A sine of LSB with PERIODS a turn."
+
 
 @dataclass(frozen=True, kw_only=True)
 class EncoderOptions:
@@ -85,12 +95,7 @@ class EncoderOptions:
     _group = "Encoder faults"
 
     vibration: Vibration | None = option(  # noqa: RUF009
-        None,
-        "Sinusoidal vibration of the shaft, such as 1mrad:50Hz. In rad, mrad or deg; Hz, kHz, MHz or GHz. "
-        "It is part of the true motion.",
-        metavar="AMPL:FREQ",
-        group="Motion",
-        parse=_vibration,
+        None, _VIBRATION, metavar="AMPL:FREQ", group="Motion", parse=_vibration
     )
     jitter: float = _fault(
         "Gaussian jitter of the edges in time, such as 0.05 or 5%. Its standard deviation over the gap to "
@@ -122,13 +127,7 @@ class EncoderOptions:
         number_reader(DEGREES, "deg"),
         name="duty-error",
     )
-    bounce: Bounce | None = option(  # noqa: RUF009
-        None,
-        "Contact bounce, such as 3:500us. After an edge the line falls back COUNT times within TIME (s, "
-        "ms, us or ns), or within half the way to the next edge.",
-        metavar="COUNT:TIME",
-        parse=_bounce,
-    )
+    bounce: Bounce | None = option(None, _BOUNCE, metavar="COUNT:TIME", parse=_bounce)  # noqa: RUF009
     lost: float = _fault(
         "Probability that a line misses a pulse, so two edges.", "PROBABILITY", number_reader(FRACTION)
     )
@@ -137,38 +136,16 @@ class EncoderOptions:
         "PROBABILITY",
         number_reader(FRACTION),
     )
-    broken: LineFault | None = option(  # noqa: RUF009
-        None,
-        "A broken wire, such as b:200ms: high from then on. Line a, b, z, c of halls, or a complement as a_n.",
-        metavar="LINE:TIME",
-        parse=_line_fault,
-    )
-    stuck: LineFault | None = option(  # noqa: RUF009
-        None,
-        "A shorted wire, such as a:200ms: constant from then on. Line a, b, z, c of halls, or a complement as a_n.",
-        metavar="LINE:TIME",
-        parse=_line_fault,
-    )
+    broken: LineFault | None = option(None, _BROKEN, metavar="LINE:TIME", parse=_line_fault)  # noqa: RUF009
+    stuck: LineFault | None = option(None, _STUCK, metavar="LINE:TIME", parse=_line_fault)  # noqa: RUF009
     index_width: int = option(
         1, "Quarter periods of the index mark, 1 to 16. A mark wider than 1 is not gated by A and B.", metavar="N"
     )
-    index_skew_s: float = option(
-        None,
-        "Delay of the index after A and B, such as 3us or -3us. In s, ms, us or ns; the index is then not gated.",
-        text="0s",
-        name="index-skew",
-        metavar="TIME",
-        parse=_time,
-    )
+    index_skew_s: float = option(None, _INDEX_SKEW_S, text="0s", name="index-skew", metavar="TIME", parse=_time)
     noise: float = _fault(
         "Noise of sampled positions: standard deviation in LSB. At most 1000.", "LSB", number_reader(FRACTION)
     )
-    interpolation: tuple[float, int] | None = option(
-        None,
-        "Interpolation error of sampled positions, such as 0.15:1024. A sine of LSB with PERIODS a turn.",
-        metavar="LSB:PERIODS",
-        parse=_interpolation,
-    )
+    interpolation: tuple[float, int] | None = option(None, _INTERPOLATION, metavar="LSB:PERIODS", parse=_interpolation)
     frame_errors: float = _fault(
         "Probability that a read of a sampled position is wrong. Its frame shows that.",
         "P",

@@ -35,6 +35,14 @@ class _Filter:
         return parse_bandwidth.written(value) if value else "none"
 
 
+_POSITION_GAIN = "Gain k_p of the position error, in 1/s²; 0: none. With 0 the velocity alone is controlled."
+_OBSERVER = "Bandwidth of the disturbance observer G_dis. In rad/s, Hz or kHz."
+_CURRENT_LIMIT = "Greatest commanded current, in A or mA. The observer gets the current that is held within it."
+_CONTROL_PERIOD = "Time between two control ticks, such as 20us or 960clk. It is a whole number of clocks."
+_SYNCHRONISED = """Let filter and observer work at velocity updates. That is Fig. 11; otherwise they work at every \
+control tick (Fig. 2)."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Law(WithTachometer, Motor):
     """Says how position and velocity are controlled, and how disturbances are observed.
@@ -44,23 +52,13 @@ class Law(WithTachometer, Motor):
 
     tachometer: TachometerSpec  # of any method
     position_gain: Fraction = option(  # noqa: RUF009
-        None,
-        "Gain k_p of the position error, in 1/s²; 0: none. With 0 the velocity alone is controlled.",
-        text="100",
-        name="kp",
-        metavar="KP",
-        parse=Quantity(PLAIN),
+        None, _POSITION_GAIN, text="100", name="kp", metavar="KP", parse=Quantity(PLAIN)
     )
     velocity_gain: Fraction = option(  # noqa: RUF009
         None, "Gain k_v of the velocity error, in 1/s.", text="30", name="kv", metavar="KV", parse=Quantity(PLAIN)
     )
     observer: Fraction = option(  # noqa: RUF009
-        None,
-        "Bandwidth of the disturbance observer G_dis. In rad/s, Hz or kHz.",
-        text="40rad/s",
-        metavar="BANDWIDTH",
-        unit="rad/s",
-        parse=parse_bandwidth,
+        None, _OBSERVER, text="40rad/s", metavar="BANDWIDTH", unit="rad/s", parse=parse_bandwidth
     )
     velocity_filter: Fraction | None = option(  # noqa: RUF009
         None,
@@ -71,25 +69,12 @@ class Law(WithTachometer, Motor):
         parse=_Filter(),
     )
     current_limit: Fraction = option(  # noqa: RUF009
-        None,
-        "Greatest commanded current, in A or mA. The observer gets the current that is held within it.",
-        text="20A",
-        metavar="CURRENT",
-        parse=Quantity(CURRENT),
+        None, _CURRENT_LIMIT, text="20A", metavar="CURRENT", parse=Quantity(CURRENT)
     )
     control_period: int | None = option(
-        None,
-        "Time between two control ticks, such as 20us or 960clk. It is a whole number of clocks.",
-        shown="one tick",
-        metavar="TIME",
-        unit="clocks",
-        parse_at=parse_clocks,
+        None, _CONTROL_PERIOD, shown="one tick", metavar="TIME", unit="clocks", parse_at=parse_clocks
     )
-    synchronised: bool = option(
-        True,
-        "Let filter and observer work at velocity updates. That is Fig. 11; otherwise they work at every "
-        "control tick (Fig. 2).",
-    )
+    synchronised: bool = option(True, _SYNCHRONISED)
 
     def __post_init__(self) -> None:
         for about in options_of(Law):

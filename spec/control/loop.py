@@ -66,6 +66,13 @@ class LoopLatency:
         return max(self.tick_to_result + 1, generator_clocks(self.multiplier) if self.generated else 0)
 
 
+_MULTIPLIER = """Way in which products of the loop are computed. serial takes a clock for each bit, parallel \
+multipliers of the FPGA."""
+_COMMAND = """Source of commands: inputs or a generator. The generator in the core makes constant speeds, ramps and \
+sines."""
+_GAINS = "Let gains and current limit be fixed, or inputs. A bus makes inputs registers that begin with the options."
+
+
 @dataclass(frozen=True, kw_only=True)
 class Loop(Law):
     """Options and numbers of a disturbance observer and a controller of position and velocity; see `ControlForm`.
@@ -75,23 +82,9 @@ class Loop(Law):
     """
 
     current_width: int = option(16, "Bits of current, 8 to 24.", metavar="N", limits=(8, 24))
-    multiplier: str = option(
-        "serial",
-        "Way in which products of the loop are computed. serial takes a clock for each bit, parallel "
-        "multipliers of the FPGA.",
-        name="loop-multiplier",
-        choices=MULTIPLIERS,
-    )
-    command: str = option(
-        "ports",
-        "Source of commands: inputs or a generator. The generator in the core makes constant speeds, ramps and sines.",
-        choices=COMMANDS,
-    )
-    gains: str = option(
-        "fixed",
-        "Let gains and current limit be fixed, or inputs. A bus makes inputs registers that begin with the options.",
-        choices=FIXED_OR_INPUTS,
-    )
+    multiplier: str = option("serial", _MULTIPLIER, name="loop-multiplier", choices=MULTIPLIERS)
+    command: str = option("ports", _COMMAND, choices=COMMANDS)
+    gains: str = option("fixed", _GAINS, choices=FIXED_OR_INPUTS)
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -16,6 +16,23 @@ from tachometry.spec.formats.velocity_output import NATIVE, UNITS, parse_lsb
 from tachometry.spec.language.option import Option, option, parse_whole
 from tachometry.spec.language.units import FRACTION, Quantity, Speed, parse_bandwidth, parse_speed
 
+_UNIT = """Unit of the velocity. All but count/tick cost a constant multiplication, and the velocity is then off by \
+less than one LSB."""
+_POSITION_WIDTH = "Bits of the position, 8 to 48; it wraps in two's complement."
+_FILTER_CLOCKS = """Glitch filter: a level counts once it has held for TIME. Edges are delayed by TIME, which is at \
+most 100 ms. In s, ms, us or ns, rounded up to clocks; a plain number is clocks. Edges that are filtered out are \
+counted."""
+_PRESET = """Input preset sets the position to N when it rises. No count is lost, and the velocity does not change. \
+With --bus, register PRESET begins with N, and CONTROL.preset sets the position as well."""
+_POSITION_MODULO = """Output position_modulo, 0 to N-1. N is counts, rev is a revolution, rev/4 an electrical turn of \
+4 pole pairs. A preset does not change it, --index-reset makes it 0."""
+_EXTERNAL_TICK = "Input tick_in ends a sampling period, as of a PWM carrier. --tick is its nominal length."
+_BOUNDS = """Bounds: outputs velocity_lower, velocity_upper, bounds_valid. They enclose the true mean speed over the \
+measured window, for an ideal disc and ideal lines, or within --edge-error, while no count is lost."""
+_EDGE_ERROR = "Widen --bounds for edges that are off by up to E counts. 0 to 1, rounded up to eighths."
+_LOWPASS = """Low-pass filter of the velocity, in rad/s, Hz or kHz. It is for measurements of different length, eq. \
+(22); the length is the time since the last update."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
@@ -23,13 +40,7 @@ class Asked:
 
     encoder: Encoder
     timing: Timing = Timing.parse()  # noqa: RUF009
-    unit: str = option(
-        NATIVE,
-        "Unit of the velocity. All but count/tick cost a constant multiplication, and the velocity is "
-        "then off by less than one LSB.",
-        choices=UNITS,
-        tests=("", "rpm", "rad/s", "rev/s"),
-    )
+    unit: str = option(NATIVE, _UNIT, choices=UNITS, tests=("", "rpm", "rad/s", "rev/s"))
     frac_bits: int | None = option(
         None,
         "Fraction bits of the velocity: its LSB is 2^-N of the unit. 4 to 24 in count/tick.",
@@ -67,23 +78,9 @@ class Asked:
         parse=parse_speed,
         tests=("", "some counts per tick"),
     )
-    position_width: int = option(
-        32,
-        "Bits of the position, 8 to 48; it wraps in two's complement.",
-        metavar="N",
-        limits=(8, 48),
-        tests=("8", "", "48"),
-    )
+    position_width: int = option(32, _POSITION_WIDTH, metavar="N", limits=(8, 48), tests=("8", "", "48"))
     filter_clocks: int = option(
-        0,
-        "Glitch filter: a level counts once it has held for TIME. Edges are delayed by TIME, which is at "
-        "most 100 ms. In s, ms, us or ns, rounded up to clocks; a plain number is clocks. Edges that are "
-        "filtered out are counted.",
-        name="filter",
-        metavar="TIME",
-        shown="0",
-        parse_at=parse_filter,
-        tests=("", "1", "5"),
+        0, _FILTER_CLOCKS, name="filter", metavar="TIME", shown="0", parse_at=parse_filter, tests=("", "1", "5")
     )
     blanking_clocks: int = option(
         0,
@@ -100,29 +97,11 @@ class Asked:
     index: Index | None = option(  # noqa: RUF009
         None, "Index line z: it captures the position in index_position.", part=Index
     )
-    preset: int | None = option(
-        None,
-        "Input preset sets the position to N when it rises. No count is lost, and the velocity does not "
-        "change. With --bus, register PRESET begins with N, and CONTROL.preset sets the position as well.",
-        metavar="N",
-        parse=parse_whole,
-        tests=("", "-7"),
-        tacit=True,
-    )
+    preset: int | None = option(None, _PRESET, metavar="N", parse=parse_whole, tests=("", "-7"), tacit=True)
     position_modulo: str | None = option(
-        None,
-        "Output position_modulo, 0 to N-1. N is counts, rev is a revolution, rev/4 an electrical turn of "
-        "4 pole pairs. A preset does not change it, --index-reset makes it 0.",
-        metavar="[N|rev|rev/P]",
-        parse=parse_modulo,
-        tests=("", "rev", "7"),
-        tacit=True,
+        None, _POSITION_MODULO, metavar="[N|rev|rev/P]", parse=parse_modulo, tests=("", "rev", "7"), tacit=True
     )
-    external_tick: bool = option(
-        False,
-        "Input tick_in ends a sampling period, as of a PWM carrier. --tick is its nominal length.",
-        group="Timing",
-    )
+    external_tick: bool = option(False, _EXTERNAL_TICK, group="Timing")
     max_tick_cycles: int | None = option(
         None,
         "Longest external tick. After it the core makes a tick itself and raises tick_error.",
@@ -135,30 +114,12 @@ class Asked:
         needs="external-tick",
     )
     age: bool = option(False, "Output age: ticks since the update.")
-    bounds: bool = option(
-        False,
-        "Bounds: outputs velocity_lower, velocity_upper, bounds_valid. They enclose the true mean speed "
-        "over the measured window, for an ideal disc and ideal lines, or within --edge-error, while no "
-        "count is lost.",
-        fits=lambda spec: spec.facts.bounds,
-    )
+    bounds: bool = option(False, _BOUNDS, fits=lambda spec: spec.facts.bounds)
     edge_error: Fraction = option(  # noqa: RUF009
-        Fraction(0),
-        "Widen --bounds for edges that are off by up to E counts. 0 to 1, rounded up to eighths.",
-        shown="0",
-        metavar="E",
-        parse=Quantity(FRACTION),
-        needs="bounds",
-        tests=("0.3",),
+        Fraction(0), _EDGE_ERROR, shown="0", metavar="E", parse=Quantity(FRACTION), needs="bounds", tests=("0.3",)
     )
     lowpass: Fraction | None = option(  # noqa: RUF009
-        None,
-        "Low-pass filter of the velocity, in rad/s, Hz or kHz. It is for measurements of different "
-        "length, eq. (22); the length is the time since the last update.",
-        metavar="BANDWIDTH",
-        unit="rad/s",
-        parse=parse_bandwidth,
-        tests=("", "20kHz"),
+        None, _LOWPASS, metavar="BANDWIDTH", unit="rad/s", parse=parse_bandwidth, tests=("", "20kHz")
     )
 
     # Unit that speeds are shown in, of those without a unit of their own; None: that of --max-speed, or rad/s. It is

@@ -80,6 +80,9 @@ def _usual_ticks(what: str, text: str, timing: Mapping[str, Any]) -> int:
     return min(max(math.ceil(ticks), MIN_TICKS), MAX_TICKS)
 
 
+_CLOCK_HZ = "Clock of the core, in Hz, kHz, MHz or GHz."
+
+
 @dataclass(frozen=True)
 class Timing:
     """Holds clock, tick and maximum measurement time.
@@ -88,14 +91,7 @@ class Timing:
     """
 
     _group = "Timing"
-    clock_hz: int = option(
-        REQUIRED,
-        "Clock of the core, in Hz, kHz, MHz or GHz.",
-        text="48MHz",
-        name="clock",
-        metavar="FREQUENCY",
-        parse=parse_frequency,
-    )
+    clock_hz: int = option(REQUIRED, _CLOCK_HZ, text="48MHz", name="clock", metavar="FREQUENCY", parse=parse_frequency)
     tick_cycles: int = option(
         REQUIRED,
         "Sampling period Ts, such as 100us, 10kHz or 960clk. It must be a whole number of clocks.",

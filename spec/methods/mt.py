@@ -51,6 +51,11 @@ class MTForm(TimedForm):
         return (1 << self.max_interval.bit_length()) + self.max_periods + self.max_interval + 2
 
 
+_MIN_TIME = "Tc: a measurement lasts longer than this. In s, ms, us or ns, or clocks: 960clk."
+_WHOLE_CYCLES = """Let measurements last whole cycles of A and B. Phase and duty errors of the encoder then cancel. \
+Below one cycle per Tc, and at reversals, they end as without it."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class MTTachometer(TimedTachometer):
     """Divides counts by the time from the first to the last of them (M/T method, eq. (13) of Tsuji 2009).
@@ -60,19 +65,9 @@ class MTTachometer(TimedTachometer):
     """
 
     min_time: int | None = option(
-        None,
-        "Tc: a measurement lasts longer than this. In s, ms, us or ns, or clocks: 960clk.",
-        shown="a tick",
-        metavar="TIME",
-        unit="clocks",
-        parse_at=parse_clocks,
-        tests=("", "longest"),
+        None, _MIN_TIME, shown="a tick", metavar="TIME", unit="clocks", parse_at=parse_clocks, tests=("", "longest")
     )
-    whole_cycles: bool = option(
-        False,
-        "Let measurements last whole cycles of A and B. Phase and duty errors of the encoder then cancel. "
-        "Below one cycle per Tc, and at reversals, they end as without it.",
-    )
+    whole_cycles: bool = option(False, _WHOLE_CYCLES)
 
     method = "mt"
     facts = Facts(

@@ -160,6 +160,11 @@ class RairanForm:
         return ndt1 if self.estimate != "n3" and ndt1 <= self.max_dt(shift) else None
 
 
+_ESTIMATE = "Estimate that the velocity is, eq. (11). n1 is the upper bound, n2 the lower, n3 their harmonic mean."
+_ADAPTIVE = """Longer dt, 2^k ticks, for an error of at most TARGET. It is the shortest with which the relative error \
+of n3, eq. (13), is at most TARGET, such as 1% or 0.01."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class RairanTachometer(TachometerSpec):
     """Tachometer of Rairán 2013: sampling periods dt that a count begins; the paper's ts is a clock.
@@ -170,20 +175,11 @@ class RairanTachometer(TachometerSpec):
     ParameterError.
     """
 
-    estimate: str = option(
-        "n3",
-        "Estimate that the velocity is, eq. (11). n1 is the upper bound, n2 the lower, n3 their harmonic mean.",
-        choices=ESTIMATES,
-    )
+    estimate: str = option("n3", _ESTIMATE, choices=ESTIMATES)
     paper_exact: bool = option(False, "The published algorithm alone: no direction, no standstill.")
     bound_decay: bool = option(True, "Let the velocity decay while no count comes.")
     adaptive: Fraction | None = option(  # noqa: RUF009
-        None,
-        "Longer dt, 2^k ticks, for an error of at most TARGET. It is the shortest with which the relative "
-        "error of n3, eq. (13), is at most TARGET, such as 1% or 0.01.",
-        metavar="TARGET",
-        parse=parse_target,
-        tests=("", "25%"),
+        None, _ADAPTIVE, metavar="TARGET", parse=parse_target, tests=("", "25%")
     )
 
     method = "rairan"

@@ -78,6 +78,15 @@ class Acceleration:
         return self.scale.unit_velocity * float(counts / self.asked.timing.tick_seconds)
 
 
+_MULTIPLIER = """Way in which products are computed. serial takes few cells and a clock for each bit, block a \
+multiplier of the FPGA and few clocks. auto is serial where that fits the tick."""
+_POSITION_FINE_BITS = "Fraction bits of position_fine, 1 to 16. Some extras need more than 6, and then have them."
+_PERIOD = """Period of the interpolation error of an encoder that is read. It is a power of two, in LSB: 128 for 1024 \
+periods of 17 bits. The core learns that error, as four offsets a period."""
+_SMOOTH = """Outputs velocity_smooth and smooth_delay. The velocity in the middle of the memory, some ms ago, has a \
+quarter of the noise; smooth_delay is how long ago, in clocks. For logs, identification, displays."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class TrackTachometer(TachometerSpec):
     """Tachometer that tracks position, velocity and acceleration by least squares; it has no settings.
@@ -99,38 +108,14 @@ class TrackTachometer(TachometerSpec):
         parse_at=parse_clocks,
         tests=("", "5ms"),
     )
-    multiplier: str = option(
-        "auto",
-        "Way in which products are computed. serial takes few cells and a clock for each bit, block a "
-        "multiplier of the FPGA and few clocks. auto is serial where that fits the tick.",
-        choices=_MULTIPLIERS,
-        tests=("", "block"),
-    )
+    multiplier: str = option("auto", _MULTIPLIER, choices=_MULTIPLIERS, tests=("", "block"))
     position_fine_bits: int = option(
-        None,
-        "Fraction bits of position_fine, 1 to 16. Some extras need more than 6, and then have them.",
-        metavar="N",
-        parse=parse_whole,
-        limits=(1, 16),
-        shown="6",
-        tests=("", "1", "16"),
+        None, _POSITION_FINE_BITS, metavar="N", parse=parse_whole, limits=(1, 16), shown="6", tests=("", "1", "16")
     )
     period: int | None = option(
-        None,
-        "Period of the interpolation error of an encoder that is read. It is a power of two, in LSB: 128 for 1024 "
-        "periods of 17 bits. The core learns that error, as four offsets a period.",
-        shown="none is learned",
-        metavar="N",
-        parse=_parse_period,
-        tests=(),
-        tacit=True,
+        None, _PERIOD, shown="none is learned", metavar="N", parse=_parse_period, tests=(), tacit=True
     )
-    smooth: bool = option(
-        False,
-        "Outputs velocity_smooth and smooth_delay. The velocity in the middle of the memory, some ms ago, has a "
-        "quarter of the noise; smooth_delay is how long ago, in clocks. For logs, identification, displays.",
-        tacit=True,
-    )
+    smooth: bool = option(False, _SMOOTH, tacit=True)
 
     method = "track"
     facts = Facts(

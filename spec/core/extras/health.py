@@ -62,6 +62,15 @@ FAULT_TEXTS = {
 COMPLEMENTS = (2, 1 << 20)  # the least and the most clocks
 OPEN = {"a": Fault.A_OPEN, "b": Fault.B_OPEN, "z": Fault.Z_OPEN}  # of lines that have a complement
 
+_ON = """Watch the encoder: outputs health, faults and fault. health is the first fault, faults how many there were, \
+fault that there is one. With --index also index_error. A reset or CONTROL.clear clears them."""
+_EDGES = """Edges of a line, 2 to 65536, by which the other is dead. They count within a second, without an edge of \
+the other line. A shaft that swings about one edge has such edges as well (with --health)."""
+_ERRORS = "Illegal transitions allowed in a second, 0 to 65535. More are a fault (with --health)."
+_DIFFERENTIAL = """Differential encoder: inputs a_n, b_n, and z_n with --index. A line that equals its complement for \
+longer than TIME is an open circuit, a fault (with --health). In s, ms, us or ns, rounded up to clocks; a plain number \
+is clocks. 1us is more than the skew of receivers and cables."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Health(Extra):
@@ -70,46 +79,13 @@ class Health(Extra):
     name = "health"
     texts = {"health": FAULT_TEXTS}  # noqa: RUF012
 
-    on: bool = option(
-        True,
-        "Watch the encoder: outputs health, faults and fault. health is the first fault, faults how many "
-        "there were, fault that there is one. With --index also index_error. A reset or CONTROL.clear "
-        "clears them.",
-        name="health",
-        flag=True,
-        parse=parse_flag,
-        tacit=True,
-    )
-    edges: int = option(
-        256,
-        "Edges of a line, 2 to 65536, by which the other is dead. They count within a second, without an "
-        "edge of the other line. A shaft that swings about one edge has such edges as well (with "
-        "--health).",
-        name="health-edges",
-        metavar="N",
-        limits=(2, 1 << 16),
-        tests=("5",),
-        tacit=True,
-    )
+    on: bool = option(True, _ON, name="health", flag=True, parse=parse_flag, tacit=True)
+    edges: int = option(256, _EDGES, name="health-edges", metavar="N", limits=(2, 1 << 16), tests=("5",), tacit=True)
     errors: int = option(
-        10,
-        "Illegal transitions allowed in a second, 0 to 65535. More are a fault (with --health).",
-        name="health-errors",
-        metavar="N",
-        limits=(0, (1 << 16) - 1),
-        tests=("0",),
-        tacit=True,
+        10, _ERRORS, name="health-errors", metavar="N", limits=(0, (1 << 16) - 1), tests=("0",), tacit=True
     )
     differential: int | None = option(
-        None,
-        "Differential encoder: inputs a_n, b_n, and z_n with --index. A line that equals its complement "
-        "for longer than TIME is an open circuit, a fault (with --health). In s, ms, us or ns, rounded up "
-        "to clocks; a plain number is clocks. 1us is more than the skew of receivers and cables.",
-        name="differential",
-        metavar="TIME",
-        parse_at=parse_filter,
-        tests=("2", "40"),
-        tacit=True,
+        None, _DIFFERENTIAL, name="differential", metavar="TIME", parse_at=parse_filter, tests=("2", "40"), tacit=True
     )
 
     def __post_init__(self) -> None:

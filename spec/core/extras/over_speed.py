@@ -11,6 +11,9 @@ from tachometry.spec.language.option import REQUIRED, ParameterError, option
 from tachometry.spec.language.port import TICK, Port, held
 from tachometry.spec.language.units import Speed, SpeedUnit, format_time, parse_speed
 
+_LIMIT = """Latch output over_speed when the speed exceeds SPEED. In rad/s, rev/s or rpm. A reset or CONTROL.clear \
+clears it."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class OverSpeed(Extra):
@@ -19,14 +22,7 @@ class OverSpeed(Extra):
     name = "over_speed"
 
     limit: Speed = option(  # noqa: RUF009
-        REQUIRED,
-        "Latch output over_speed when the speed exceeds SPEED. In rad/s, rev/s or rpm. A reset or "
-        "CONTROL.clear clears it.",
-        name="over-speed",
-        metavar="SPEED",
-        parse=parse_speed,
-        tests=("", "30rad/s"),
-        tacit=True,
+        REQUIRED, _LIMIT, name="over-speed", metavar="SPEED", parse=parse_speed, tests=("", "30rad/s"), tacit=True
     )
 
     def greatest(self, spec: Numbers) -> int:
