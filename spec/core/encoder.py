@@ -103,6 +103,25 @@ def _polynomial(what: str, text: str) -> str:
 # Of options of an encoder that is read.
 _READ: dict[str, Any] = {"fits": lambda spec: bool(spec.facts.takes_reads), "tests": (), "tacit": True}
 
+_DECODING = """Counts per pulse. 4 (or x4) counts every edge, 2 both edges of A, 1 the edges of A while B is low. With \
+--sensor pulses or step-dir 2 counts every edge of A, 1 the rises: the default is 2 of pulses, 1 of steps. Up/down \
+always has 1, a period of halls 6."""
+_INVERT = "Lines that are inverted: a, b, c, z, with commas between."
+_RATIO = """Turns of the encoder in a turn of the shaft, as 10/9 or 1.75. Speeds, angles and plans are the shaft's; \
+--ppr, positions in counts and the index are the encoder's."""
+_TEETH = """Teeth of a crank wheel, as 60-2, 36-2-2-2 or 24+1, one extra. It needs --sensor pulses and --ppr N. Gaps \
+are evenly spread, or listed with the teeth before them, as 15-2,3-2,18-2; the core takes any. Missing teeth count \
+where they would be once the place is known, extra ones do not. With --index the first tooth after the gap, after the \
+longest row of teeth, or after the extra tooth is the index, and there is no pin z. Output synced is high while the \
+pattern is in its place."""
+_BITS = "Bits of a sampled position (instead of --ppr). M+B: M of turns and B of a turn, as 12+17, or B alone."
+_SAMPLE_AGE = """Age of each sampled position, in clocks. It is the time since the shaft was there; without it, input \
+sample_age has it."""
+_ZERO = "Position of an encoder that is read, in LSB, which is 0. On a bus register ZERO begins with it."
+_LINE_DELAY = """Delay of the lines to an encoder and back. With ssi and spi each bit is read this much later; biss \
+and tformat measure it in every frame, and simulations take it."""
+_CRC = "Polynomial of the CRC of biss, with its highest term. It begins with 0 and is sent inverted."
+
 
 @dataclass(frozen=True)
 class Encoder:
@@ -135,16 +154,7 @@ class Encoder:
             ),
         ),
     )
-    decoding: int = option(
-        None,
-        "Counts per pulse. 4 (or x4) counts every edge, 2 both edges of A, 1 the edges of A while B is "
-        "low. With --sensor pulses or step-dir 2 counts every edge of A, 1 the rises: the default is 2 of pulses, "
-        "1 of steps. Up/down always has 1, a period of halls 6.",
-        parse=_factor,
-        shown="4",
-        metavar="[4|2|1]",
-        tests=("", "2", "1"),
-    )
+    decoding: int = option(None, _DECODING, parse=_factor, shown="4", metavar="[4|2|1]", tests=("", "2", "1"))
     sensor: str = option(
         "quadrature",
         "Kind of the encoder, as quadrature, pulses, hall or biss. quadrature: A and B. pulses: A alone, of "
@@ -159,58 +169,12 @@ class Encoder:
         tacit=True,
     )
     reverse: bool = option(False, "Reverse the direction of counting.", tacit=True)
-    invert: str | None = option(
-        None,
-        "Lines that are inverted: a, b, c, z, with commas between.",
-        metavar="LINES",
-        parse=_inverted,
-        tests=("", "a"),
-        tacit=True,
-    )
-    ratio: str | None = option(
-        None,
-        "Turns of the encoder in a turn of the shaft, as 10/9 or 1.75. Speeds, angles and plans are the "
-        "shaft's; --ppr, positions in counts and the index are the encoder's.",
-        shown="1",
-        metavar="N/M",
-        parse=_ratio,
-        tests=(),
-        tacit=True,
-    )
-    teeth: str | None = option(
-        None,
-        "Teeth of a crank wheel, as 60-2, 36-2-2-2 or 24+1, one extra. It needs --sensor pulses and --ppr N. "
-        "Gaps are evenly spread, or listed with the teeth before them, as 15-2,3-2,18-2; the core takes any. "
-        "Missing teeth count where they would be once the place is known, extra ones do not. With --index "
-        "the first tooth after the gap, after the longest row of teeth, or after the extra tooth is the index, and "
-        "there is no pin z. Output synced is high while the pattern is in its place.",
-        metavar="PATTERN",
-        parse=_teeth,
-        tests=(),
-        tacit=True,
-    )
-    bits: str | None = option(
-        None,
-        "Bits of a sampled position (instead of --ppr). M+B: M of turns and B of a turn, as 12+17, or B alone.",
-        metavar="M+B",
-        parse=parse_bits,
-        **_READ,
-    )
-    sample_age: int | None = option(
-        None,
-        "Age of each sampled position, in clocks. It is the time since the shaft was there; without it, "
-        "input sample_age has it.",
-        metavar="N",
-        parse=parse_whole,
-        **_READ,
-    )
-    zero: int | None = option(
-        None,
-        "Position of an encoder that is read, in LSB, which is 0. On a bus register ZERO begins with it.",
-        metavar="N",
-        parse=parse_whole,
-        **_READ,
-    )
+    invert: str | None = option(None, _INVERT, metavar="LINES", parse=_inverted, tests=("", "a"), tacit=True)
+    ratio: str | None = option(None, _RATIO, shown="1", metavar="N/M", parse=_ratio, tests=(), tacit=True)
+    teeth: str | None = option(None, _TEETH, metavar="PATTERN", parse=_teeth, tests=(), tacit=True)
+    bits: str | None = option(None, _BITS, metavar="M+B", parse=parse_bits, **_READ)
+    sample_age: int | None = option(None, _SAMPLE_AGE, metavar="N", parse=parse_whole, **_READ)
+    zero: int | None = option(None, _ZERO, metavar="N", parse=parse_whole, **_READ)
     chip: str | None = option(
         None, "Chip of an encoder with spi. as5047p answers a tick late.", choices=tuple(CHIPS), **_READ
     )
@@ -224,21 +188,10 @@ class Encoder:
         **_READ,
     )
     line_delay: Fraction | None = option(  # noqa: RUF009
-        None,
-        "Delay of the lines to an encoder and back. With ssi and spi each bit is read this much later; biss and "
-        "tformat measure it in every frame, and simulations take it.",
-        shown="0",
-        metavar="TIME",
-        parse=parse_time,
-        **_READ,
+        None, _LINE_DELAY, shown="0", metavar="TIME", parse=parse_time, **_READ
     )
     crc: str | None = option(
-        None,
-        "Polynomial of the CRC of biss, with its highest term. It begins with 0 and is sent inverted.",
-        shown="0x43, which is x^6 + x + 1",
-        metavar="[POLY|none]",
-        parse=_polynomial,
-        **_READ,
+        None, _CRC, shown="0x43, which is x^6 + x + 1", metavar="[POLY|none]", parse=_polynomial, **_READ
     )
     gray: bool = option(False, "The encoder sends Gray code.", **_READ)
     repeat: bool = option(

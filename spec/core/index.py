@@ -5,6 +5,9 @@ from dataclasses import dataclass
 from tachometry.spec.core.sensors import USUAL_STATE, parse_state
 from tachometry.spec.language.option import option
 
+_ONCE = """Take the index once, after input home (with --index). CONTROL.home also arms it. Output homed shows that it \
+was taken."""
+
 
 @dataclass(frozen=True)
 class Index:
@@ -24,10 +27,4 @@ class Index:
         tests=("edge", "A=0,B=1"),
         tacit=True,
     )
-    once: bool = option(
-        False,
-        "Take the index once, after input home (with --index). CONTROL.home also arms it. Output homed "
-        "shows that it was taken.",
-        name="index-once",
-        tacit=True,
-    )
+    once: bool = option(False, _ONCE, name="index-once", tacit=True)

@@ -123,6 +123,11 @@ def _serial_clocks(reciprocal: Reciprocal) -> int:
     return reciprocal.digits + 1
 
 
+_RECIPROCAL_SOURCE = """Source of the reciprocal of the measurement time. serial divides between two ticks, table \
+looks it up in block RAM. Where ticks are too short for the one, or windows too long, the other is taken; where \
+neither is possible, it is carried from tick to tick."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class STachometer(TachometerSpec):
     """Averages in step with the alterations of the pulse number (S method).
@@ -133,14 +138,7 @@ class STachometer(TachometerSpec):
 
     cancel: bool = option(True, "Cancel alternate pulse alterations, eq. (21). Otherwise they are averaged, eq. (17).")
 
-    reciprocal_source: str = option(
-        "serial",
-        "Source of the reciprocal of the measurement time. serial divides between two ticks, table looks "
-        "it up in block RAM. Where ticks are too short for the one, or windows too long, the other is "
-        "taken; where neither is possible, it is carried from tick to tick.",
-        name="reciprocal",
-        choices=_SOURCES,
-    )
+    reciprocal_source: str = option("serial", _RECIPROCAL_SOURCE, name="reciprocal", choices=_SOURCES)
 
     method = "s"
     facts = Facts(
