@@ -11,7 +11,7 @@ import numpy as np
 from amaranth.lib import wiring
 
 from tachometry.hdl.core.demo import Demo
-from tachometry.sim.engines.compiled import Design
+from tachometry.sim.engines.compiled import Design, struct
 from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.spec import Port
 from tachometry.spec.registers.buses import Bus
@@ -48,18 +48,10 @@ class _BoardDesign(Design):
         return f"{head}#include <cstdint>\n{model}\n{_DRIVER}"
 
 
-class _Transfer(ctypes.Structure):
-    _fields_ = (
-        ("clocks", ctypes.c_int64),
-        ("in", ctypes.c_void_p),
-        ("n_in", ctypes.c_int64),
-        ("taken", ctypes.c_int64),
-        ("out", ctypes.c_void_p),
-        ("n_out", ctypes.c_int64),
-        ("capacity", ctypes.c_int64),
-        ("lines", ctypes.c_int64),
-        ("broken", ctypes.c_int64),
-    )
+_FIELDS = ("clocks", "in", "n_in", "taken", "out", "n_out", "capacity", "lines", "broken")
+_Transfer = struct(
+    "_Transfer", **{name: ctypes.c_void_p if name in ("in", "out") else ctypes.c_int64 for name in _FIELDS}
+)
 
 
 class BoardSimulation:
@@ -89,10 +81,8 @@ class BoardSimulation:
     def run(self, n_clocks: int, data: bytes = b"") -> tuple[bytes, bytes]:
         """Return the bytes that the core sends in these clocks, and those of `data` that have not begun to reach it."""
         given, found = np.frombuffer(data, dtype=np.uint8), []
-        transfer = _Transfer(
-            clocks=n_clocks, n_in=len(data), lines=self._lines, out=self._out.ctypes.data, capacity=_ROOM
-        )
-        setattr(transfer, "in", given.ctypes.data)
+        arrays = {"in": given.ctypes.data, "out": self._out.ctypes.data}
+        transfer: Any = _Transfer(clocks=n_clocks, n_in=len(data), lines=self._lines, capacity=_ROOM, **arrays)
         with self._busy:
             while transfer.clocks and self._board is not None:
                 transfer.n_out = 0

@@ -36,6 +36,16 @@ _FIRST_CALL = 1000  # clocks
 _CAPACITY = 1 << 14  # rows
 _SHORT, _LONG = 30_000, 30_000_000  # clocks: a run is brief up to the first, and long above the second
 _SHORT_OF = {"track": 400_000}  # a machine takes seconds more to be compiled than those that its clocks take
+# Members of a job of driver.h, but the last.
+_JOB = (
+    *("clock", "end", "at", "level", "n_changes", "next", "rows", "n_rows", "capacity"),
+    *("shown", "n_shown", "shown_capacity", "shown_from", "shown_to", "every_clock", "skipped"),
+)
+
+
+def struct(name: str, **members: Any) -> type[ctypes.Structure]:
+    """Return a structure of C with these members."""
+    return type(name, (ctypes.Structure,), {"_fields_": list(members.items())})
 
 
 @dataclass(frozen=True)
@@ -212,35 +222,10 @@ class Play:
                 progress(self.done)
 
     def _new_job(self) -> Any:
-        long, pointer = ctypes.c_int64, ctypes.c_void_p
-
-        class Job(ctypes.Structure):
-            _fields_ = (
-                ("clock", long),
-                ("end", long),
-                ("at", pointer),
-                ("level", pointer),
-                ("n_changes", long),
-                ("next", long),
-                ("rows", pointer),
-                ("n_rows", long),
-                ("capacity", long),
-                ("shown", pointer),
-                ("n_shown", long),
-                ("shown_capacity", long),
-                ("shown_from", long),
-                ("shown_to", long),
-                ("every_clock", long),
-                ("skipped", long),
-                ("last", ctypes.c_uint32 * (self._n_words + 1)),
-            )
-
-        return Job(
-            rows=self._rows.ctypes.data,
-            capacity=_CAPACITY,
-            shown=self._shown.ctypes.data,
-            shown_capacity=len(self._shown),
-            shown_from=self.window[0],
-            shown_to=self.window[1],
-            every_clock=self._every_clock,
+        kinds: dict[str, Any] = dict.fromkeys(_JOB, ctypes.c_int64)
+        kinds |= dict.fromkeys(("at", "level", "rows", "shown"), ctypes.c_void_p)
+        window = dict(zip(("shown_from", "shown_to"), self.window, strict=True))
+        return struct("Job", **kinds, last=ctypes.c_uint32 * (self._n_words + 1))(
+            **{name: array.ctypes.data for name, array in (("rows", self._rows), ("shown", self._shown))},
+            **{"capacity": _CAPACITY, "shown_capacity": len(self._shown), "every_clock": self._every_clock, **window},
         )

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.engines.loop import CONTROLLER, Course, Edges, Log, LoopDesign, LoopSimulation, Motor, struct
+from tachometry.sim.engines.compiled import struct
+from tachometry.sim.engines.loop import CONTROLLER, Course, Edges, Log, LoopDesign, LoopSimulation, Motor
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec.control import LoopSpec
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.engines.compiled import Design
+from tachometry.sim.engines.compiled import Design, struct
 from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control.units import longest_interval
@@ -124,11 +124,6 @@ class LoopDesign(Design):
         head = f"#define N_COLUMNS {len(self.outputs)}\n#define GATES 0\n#include <cstdint>\n"
         parts = [files(__package__).joinpath(part).read_text(encoding="utf-8") for part in PARTS]
         return "\n".join([head, model, *parts])
-
-
-def struct(name: str, **members: Any) -> type[ctypes.Structure]:
-    """Return a structure of C with these members."""
-    return type(name, (ctypes.Structure,), {"_fields_": list(members.items())})
 
 
 _D, _I, _P = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p

@@ -1,12 +1,10 @@
 """Says which signals of a core a waveform shows."""
 
-from typing import Any
-
-from amaranth import Cat, Module, Value, signed
-from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out
+from amaranth import Cat, Module, Value
+from amaranth.lib.wiring import Out
 
 from tachometry.hdl import AnyTachometer, core_of
+from tachometry.hdl.wires.ports import Box, hand_through, members
 from tachometry.spec import CoreSpec
 from tachometry.spec.language.port import INDEX, TICK, UPDATE
 
@@ -31,7 +29,7 @@ def shown(core: AnyTachometer) -> dict[str, Value]:
     return found
 
 
-class Watched(wiring.Component):
+class Watched(Box):
     """Wraps a core, so that the signals to be shown are outputs.
 
     Members are the ports of the core, and `shown_0`, `shown_1` … of 32 bits, with the first signal in the lowest bits.
@@ -40,22 +38,12 @@ class Watched(wiring.Component):
     def __init__(self, spec: CoreSpec) -> None:
         self.core = core_of(spec)
         self.widths = {name: (len(value), value.shape().signed) for name, value in shown(self.core).items()}
-        flow = {"input": In, "output": Out}
-        members: dict[str, Any] = {
-            port.name: flow[port.direction](signed(port.width) if port.signed else port.width)
-            for port in spec.ports
-            if port.name not in ("clk", "rst")
-        }
         self.n_words = -(-sum(width for width, _ in self.widths.values()) // WORD)
-        super().__init__(members | {f"shown_{k}": Out(WORD) for k in range(self.n_words)})
-        self._flows = {name: member.flow for name, member in members.items()}
+        self._ports = members(spec.ports)
+        super().__init__(self._ports | {f"shown_{k}": Out(WORD) for k in range(self.n_words)})
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         m.submodules.core = core = self.core
-        for name, flow in self._flows.items():
-            inside, outside = getattr(core, name), getattr(self, name)
-            m.d.comb += inside.eq(outside) if flow == In else outside.eq(inside)
+        hand_through(m, self, core, self._ports)
         words = Cat(getattr(self, f"shown_{k}") for k in range(self.n_words))
         m.d.comb += words.eq(Cat(shown(core).values()))
-        return m
