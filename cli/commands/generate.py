@@ -95,7 +95,13 @@ class Asked:
 
     def texts(self) -> dict[str, str]:
         """Return all files by their names."""
-        bench = {} if self.testbench is None else _bench(self.spec, self.name, self.record)
+        spec, record, bench = self.spec, self.record, {}
+        if self.testbench is not None:
+            axes = range(spec.axes or 1)
+            recordings = (
+                None if record is None else [record(spec.tachometer, axis, spec.axes).recording for axis in axes]
+            )
+            bench = cocotb_bench(spec, self.name, recordings)
         texts = core_files(self.spec, self.name, self.on, self.target, self.writer)
         jobs = {file: text for file, text in ci_files(self.name).items() if file == f"{self.name}_{self.ci}.yml"}
         asked = self.target, self.testbench or "none", self.ci or "none", self.writer
@@ -109,7 +115,9 @@ class Asked:
     @property
     def rows(self) -> list[tuple[str, str]]:
         """The names and values that are printed of the core."""
-        return _rows(self.spec, self.on)
+        if self.spec.axes is not None:
+            return axes_rows(self.spec)
+        return loop_rows(self.spec, self.on) if self.spec.kind == "loop" else core_rows(self.spec, self.on)
 
 
 def _read(*, bus: str | None, target: str, **given: Any) -> dict[str, Any]:
@@ -217,16 +225,3 @@ def generate(asked: Asked, directory: Path) -> int:
     left = left_files(directory, asked.name, file_names(asked.name), texts)
     print_warnings([f"{click.format_filename(directory / file)} is of an earlier core: remove it" for file in left])
     return 0
-
-
-def _bench(spec: AnySpec, name: str, record: Callable[..., Encoding] | None) -> dict[str, str]:
-    recordings = None
-    if record is not None:
-        recordings = [record(spec.tachometer, axis, spec.axes).recording for axis in range(spec.axes or 1)]
-    return cocotb_bench(spec, name, recordings)
-
-
-def _rows(spec: AnySpec, bus: Bus | None) -> list[tuple[str, str]]:
-    if spec.axes is not None:
-        return axes_rows(spec)
-    return loop_rows(spec, bus) if spec.kind == "loop" else core_rows(spec, bus)

@@ -5,7 +5,6 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
 from itertools import product
-from typing import Any
 
 import click
 
@@ -21,7 +20,7 @@ from tachometry.sim.encoder.sampled import encoder_of
 from tachometry.sim.studies.sweeping.grid import Grid, Item, Loops, Points
 from tachometry.sim.studies.sweeping.loops import LoopPoint, seeds_from
 from tachometry.sim.studies.sweeping.sweep import COLUMNS, Point
-from tachometry.spec import AUTO, METHODS, ParameterError, TachometerSpec, common_options, methods_with, of_texts
+from tachometry.spec import AUTO, METHODS, ParameterError, common_options, methods_with, of_texts
 from tachometry.spec.language.option import options_of, read_options
 from tachometry.spec.language.units import FREQUENCY, SPEED, TIME, read_nearest
 
@@ -105,8 +104,9 @@ class _Maker:
     """Makes points; what many of them share is made once."""
 
     def __init__(self, run: tuple[float, str | None, float]) -> None:
-        self._run, self._core = run, tuple(core_click_options())
-        self._spec, self._values, self._motion = cache(_spec), cache(_encoder_values), cache(parse_motion)
+        self._run, self._core, self._motion = run, tuple(core_click_options()), cache(parse_motion)
+        self._spec = cache(lambda method, texts: of_texts(method, dict(texts)))
+        self._values = cache(lambda texts: read_options(EncoderOptions, dict(texts)))
 
     def point(self, name: str, method: str, given: Mapping[str, str], texts: Mapping[str, Text]) -> Point:
         """Return the point of a method, with texts of some of its options and of names in the motion."""
@@ -121,14 +121,6 @@ class _Maker:
         motion = _PLACE.sub(lambda place: places[place[1]], motion)
         moved = self._motion(motion)
         return Point(shown_name(name, spec), spec, encoder, moved, motion, values, *self._run)
-
-
-def _spec(method: str, texts: tuple[tuple[str, Text], ...]) -> TachometerSpec:
-    return of_texts(method, dict(texts))
-
-
-def _encoder_values(texts: tuple[tuple[str, str], ...]) -> dict[str, Any]:
-    return read_options(EncoderOptions, dict(texts))
 
 
 def loops_of(settings: Settings, methods: str, n_seeds: int) -> Loops:

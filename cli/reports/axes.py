@@ -11,12 +11,12 @@ def axes_rows(spec: AxesSpec) -> list[tuple[str, str]]:
     """Return the configuration of a core of many axes."""
     alone, axis = spec.tachometer, spec.axis
     greatest = axis.velocity.max * alone.scale.unit_velocity
-    latencies = manifest(spec)["latency_cycles"]
+    latencies, memory = manifest(spec)["latency_cycles"], spec.words.memory
     own = {
         "greatest speed": f"{speed_text(alone, greatest)} ({plural(axis.velocity.max, 'count')} per tick)",
         "full scale": full_scale_text(alone, axis),
         "widths": ", ".join(f"{port.name} {port.width}" for port in axis.ports.outputs if port.width > 1),
-        **_reciprocal(spec),
+        **({"reciprocal": f"{memory_text(*memory)}; there is no time to divide between two axes"} if memory else {}),
         **{name: plural(clocks, "clock") for name, clocks in latencies.items()},
         "tick_to_velocity": "0 clocks: velocity_valid comes together with tick",
     }
@@ -29,10 +29,3 @@ def axes_rows(spec: AxesSpec) -> list[tuple[str, str]]:
     late = f"{short_time(spec.tick.seconds(spec.latency.tick))} from the end of a tick to the last axis' velocity"
     rows += measured(alone, Plans.of(alone, greatest), late)
     return [rows[0], ("axes", turns), *rows[1:], *(("note", note) for note in spec.words.notes)]
-
-
-def _reciprocal(spec: AxesSpec) -> dict[str, str]:
-    memory = spec.words.memory
-    return (
-        {} if memory is None else {"reciprocal": f"{memory_text(*memory)}; there is no time to divide between two axes"}
-    )

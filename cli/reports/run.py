@@ -12,7 +12,7 @@ from tachometry.cli.reports.core import choice
 from tachometry.cli.reports.standard_streams import INTERRUPTED, printable
 from tachometry.cli.reports.terminal import print_rows, stdout_console
 from tachometry.sim.studies.simulation import Axis, Simulation
-from tachometry.spec import AxesSpec, CoreSpec
+from tachometry.spec import CoreSpec
 from tachometry.spec.language.port import MISSED, TICK, UPDATE, WIDE
 from tachometry.spec.language.units import format_time, plural
 
@@ -52,7 +52,12 @@ def _summary(spec: CoreSpec, axes: Sequence[Axis], mismatches: _Row) -> tuple[li
         forced = axis.tally.not_zero[UPDATE, "forced"]
         updates = "updates", f"{axis.tally.rows[UPDATE]} ({forced} of them forced)"
         return [*capture_rows(axis), updates, mismatches, *_rows(axis)], _warnings(axis)
-    warnings = [_merged_looks(spec, number, axis.n_merged) for number, axis in enumerate(axes) if axis.n_merged]
+    warnings = [
+        f"axis {number}: {plural(axis.n_merged, 'edge')} came within {spec.slots} clocks of another, in which an axis "
+        "is looked at once: counts and velocity are wrong there"
+        for number, axis in enumerate(axes)
+        if axis.n_merged
+    ]
     warnings += [f"axis {number}: {warning}" for number, axis in enumerate(axes) for warning in _of_capture(axis)]
     rows = [mismatches, *((f"axis {number}", _line(axis)) for number, axis in enumerate(axes))]
     sources = [(number, source) for number, axis in enumerate(axes) if (source := axis.recording.source)]
@@ -77,8 +82,7 @@ def merged_edges(n_merged: int) -> list[str]:
 
 def _warnings(axis: Axis) -> list[str]:
     """Return why the core cannot have counted what the shaft did."""
-    warnings = merged_edges(axis.n_merged)
-    warnings += _of_capture(axis)
+    warnings = merged_edges(axis.n_merged) + _of_capture(axis)
     if axis.difference:
         warnings.append(f"counts out differ from counts in by {axis.difference:+d}")
     return warnings
@@ -86,13 +90,6 @@ def _warnings(axis: Axis) -> list[str]:
 
 def _of_capture(axis: Axis) -> list[str]:
     return [] if axis.truth else axis_warnings(axis)
-
-
-def _merged_looks(spec: AxesSpec, number: int, n_merged: int) -> str:
-    return (
-        f"axis {number}: {plural(n_merged, 'edge')} came within {spec.slots} clocks of another, in which an axis "
-        "is looked at once: counts and velocity are wrong there"
-    )
 
 
 def _index(axis: Axis) -> str:
