@@ -182,7 +182,6 @@ class _Watched:
         pass
 
     def notice(self, text: str) -> None:
-        """Show that something has changed."""
         with self._busy:
             self._told = text
 

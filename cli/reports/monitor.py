@@ -41,16 +41,13 @@ class PlainLines:
         pass
 
     def notice(self, text: str) -> None:
-        """Show that something has changed."""
         click.echo(f"tachometry: {printable(text)}", err=True)
 
     def show(self, state: State) -> None:
-        """Show the state, if it is time to."""
         if state.frame and (self._shown is None or state.frame.time >= self._shown + _LINE):
             self._print(state)
 
     def end(self, state: State) -> None:
-        """Show the state for the last time."""
         if state.frame and state.frame.time != self._shown:
             self._print(state)
 
@@ -84,7 +81,6 @@ class LiveView:
         self._texts.append(text)
 
     def show(self, state: State) -> None:
-        """Show the state, if it is time to."""
         if time.monotonic() - self._drawn >= _REFRESH:
             self._drawn = time.monotonic()
             self._live.update(view(state, *self._console.size), refresh=True)

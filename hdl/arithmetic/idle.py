@@ -37,7 +37,6 @@ class IdleRegister(Idle):
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Signals that it moves on."""
         return (self.path,)
 
 
@@ -76,7 +75,6 @@ class IdleProduct(Idle):
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Signals that it moves on."""
         return (self.total, self.factor, self.left)
 
 
@@ -92,7 +90,6 @@ class IdleDivision(Idle):
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Signals that it moves on."""
         return (self.digits, self.less_one)
 
 
@@ -122,7 +119,6 @@ class IdleRounds(Idle):
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Signals that it moves on."""
         return tuple(path for one in self.moving for path in one.paths)
 
 
@@ -132,7 +128,7 @@ class HasIdle(Protocol):
 
     @property
     def idle(self) -> tuple[Idle, ...]:
-        """With names within the box."""
+        """Registers that a simulation may move on, with names within the box."""
 
 
 def idle_of(boxes: Mapping[str, object]) -> tuple[Idle, ...]:

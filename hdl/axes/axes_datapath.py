@@ -88,7 +88,6 @@ class AxesDatapath(Box):
 
     @property
     def probes(self) -> dict[str, Value]:
-        """Signals of the inside that a waveform should show."""
         return {"turn": self.turns.axis, "m_s": self.window.state.m_s, "numerator": self.window.numerator}
 
     def build(self, m: Module) -> None:

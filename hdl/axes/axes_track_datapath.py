@@ -70,7 +70,6 @@ class AxesTrackDatapath(Box):
 
     @property
     def probes(self) -> dict[str, Value]:
-        """Signals of the inside that a waveform should show."""
         return {"turn": self.axis}
 
     def build(self, m: Module) -> None:

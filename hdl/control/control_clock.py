@@ -24,7 +24,6 @@ class ControlClock(Box):
 
     @property
     def idle(self) -> tuple[Idle, ...]:
-        """Registers that a simulation may move on."""
         return (IdleCounter("left", -1, (0,)),)
 
     def build(self, m: Module) -> None:

@@ -96,7 +96,6 @@ class Controller(Box):
 
     @property
     def idle(self) -> tuple[Idle, ...]:
-        """Registers that a simulation may move on."""
         names = ("product.product", "product.factor", "product.left", "word")
         return (IdleProduct(*names),) if self._multiplier == "serial" else ()
 

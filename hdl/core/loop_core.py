@@ -40,7 +40,6 @@ class LoopCore(Box):
 
     @property
     def idle(self) -> tuple[Idle, ...]:
-        """Registers that a simulation may move on."""
         boxes = {"tachometer": self.tachometer, "control_clock": self.control_clock, "controller": self.controller}
         return (IdleSum("sigma_delta.left"), IdleEcho("sigma_delta.current_pdm"), *idle_of(boxes))
 

@@ -97,7 +97,6 @@ class Tachometer(Box):
 
     @property
     def idle(self) -> tuple[Idle, ...]:
-        """Registers that a simulation may move on."""
         boxes: dict[str, object] = {name: getattr(self, name) for name in self._skipped}
         boxes |= {f"{name}_box": box for name, box in self.extras.items()}
         if not self._spec.facts.own_ticks:

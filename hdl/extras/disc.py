@@ -50,7 +50,6 @@ class Gates(Box):
 
     @classmethod
     def of(cls, extra: DiscMap, spec: TachometerSpec) -> Self:
-        """Return the gates of this core."""
         table = extra.sectors(spec) or extra.entries(spec)
         place, form = extra.index_place(spec), extra.displacement(spec)
         return cls(table, place, form, writable=extra.writable, looks=spec.facts.update_by != "count")

@@ -50,7 +50,6 @@ class Gates(wiring.Component):
 
     @classmethod
     def of(cls, extra: ElectricalAngle, spec: TachometerSpec) -> Self:
-        """Return the gates of this core."""
         taken = [one for one in spec.method_ports if spec.carrying and one.name in ("acceleration", "position_fine")]
         inputs = {"native_velocity": spec.velocity.native, **{f"native_{one.name}": one.width for one in taken}}
         if read := spec.encoder.sampled:

@@ -46,7 +46,6 @@ class Gates(wiring.Component):
 
     @classmethod
     def of(cls, extra: AngleInTurn, spec: AxesSpec) -> Self:
-        """Return the gates of this core."""
         return cls(extra, spec)
 
     def elaborate(self, platform: object) -> Module:

@@ -113,7 +113,6 @@ class Gates(Box):
 
     @classmethod
     def of(cls, extra: Health, spec: TachometerSpec) -> "Gates | ReadGates":
-        """Return the gates of this core."""
         if spec.encoder.sampled is not None:
             return ReadGates(extra.read_counts(spec))
         front, turn = spec.front_end, None

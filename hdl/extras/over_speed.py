@@ -23,7 +23,6 @@ class Gates(Box):
 
     @classmethod
     def of(cls, extra: OverSpeed, spec: TachometerSpec) -> Self:
-        """Return the gates of this core."""
         return cls(extra.greatest(spec), spec.velocity.width)
 
     def build(self, m: Module) -> None:

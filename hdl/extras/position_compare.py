@@ -68,7 +68,6 @@ class Gates(Box):
 
     @classmethod
     def of(cls, extra: PositionCompare, spec: TachometerSpec) -> "Gates":
-        """Return the gates of this core."""
         places, clocks, width = extra.places, extra.clocks(spec), spec.position_width
         if places.fine and spec.carrying:
             return FineGates(places, clocks, width, spec.carrying, spec.velocity.native)

@@ -64,7 +64,6 @@ class Gates(Box):
 
     @classmethod
     def of(cls, extra: Probe, spec: TachometerSpec) -> Self:
-        """Return the gates of this core."""
         port, fine = extra.fine(spec), None
         if port is not None:
             latency = spec.latency.tick + spec.latency.tick_to_velocity

@@ -42,7 +42,6 @@ class Gates(Box):
 
     @classmethod
     def of(cls, extra: Stream, spec: TachometerSpec) -> Self:
-        """Return the gates of this core."""
         event, flags = _EVENTS[extra.records.when], extra.flags(spec)[1:]
         return cls(extra.parts(spec), flags, extra.records.packet, event, spec.latency.tick)
 

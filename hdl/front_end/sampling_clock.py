@@ -55,7 +55,6 @@ class SamplingClock(Box):
 
     @property
     def idle(self) -> tuple[Idle, ...]:
-        """Counters that a simulation may skip: `IdleCounter`."""
         if self._lead:
             return ()
         if self.states:

@@ -101,7 +101,6 @@ class MMethod(Box):
 
     @property
     def probes(self) -> dict[str, Value]:
-        """Signals of the inside that a waveform should show."""
         return {"sum": self.moving_sum.total}
 
     def build(self, m: Module) -> None:

@@ -29,7 +29,6 @@ class MTMethod(TimedDatapath):
 
     @property
     def idle(self) -> tuple[Idle, ...]:
-        """Counters that a simulation may skip: `IdleCounter`."""
         counters = super().idle
         stops = (~self._min_periods, ~self._patient_periods)
         return (*counters, IdleCounter("still", -1, stops)) if counters else ()

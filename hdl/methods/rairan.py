@@ -42,12 +42,10 @@ class RairanMethod(Box):
 
     @property
     def probes(self) -> dict[str, Value]:
-        """Signals of the inside that a waveform should show."""
         return {"c_ep": self.counters.c_more + self.counters.any, "c_dt": self.counters.c_dt}
 
     @property
     def idle(self) -> tuple[Idle, ...]:
-        """Counters that a simulation may skip: `IdleCounter`."""
         return (IdleCounter("counters.left", -1, (-1,)),) if self._spec.timing.tick_cycles > 1 else ()
 
     def build(self, m: Module) -> None:

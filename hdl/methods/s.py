@@ -58,7 +58,6 @@ class SMethod(Box):
 
     @property
     def probes(self) -> dict[str, Value]:
-        """Signals of the inside that a waveform should show."""
         return {
             "alteration": self.alteration.alteration & self.tick,
             "m_s": self.interval_accumulator.m_s,

@@ -49,12 +49,10 @@ class TimedDatapath(Box):
 
     @property
     def probes(self) -> dict[str, Value]:
-        """Signals of the inside that a waveform should show."""
         return {"gap": self.gap_timer.age}
 
     @property
     def idle(self) -> tuple[Idle, ...]:
-        """Counters that a simulation may skip: `IdleCounter`."""
         if self._spec.form.on_lattice:  # which counts with the tick
             return ()
         return (IdleCounter("gap_timer.age", 1, (self._spec.form.max_periods - 2,)),)

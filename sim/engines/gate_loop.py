@@ -29,7 +29,6 @@ MOST_EDGES = 1 << 22
 
 class _GateDesign(LoopDesign):
     def source(self, model: str) -> str:
-        """Write the source, as `Design.source` says."""
         places = {pin.name: place for place, pin in enumerate(self.pins)}
         names = ("PIN_A", "PIN_B", "PIN_ENABLE", "PIN_POSITION", "PIN_VELOCITY", "PIN_ACCELERATION")
         head = "".join(f"#define {name} {places[pin]}\n" for name, pin in zip(names, _PINS, strict=True))

@@ -120,7 +120,6 @@ class LoopDesign(Design):
     """Describes a core to be compiled with plant and controller."""
 
     def source(self, model: str) -> str:
-        """Write the source, as `Design.source` says."""
         head = f"#define N_COLUMNS {len(self.outputs)}\n#define GATES 0\n#include <cstdint>\n"
         parts = [files(__package__).joinpath(part).read_text(encoding="utf-8") for part in PARTS]
         return "\n".join([head, model, *parts])

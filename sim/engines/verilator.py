@@ -70,7 +70,6 @@ class Verilator(CompiledEngine):
         return write(design.component, "tachometer").text
 
     def library(self, design: Design) -> Path:
-        """Build the library, as `CompiledEngine.library` says."""
         text = self.text(design)
         compiler = build.compiler()
         tools = (compiler, build.version(compiler), build.flags(), version_of("verilator"))

@@ -82,7 +82,6 @@ class MTTachometer(TimedTachometer):
 
     @cached_property
     def form(self) -> MTForm:
-        """Numbers of timer and divider."""
         min_clocks = self.timing.tick_cycles if self.min_time is None else self.min_time
         counts = self.encoder.decoding if self.whole_cycles else 1
         return MTForm(**vars(super().form), min_clocks=min_clocks, cycle_counts=counts)
