@@ -33,8 +33,6 @@ def named_methods(text: str, make: Make, others: Collection[str] = ()) -> Method
                 specs[name] = make(name, {})
             except ValueError as error:
                 wrong[name] = error
-        if not specs:
-            raise next(iter(wrong.values()))
         left_out = {name: message_of(error) for name, error in wrong.items()}
         return Methods(specs | dict.fromkeys(others), left_out)
     specs = {}

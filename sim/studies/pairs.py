@@ -201,7 +201,7 @@ def _texts(method: str, row: Texts) -> Texts:
     if frac_bits:
         spec = of_texts(method, texts)
         fewest, most = spec.velocity.frac_bits_range(spec.unit)
-        bits = max(fewest, most - _less(frac_bits)) if "-" in frac_bits else max(fewest, min(int(frac_bits), most))
+        bits = max(fewest, most - _less(frac_bits)) if "-" in frac_bits else min(int(frac_bits), most)
         texts["frac-bits"] = str(bits)
     if width:
         # The greatest speed must fit.

@@ -54,7 +54,7 @@ class Disc:
     def parse(text: str) -> "Disc":
         """Read the file; ValueError if it is not one of these."""
         try:
-            found = {"reverse": False} | json.loads(text)
+            found = json.loads(text)
             values = {about.name: found[about.name] for about in fields(Disc)}
             tuples = {name: tuple(map(float, values[name])) for name in ("displacement", "speeds_rad_per_s")}
         except (ValueError, TypeError, KeyError, RecursionError):
