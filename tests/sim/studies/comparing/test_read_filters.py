@@ -3,14 +3,19 @@
 import csv
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from support.command import run
 
+from tachometry.sim.encoder.motion import parse_motion
+from tachometry.sim.encoder.sampled import SampledEncoder
 from tachometry.sim.studies.comparing.baseline_catalogue import OF_READS, steps_curve
 from tachometry.sim.studies.comparing.baselines import Steps
+from tachometry.sim.studies.comparing.comparison import steps_beside
 from tachometry.sim.studies.comparing.read_filters import savitzky_golay
+from tachometry.spec import of_texts
 
 TICK, COUNTS = 1e-4, 1 << 17
 
@@ -23,7 +28,9 @@ def positions(of: object, n: int = 4000, age: float = 0.25) -> Steps:
     return Steps(np.empty(0), none, 1.0, COUNTS, time, taken=place - place[0], age_s=age * TICK, tick_s=TICK)
 
 
-@pytest.mark.parametrize(("name", "of"), [("savitzky-golay:reads=9:order=3", [5e4, 3e4, -2e4, 7]), ("pll", [9e4, 3])])
+@pytest.mark.parametrize(
+    ("name", "of"), [("savitzky-golay:reads=9:order=3", [5e4, 3e4, -2e4, 7]), ("pll", [9e4, 3]), ("pll", [50.0, 0])]
+)
 def test_a_speed_that_a_filter_can_follow_is_exact(name: str, of: list[float]) -> None:
     steps = positions(of)
     found = steps_curve(name, steps).estimate.velocity / steps.count_rad
@@ -44,6 +51,13 @@ def test_a_polynomial_is_that_of_numpy() -> None:
     found = savitzky_golay(steps, 13, 2).velocity[1000] / steps.count_rad
     fit = np.polyfit(steps.reads[988:1001], steps.taken[988:1001], 2)
     assert found == pytest.approx(np.polyval(np.polyder(fit), steps.reads[1000] + steps.age_s))
+
+
+def test_reads_begin_at_place_zero() -> None:
+    spec = of_texts("m", {"sensor": "ssi", "bits": "0+12", "clock": "10MHz", "tick": "100us", "max-time": "10ms"})
+    shaft = SampledEncoder.of(spec.encoder, core=spec, start_angle_rad=1.0)
+    taken: Any = steps_beside(spec, shaft.record(parse_motion("constant:30rad/s:2ms")).recording).taken
+    np.testing.assert_allclose(taken, np.arange(19) * 30 * TICK / (2 * np.pi) * 4096, atol=2)
 
 
 def test_methods_on_reads_are_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
