@@ -195,6 +195,8 @@ def _end(processes: list[Process]) -> None:
     for process in processes:
         process.terminate()
     for process in processes:
+        process.join(_PATIENCE / 20)
+        process.terminate()  # again: what the first signal raised in a `__del__` is lost
         process.join(_PATIENCE)
         process.kill()
         process.join()

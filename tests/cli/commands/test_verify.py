@@ -168,6 +168,30 @@ def test_signals_are_held_back_while_workers_start(monkeypatch: pytest.MonkeyPat
     assert not any(worker.is_alive() for worker in workers)
 
 
+def lose_a_signal(begun: int, core: object) -> None:
+    class Deaf:
+        def __del__(self) -> None:
+            begin_and_wait(begun, core)
+
+    Deaf()
+    signal.pause()
+
+
+def test_workers_that_lose_a_signal_end_in_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, workers, real = os.pipe(), list[Any](), vars(study)["Process"]
+
+    def start(**options: Any) -> Any:
+        workers.append(real(**options))
+        return workers[-1]
+
+    monkeypatch.setattr(study, "Process", start)
+    with study._each(partial(lose_a_signal, begun[1]), [None, None], 2):
+        assert read(begun[0]) + read(begun[0]) == b".."
+    assert [worker.exitcode for worker in workers] == [1, 1]
+    for end in begun:
+        os.close(end)
+
+
 def end_or_wait(core: int) -> None:
     os._exit(9) if core == 1 else signal.pause()
 
