@@ -23,8 +23,8 @@ _OPTIONS = [
         {
             "--a CHANNEL": "Channel of line A: its name, or its number from 0. With --axes one for each "
             "axis, with commas between, also for --b and --z; without them a0, a1 and so on, "
-            "b0, z0. With --sensor ssi or biss the encoder's clock (MA).",
-            "--b CHANNEL": "Channel of line B. With --sensor ssi or biss the encoder's data (SLO). [default of "
+            "b0, z0. Of an absolute encoder its clock (MA, SCK) or, of T-format, the request (TX).",
+            "--b CHANNEL": "Channel of line B. Of an absolute encoder its data (SLO, MISO, RX). [default of "
             "--a and --b: the channels named A and B, else the first two]",
             "--c CHANNEL": "Channel of line C of halls. [default: c with --sensor hall]",
             "--z CHANNEL": "Channel of line Z, the index. [default: z with --index, else none]",
