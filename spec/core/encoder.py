@@ -29,7 +29,7 @@ _OF_SENSORS = {
     "chip": ("spi",),
     "encoder_clock": _MASTERS,
     "line_delay": _MASTERS,
-    "crc": ("biss",),
+    "crc": ("biss", "sampled"),
     "gray": _SERIAL,
     "repeat": ("ssi",),
 }
@@ -120,7 +120,8 @@ sample_age has it."""
 _ZERO = "Position of an encoder that is read, in LSB, which is 0. On a bus register ZERO begins with it."
 _LINE_DELAY = """Delay of the lines to an encoder and back. With ssi and spi each bit is read this much later; biss \
 and tformat measure it in every frame, and simulations take it."""
-_CRC = "Polynomial of the CRC of biss, with its highest term. It begins with 0 and is sent inverted."
+_CRC = """Polynomial of the CRC of biss, with its highest term. It begins with 0 and is sent inverted. With none, \
+which sampled may have too, nothing checks a frame: track lets a read that is far off wait for the next one."""
 
 
 @dataclass(frozen=True)
@@ -234,6 +235,8 @@ class Encoder:
             rest = f"must be given with --sensor {self.sensor}, as 17, or 12+17 with 12 of turns"
             raise ParameterError("bits", rest)
         object.__setattr__(self, "bits", parse_bits("bits", self.bits))
+        if self.sensor == "sampled" and self.crc not in (None, "none"):
+            raise ParameterError("crc", f"must be none or left out with --sensor sampled, not {self.crc}")
         counts = 1 << Sampled.of(self.bits, self.sample_age).bits
         if self.pulses_per_rev not in (None, counts):
             rest = f"must be left out with --sensor {self.sensor}, not {self.pulses_per_rev}: type --bits"
@@ -281,6 +284,11 @@ class Encoder:
     def sampled(self) -> Sampled | None:
         """Facts of a position that is read; None: edges are counted."""
         return None if self.bits is None else Sampled.of(self.bits, self.sample_age)
+
+    @property
+    def unchecked(self) -> bool:
+        """Whether nothing checks the frames of an encoder that is read."""
+        return self.crc == "none" or (self.sensor == "ssi" and not self.repeat)
 
     def reads(self, clock_hz: int) -> Reads | None:
         """Return the reads that a core makes itself, one in each tick; None: it makes none."""

@@ -106,7 +106,7 @@ def assembled(listing: str = LISTING, ports: int = 1, **kind: bool) -> Code:
     """
     code: list[Instruction] = []
     labels: dict[str, int] = {}
-    wanted = dict.fromkeys(("smooth", "reads", "map", "period"), False)
+    wanted = dict.fromkeys(("smooth", "reads", "map", "period", "waits"), False)
     wanted |= {"block": ports > 1, "serial": ports == 1, **kind}
     within, wanted["edges"], wanted["plain"] = True, not wanted["reads"], not wanted["map"]
     wanted["kinds"] = wanted["edges"] or wanted["period"]
@@ -191,7 +191,8 @@ class Program:
     @property
     def _kind(self) -> dict[str, bool]:
         form, mapped = self.form, self.form.displacement is not None
-        return {"smooth": self.smooth, "reads": form.sampled, "map": mapped, "period": form.period_bits > 0}
+        kind = {"smooth": self.smooth, "reads": form.sampled, "map": mapped, "period": form.period_bits > 0}
+        return kind | {"waits": form.waits}
 
     @property
     def outputs(self) -> tuple[str, ...]:

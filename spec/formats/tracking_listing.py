@@ -12,7 +12,7 @@ what is begun with the sum`.
     keep          the sign of the sum         log, exp      begin log2|sum|, 2^sum       out name      an output
     gain k        begin: log of the gain of p (0), v (1), a (2)  block, serial  before a line: for that machine only
     smooth, edges, reads   before a line, or several in braces: with --smooth, of counted edges, of read positions
-    period, kinds          the same: of reads with --period, of edges or reads with offsets
+    period, kinds, waits   the same: of reads with --period, of edges or reads with offsets, of reads without a check
     map, plain    before a line: for a core with a map of the disc, without one
     by            the factor of products      product name  begin: sum·factor/2^shift of that name
     over n        begin: shift right by n     over by       by ⌊log2⌋ of the factor's whole part
@@ -113,8 +113,7 @@ heard:
     mu = mu s+ minus_Ds
     P = P + ~
     e = e - ~
-kept:
-    T log
+kept:; T log
 sized:
     of_e = log_e - log_dt
     e keep
@@ -233,21 +232,19 @@ scaled:
     reads {; w = minus_Ds + minus_Ds + minus_Ds; minus_D4 = sum + minus_Ds min minus_change
     minus_D3 = w min minus_mean; }
 judged:
+    waits far = w + w + w + w + w + minus_Ds min least_far
     trouble; if neg goto grows
     sum - log_4; if neg goto shrinks
     sum - log_4; if neg goto halves
     slow_T = T + T
     growth = zero - count               # that outweighs any logarithm
     growing = log_T - log_half
-end:
-    end
+end:; end
 fewer:
     sum + one; if neg goto end
     goto ready
-halves:
-    slow_T = T + T
-shrinks:
-    growth = zero - count; growing = log_T + log_half
+halves:; slow_T = T + T
+shrinks:; growth = zero - count; growing = log_T + log_half
     end
 edges {; some:
     w = minus_Ds - ~ min minus_sixteenth
@@ -298,6 +295,7 @@ lone:
     P = P - moved
     goto heard
 alone:
+    waits far s+ e; waits if pos goto later
     mu = mu + ~; edges slips = slips min zero
     block log_dt + log_8 exp
     since + ahead by
@@ -338,6 +336,9 @@ begin:
 edges {; same:
     smooth since + of_e out smooth_delay; smooth of_v out velocity_smooth
     edge = edge - moved; p = p - moved
+    goto show; }
+waits {; later:                         # the next read is taken, wherever it is
+    since = tau + dt; p = p - moved; far = zero - most
     goto show; }
 silent:
     since = $length + since min most_since

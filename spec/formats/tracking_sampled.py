@@ -80,6 +80,7 @@ class SampledTracking(Tracking):
             "least_noise": round(lsb / 3),  # that of rounding alone
             "minus_change": -3 * lsb // 2,
             "minus_mean": -2 * lsb,  # of twice a mean
+            "least_far": -3 * lsb,
             "most_silent": self.max_ticks << t,
             "of_period": fixed_log(self.period_bits + 2 + self.moved_shift + self.shifts["place"]),
             "carried": (_CARRIED + 1) << t,

@@ -174,6 +174,7 @@ class TrackTachometer(TachometerSpec):
         return SampledTracking(
             **common,
             period_bits=(self.period or 1).bit_length() - 1,
+            waits=self.encoder.unchecked,
             shift=self._shift,
             most_moved=most,
             most_age=sampled.most_age(self.tick.longest),

@@ -37,14 +37,17 @@ class Interpreter:
     def tick(self, *row: int) -> tuple[int, ...]:
         """Take what `Windows.rows` yields."""
         number, times, places, last, moved, kind, down, end, length = row
-        t = self.program.form.time_bits
+        form = self.program.form
+        t = form.time_bits
+        if form.sampled:
+            last, end = end, kind + 1 & 3
         inputs = {
             "number": number,
             "counts": number << PLACE_BITS,
             "places": places << (PLACE_BITS - 7),
             "times": times << t,
             "last": last << t,
-            "moved": moved << PLACE_BITS,
+            "moved": moved << form.moved_shift,
             "length": length << t,
         }
         chosen = {"o@last": kind, "o@up": end, "o@down": (end - 1) & 3}

@@ -1,7 +1,10 @@
 """The tracking recursion of positions that are read; docs/concepts/track.md has its rules."""
 
 from tachometry.sim.golden.methods.track_recursion import ONE, REST, TRACKS, Recursion, Row, log2
+from tachometry.spec.formats.tracking import WIDTH
 from tachometry.spec.formats.tracking_sampled import SampledTracking
+
+_NEVER = 1 << WIDTH  # more than any error
 
 
 class SampledRecursion(Recursion):
@@ -13,6 +16,7 @@ class SampledRecursion(Recursion):
         self.noise, self.slips = k["least_noise"], k["none"]
         self.log_limit = 2 * log2(self.noise) + k["order"]
         self._kind = self._fine = 0
+        self.far = _NEVER  # error from which a read waits for the next one
         self.more = self._log_dt = 0  # what the lag adds to the place; the logarithm of the time since the last read
 
     def _event(self, n: int, times: int, places: int, kind: int, down: int) -> Row:
@@ -24,12 +28,16 @@ class SampledRecursion(Recursion):
             return self._first(at, at, tau)
         dt = max(self.since - tau, self._k["clock"])
         self._log_dt = log_dt = log2(dt)
-        self.more = 0
         if self.phase == ONE:
+            self.more = 0
             return self._begin(1, at, at, tau, dt, log_dt)
         expected = self._expected(dt, log_dt)
-        self.since = tau
-        return self._take(at - expected.p, expected)
+        e = at - expected.p
+        if abs(e) >= self.far:
+            self.far, self.since, self.p = _NEVER, tau + dt, self.p - self._moved
+            return self._emit(self._ahead())
+        self.since, self.more = tau, 0
+        return self._take(e, expected)
 
     def _show_order(self) -> None:
         """Give half of the lag back, where an acceleration is shown."""
@@ -71,6 +79,7 @@ class SampledRecursion(Recursion):
         self.sure = self.noise + 2 * self._round(self.noise, 2) * long
         self.alarm = max(times * self.sure, -k["minus_change"])
         self.mean_alarm = max(3 * self.sure, -k["minus_mean"])
+        self.far = max(16 * self.sure, -k["least_far"]) if self._form.waits else _NEVER
 
     def _silence(self, end: int, above: int, below: int) -> Row:
         """Carry on without a read, `end` ticks after the last one."""

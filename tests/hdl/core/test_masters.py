@@ -17,7 +17,7 @@ from tachometry.sim.golden.encoder_read import Records
 from tachometry.sim.golden.sampled import Reads
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.lockstep import lockstep
-from tachometry.spec import ParameterError, TachometerSpec, of_options, of_texts
+from tachometry.spec import ParameterError, TachometerSpec, TrackTachometer, of_options, of_texts
 from tachometry.spec.core.extras.health import READ_FAULTS
 from tachometry.spec.core.reads import JUMP, WARNING, WRONG_CHECK
 
@@ -99,6 +99,15 @@ def test_a_read_begins_so_that_it_ends_with_its_tick() -> None:
     assert short.longest + short.rest + 1 == 2000  # the wait is shorter where the tick is
 
 
+def test_nothing_checks_reads_by_ssi_once_or_without_a_crc() -> None:
+    waiting = [{"sensor": "ssi"}, {"crc": "none"}, {"sensor": "sampled", "crc": "none"}]
+    checked = [{"sensor": "ssi", "repeat": "yes"}, {}, {"sensor": "sampled"}, AMT22, {"sensor": "tformat"}]
+    for nth, more in enumerate((*waiting, *checked)):
+        spec = of_texts("track", BASE | {"tick": "200us"} | more)
+        assert isinstance(spec, TrackTachometer)
+        assert spec.form.waits == (nth < len(waiting))
+
+
 def test_a_core_is_made_again_from_its_options() -> None:
     for case in CASES:
         assert of_options(core(case).options) == core(case)
@@ -111,7 +120,7 @@ def test_a_core_is_made_again_from_its_options() -> None:
         ({"crc": "67"}, "crc must be none, or a polynomial of degree 3 to 32, as 0x43, not '67'"),
         ({"crc": "0x42"}, "crc must be none, or a polynomial of degree 3 to 32, as 0x43, not '0x42'"),
         ({"repeat": "yes"}, "repeat must be given with --sensor ssi, not biss"),
-        ({"sensor": "ssi", "crc": "none"}, "crc must be given with --sensor biss, not ssi"),
+        ({"sensor": "ssi", "crc": "none"}, "crc must be given with --sensor biss or sampled, not ssi"),
         ({"sample-age": "3"}, "sample_age must be given with --sensor sampled, not biss"),
         ({"sensor": "sampled", "gray": "yes"}, "gray must be given with --sensor ssi or biss, not sampled"),
         ({"encoder-clock": "20MHz"}, "encoder_clock must be from 1 Hz to 10 MHz, not 20000000 Hz"),

@@ -45,10 +45,11 @@ CASES = {
     "track": SLOW,
     "track fine": SLOW
     | {"bits": "16+24", "multiplier": "block", "smooth": "yes", "external-tick": "yes"}
-    | {"position-width": "48", "period": "64", "zero": "1000000007"}
+    | {"position-width": "48", "period": "64", "zero": "1000000007", "crc": "none"}
     | {"electrical": "7", "lead": "1tick"},
     "track coarse": SLOW | {"bits": "5", "unit": "rpm", "sample-age": "100", "reverse": "yes", "max-memory": "5ms"},
-    "track period": SLOW | {"multiplier": "serial", "tick": "1000clk", "max-time": "10000clk", "period": "128"},
+    "track period": SLOW
+    | {"multiplier": "serial", "tick": "1000clk", "max-time": "10000clk", "period": "128", "crc": "none"},
 }
 
 
@@ -312,6 +313,7 @@ def test_a_core_is_made_again_from_its_options() -> None:
         ("m", {"zero": "3000000000"}, "zero must be from -2147483648 to 2147483647, a position, not 3000000000"),
         ("m", {"position-modulo": "rev/3"}, "position_modulo must be a power of two for an encoder that is read"),
         ("m", {"preset": "5"}, "preset must be left out with --sensor sampled: type --zero, or write register ZERO"),
+        ("track", {"crc": "0x43"}, "crc must be none or left out with --sensor sampled, not 0x43"),
         ("m", {"period": "64"}, "period must not be given with method m"),
         ("track", SLOW | {"period": "4"}, "period must be a power of two from 8 to 131072 LSB, a turn, not 4"),
         ("track", SLOW | {"period": "100"}, "period must be a power of two from 8 to 131072 LSB, a turn, not 100"),

@@ -3,14 +3,17 @@
 from collections import Counter
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from support.tracking import Interpreter, core, windows
 
 from tachometry.sim.golden.methods.track_recursion import Recursion, log2
-from tachometry.spec import TrackTachometer
+from tachometry.sim.golden.methods.track_sampled import SampledRecursion
+from tachometry.spec import TrackTachometer, of_texts
 from tachometry.spec.formats.tracking import WIDTH
 from tachometry.spec.formats.tracking_code import FIRST_INPUT, assembled
 from tachometry.spec.formats.tracking_instruction import Instruction, Jump
+from tachometry.spec.formats.tracking_sampled import SampledTracking
 
 # Ticks of few clocks and of many, of one length and of several; words as wide as they come.
 CORES = [
@@ -44,6 +47,28 @@ def test_listing(multiplier: str) -> None:
     assert not missed
     assert len(cores[0].program.words) <= FIRST_INPUT
     assert len(code.instructions) < 1024  # one more makes the memory of the program twice as large
+
+
+@pytest.mark.parametrize("multiplier", ["serial", "block"])
+def test_listing_of_reads(multiplier: str) -> None:
+    """Some are far from where they are expected, one or two in a row; nothing checks them."""
+    texts = {"sensor": "sampled", "bits": "17", "crc": "none", "period": "128", "multiplier": multiplier}
+    spec, rng, n_ticks = of_texts("track", texts), np.random.default_rng(1), 600
+    assert isinstance(spec, TrackTachometer)
+    form = spec.form
+    assert isinstance(form, SampledTracking)
+    machine, state = Interpreter(spec.program), SampledRecursion(form, spec.program.ahead)
+    speed = np.repeat(rng.choice([0, 3.7, -200, 41], n_ticks // 100), 100)
+    place = np.floor(np.cumsum(speed) + rng.normal(0, 0.3, n_ticks)).astype(np.int64)
+    place += (rng.random(n_ticks) < 0.05) << rng.integers(2, 12, n_ticks)
+    held = silent = 0
+    for nth, has in enumerate((rng.random(n_ticks) > 0.05).tolist()):
+        silent = 0 if has else silent + 1
+        moved, held = (int(place[nth]) - held, int(place[nth])) if has else (0, held)
+        kind, fine = form.phase(held)
+        row = (int(has), int(rng.integers(4000)), fine, 0, moved, kind, 0, silent, form.tick_cycles)
+        assert machine.tick(*row) == state.tick(*row), f"tick {nth}"
+    assert all(machine.met[machine.program.code.labels[label]] > 9 for label in ("later", "alone", "silent"))
 
 
 @pytest.mark.parametrize(
