@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -18,6 +19,7 @@ from tachometry.cli.options.outputs import OUTPUT_OPTIONS, WHOLE, outputs_of, wr
 from tachometry.cli.reports.run import print_simulation
 from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim.encoder.virtual import Encoding
+from tachometry.sim.signals.flow import Flow
 from tachometry.sim.signals.recording import Recording
 from tachometry.sim.studies.simulation import Running
 from tachometry.sim.studies.simulation import simulate as simulation_of
@@ -57,8 +59,9 @@ def simulate(spec: CoreSpec, record: Recorder, tables: list[Path], targets: dict
     """
     outputs = outputs_of(spec, targets, tables)
     spec = shown_in_unit_of(record.motion, spec)
-    truths = [record(spec.tachometer, axis, spec.axes) for axis in range(spec.axes or 1)]
-    recordings = [truth.recording for truth in truths]
+    recordings, truths = zip(
+        *(record.flow(spec.tachometer, axis, spec.axes) for axis in range(spec.axes or 1)), strict=True
+    )
     return run_core(outputs, running, spec, "--motion", recordings, truths)
 
 
@@ -67,8 +70,8 @@ def run_core(
     running: Running,
     spec: CoreSpec,
     source: str,
-    recordings: list[Recording],
-    truths: list[Encoding] | None = None,
+    recordings: Sequence[Recording | Flow],
+    truths: Sequence[Encoding] | None = None,
 ) -> int:
     """Simulate a core, write the outputs, and print the results; return the exit status."""
     with outputs:

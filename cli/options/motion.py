@@ -18,6 +18,8 @@ from tachometry.spec.language.units import SPEED, parse_time
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
     from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
+    from tachometry.sim.signals.flow import Flow
+    from tachometry.sim.signals.recording import Recording
 
 _MOTION = "Motion"
 Core = TypeVar("Core", bound=AnySpec)
@@ -78,8 +80,8 @@ def tables_of(motion: str) -> list[Path]:
     ]
 
 
-def _record(encoder: VirtualEncoder, motion: str, spec: TachometerSpec) -> Encoding:
-    """Return what an encoder records of a motion, which may be a log of what its counter showed."""
+def _record(encoder: VirtualEncoder, motion: str, spec: TachometerSpec) -> tuple[Flow | Recording, Encoding]:
+    """Return what `VirtualEncoder.flow` does of a motion, which may be a log of what its counter showed."""
     from tachometry.sim.captures.count_log import read_count_log
     from tachometry.sim.captures.file import OptionError
     from tachometry.sim.captures.header import TextOptions
@@ -87,7 +89,7 @@ def _record(encoder: VirtualEncoder, motion: str, spec: TachometerSpec) -> Encod
 
     kind, _, rest = motion.strip().partition(":")
     if kind != "counts":
-        return encoder.record(parse_motion(motion))
+        return encoder.flow(parse_motion(motion))
     if len(parts := rest.rsplit(":", 2)) != 3 or not all(parts) or ("+" in rest and not Path(parts[0]).exists()):
         raise ParameterError("motion", f"must be counts:FILE:TIME:COUNT alone, not {motion!r}")
     text = TextOptions(parts[1], slowest_s=float(spec.tick.seconds(spec.times.longest)))
@@ -103,7 +105,7 @@ def _record(encoder: VirtualEncoder, motion: str, spec: TachometerSpec) -> Encod
     # In the middle of a quarter period, for rounding not to make or lose an edge.
     angle = (log.edges(spec.encoder, encoder.edges_per_rev) + 0.5) * encoder.disc.pitch_rad
     encoding = encoder.record(Motion.of_table(log.time, angle))
-    return replace(encoding, recording=replace(encoding.recording, source=log.source))
+    return replace(encoding.recording, source=log.source), encoding
 
 
 def shown_in_unit_of(motion: str, spec: Core) -> Core:
@@ -120,7 +122,14 @@ class Recorder:
     values: Mapping[str, Any]  # of the virtual encoder
 
     def __call__(self, spec: TachometerSpec, axis: int = 0, axes: int | None = None) -> Encoding:
-        """Return the recording; ValueError if there are more motions than axes."""
+        """Return the recording, with the truth; ValueError if there are more motions than axes."""
+        from tachometry.sim.signals.flow import Flow
+
+        recording, truth = self.flow(spec, axis, axes)
+        return replace(truth, recording=recording.whole() if isinstance(recording, Flow) else recording)
+
+    def flow(self, spec: TachometerSpec, axis: int = 0, axes: int | None = None) -> tuple[Flow | Recording, Encoding]:
+        """Return the recording, in parts where `VirtualEncoder.flow` gives them, and the truth about it."""
         from tachometry.sim.encoder.sampled import encoder_of
 
         own = encoder_of(spec, **self.values)

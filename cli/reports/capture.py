@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tachometry.sim.signals.flow import Flow
 from tachometry.sim.signals.recording import Recording
 from tachometry.sim.signals.source import Source
 from tachometry.sim.studies.simulation import Axis
@@ -52,7 +53,7 @@ def axis_warnings(axis: Axis) -> list[str]:
     return capture_warnings(axis.recording) + _index(axis) + _index_place(axis) + _index_missed(axis)
 
 
-def capture_warnings(recording: Recording) -> list[str]:
+def capture_warnings(recording: Recording | Flow) -> list[str]:
     """Return what of a capture contradicts itself."""
     warnings = _still(recording.source)
     if together := recording.n_together:
@@ -95,7 +96,7 @@ def _index_place(axis: Axis) -> list[str]:
     near = np.abs(axis.index_distances)
     near = near[(near > 0) & (near <= 2 * axis.spec.encoder.decoding) & (near < axis.spec.encoder.encoder_counts / 2)]
     recording = axis.recording
-    if not len(near) or recording.z is None:
+    if not len(near) or isinstance(recording, Flow) or recording.z is None:
         return []
     if axis.spec.front_end.index_state is not None:
         return [

@@ -192,7 +192,7 @@ def _verdict(simulation: Simulation, warned: bool) -> Text:
     of = f" ({plural(tally.n_values, 'value')}); wiring and --ppr are not checked" if captured else ""
     only = "; neither was compared with the shaft: see the warning" if warned else ""
     verdict, style = ("INTERRUPTED", "bold yellow") if simulation.interrupted else ("PASS", "bold green")
-    if not any(len(axis.recording.time) > 1 for axis in simulation.axes):
+    if not any(axis.recording.n_changes for axis in simulation.axes):
         verdict, style = "NO EDGE", "bold yellow"
     return Text(
         f"{verdict}: hardware and golden model agree in every bit of {tally.rows[UPDATE]} updates "

@@ -61,6 +61,12 @@ def find_crossings(shaft: Shaft, disc: Disc) -> tuple[FloatArray, IntArray]:
     It raises ValueError if the shaft is so long in motion at so high a frequency that there are more than `MAX_CELLS`
     cells.
     """
+    times, quarters = zip((np.empty(0), np.empty(0, dtype=np.int64)), *passages(shaft, disc), strict=True)
+    return np.concatenate(times), np.concatenate(quarters)
+
+
+def passages(shaft: Shaft, disc: Disc) -> Iterator[tuple[FloatArray, IntArray]]:
+    """Yield what `find_crossings` returns, some at a time."""
     length = np.diff(shaft.breakpoints, append=shaft.breakpoints[-1])  # the end is a cell of no length
     with np.errstate(over="ignore"):
         n_cells = np.maximum(np.ceil(length * _CELLS_PER_PERIOD * np.append(shaft.max_frequency, 0)), 1)
@@ -68,17 +74,13 @@ def find_crossings(shaft: Shaft, disc: Disc) -> tuple[FloatArray, IntArray]:
         periods = MAX_CELLS // _CELLS_PER_PERIOD
         raise ValueError(f"motion and vibration must not swing more than {periods} times: shorten them or swing slower")
     first_cell = np.cumsum(np.append(0, n_cells[:-1].astype(np.int64)))
-    times, quarters = [np.empty(0)], [np.empty(0, dtype=np.int64)]
     for begin in range(0, int(first_cell[-1]), _CHUNK):
         cell = np.arange(begin, min(begin + _CHUNK, int(first_cell[-1])) + 1)
         j = np.searchsorted(first_cell, cell, side="right") - 1
         time = shaft.breakpoints[j] + length[j] * ((cell - first_cell[j]) / n_cells[j])
         time = _split(shaft.acceleration, time)  # now the speed is monotone in each cell and cannot hide two zeros
         time = _split(shaft.speed, time)
-        for passage_time, passage_quarter in _crossings_of_cells(shaft, disc, time):
-            times.append(passage_time)
-            quarters.append(passage_quarter)
-    return np.concatenate(times), np.concatenate(quarters)
+        yield from _crossings_of_cells(shaft, disc, time)
 
 
 def _split(function: Callable[[FloatArray], FloatArray], time: FloatArray) -> FloatArray:

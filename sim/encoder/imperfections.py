@@ -104,9 +104,9 @@ def displaced_edges(phase_error_deg: float, duty_error_deg: float) -> FloatArray
     return np.array([b + half, -half, b - half, half])  # B falls, A rises, B rises, A falls
 
 
-def jittered(time: FloatArray, duration: float, deviation: float, random: np.random.PCG64) -> FloatArray:
-    """Return edges shifted in time; they keep their order, and stay within the recording."""
-    gap = np.diff(time, prepend=0.0, append=duration)
+def jittered(time: FloatArray, ends: tuple[float, float], deviation: float, random: np.random.PCG64) -> FloatArray:
+    """Return edges shifted in time; they keep their order, and stay within what is before and after them, `ends`."""
+    gap = np.diff(time, prepend=ends[0], append=ends[1])
     shift = np.clip(deviation * gaussian(random, len(time)), -_CLIP, _CLIP)
     return time + shift * np.minimum(gap[:-1], gap[1:])
 

@@ -7,16 +7,18 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, cached_property
+from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tachometry.sim.encoder import imperfections
-from tachometry.sim.encoder.crossings import Disc, IntArray, find_crossings
+from tachometry.sim.encoder.crossings import Disc, IntArray, find_crossings, passages
 from tachometry.sim.encoder.imperfections import BOUNCE, ILLEGAL, JITTER, LOST, NONUNIFORMITY
 from tachometry.sim.encoder.motion import FloatArray, Motion, Vibration, sin2pi
 from tachometry.sim.encoder.options import EncoderOptions
+from tachometry.sim.signals.flow import Flow, Part, Parts
 from tachometry.sim.signals.memory import EDGE, check_memory
 from tachometry.sim.signals.recording import MAX_EDGES, Recording, packed, quadrature
 from tachometry.spec import Encoder, TachometerSpec
@@ -186,8 +188,51 @@ class VirtualEncoder(EncoderOptions):
 
     def record(self, motion: Motion) -> "Encoding":
         """Let the shaft move; ValueError if that could be more than `MAX_EDGES` edges, with those before the start."""
-        shaft = _VibratingShaft(motion, self.vibration, self.start_angle_rad)
-        n_edges = shaft.reach / self.disc.pitch_rad * (1 + 2 * self.bounce.count if self.bounce else 1)
+        self._check(motion)
+        shaft = self.shaft(motion)
+        time, quarter = find_crossings(shaft, self.disc)
+        if self.jitter:
+            time = imperfections.jittered(time, (0.0, motion.duration), self.jitter, self._stream(JITTER))
+        time = np.append(0.0, time)
+        quarter = np.append(self.disc.quarter(shaft.angle(np.zeros(1))), quarter)
+        recording, n_illegal, n_lost = self._lines(time, quarter, motion.duration)
+        return Encoding(self, motion, recording, n_illegal, n_lost)
+
+    def flow(self, motion: Motion) -> "tuple[Flow | Recording, Encoding]":
+        """Let the shaft move; return the recording of `record`, in parts if each edge needs only its neighbours, and
+        the truth about it.
+        """
+        faults = (self.lost, self.illegal, self.bounce, self.broken, self.stuck, self.index)
+        if any(faults) or self.sensor not in ("quadrature", "hall"):
+            found = self.record(motion)
+            return found.recording, found
+        start = self.disc.quarter(self.shaft(motion).angle(np.zeros(1)))
+        rest, *_ = self._lines(np.zeros(1), start, motion.duration)
+        flow = Flow((*rest.wires,), self._parts(motion, rest, start), lambda _: self._check(motion), motion.duration)
+        return flow, Encoding(self, motion, rest, 0, 0)
+
+    def _parts(self, motion: Motion, rest: Recording, quarter: IntArray) -> Parts:
+        """Yield the recording of a motion that begins with a row and in a quarter, see `flow`."""
+        yield Part(rest.time, rest.level, 0.0)
+        before, random, end = 0.0, self._stream(JITTER), np.full(1, motion.duration)
+        for (edges, quarters), (following, _) in pairwise(
+            chain(passages(self.shaft(motion), self.disc), [(end, quarter)])
+        ):
+            last = float(edges[-1])
+            if self.jitter:
+                edges = imperfections.jittered(edges, (before, float(following[0])), self.jitter, random)
+            made, *_ = self._lines(np.append(0.0, edges), np.append(quarter, quarters), motion.duration)
+            yield Part(made.time[1:], made.level[1:], float(edges[-1]))
+            before, quarter = last, quarters[-1:]
+        yield Part(rest.time[:0], rest.level[:0], motion.duration)
+
+    def shaft(self, motion: Motion) -> _VibratingShaft:
+        """Return the shaft in motion."""
+        return _VibratingShaft(motion, self.vibration, self.start_angle_rad)
+
+    def _check(self, motion: Motion) -> None:
+        """Check that a motion has not too many edges to be held."""
+        n_edges = self.shaft(motion).reach / self.disc.pitch_rad * (1 + 2 * self.bounce.count if self.bounce else 1)
         if not n_edges <= MAX_EDGES:
             raise ParameterError(
                 "motion",
@@ -195,13 +240,6 @@ class VirtualEncoder(EncoderOptions):
                 f"included, not {n_edges:.3g}",
             )
         check_memory(n_edges * EDGE, "--motion", "shorten it, or turn more slowly")
-        time, quarter = find_crossings(shaft, self.disc)
-        if self.jitter:
-            time = imperfections.jittered(time, motion.duration, self.jitter, self._stream(JITTER))
-        time = np.append(0.0, time)
-        quarter = np.append(self.disc.quarter(shaft.angle(np.zeros(1))), quarter)
-        recording, n_illegal, n_lost = self._lines(time, quarter, motion.duration)
-        return Encoding(self, motion, recording, n_illegal, n_lost)
 
     def _lines(self, time: FloatArray, quarter: IntArray, duration: float) -> tuple[Recording, int, int]:
         """Return what lines make of quarters that begin at some times, and how many edges met or were lost."""
@@ -351,4 +389,4 @@ class Encoding:
 
     @property
     def _shaft(self) -> _VibratingShaft:
-        return _VibratingShaft(self.motion, self.encoder.vibration, self.encoder.start_angle_rad)
+        return self.encoder.shaft(self.motion)

@@ -131,7 +131,7 @@ class Recording(_Lines):
 
         It raises ValueError if there are too many clocks to be told apart.
         """
-        clock = self._clock(clock_hz)
+        clock = self.clock(clock_hz)
         n_clocks = int(np.floor(self.duration * clock_hz))
         last = np.append(clock[1:] != clock[:-1], True) & (
             clock < max(n_clocks, 1)
@@ -142,7 +142,7 @@ class Recording(_Lines):
         lines = {name: line[changed] for name, line in zip(self.lines, levels, strict=True)}
         return PinTrace.of_lines(clock[row[changed]], max(n_clocks, 1), lines)
 
-    def _clock(self, clock_hz: int) -> NDArray[np.int64]:
+    def clock(self, clock_hz: int) -> NDArray[np.int64]:
         """Return the clock edge at which each row is seen."""
         if self.duration * clock_hz >= 1 << 53:
             raise ValueError(f"a recording must last less than 2^53 clocks, not {self.duration:.6g} s")
@@ -160,8 +160,13 @@ class Recording(_Lines):
     def n_merged(self, clock_hz: int, n_clocks: int) -> int:
         """Return edges, but of Z, that come in the clock of an edge before them, within the first `n_clocks`."""
         row, _ = self._edges
-        clock = self._clock(clock_hz)[row]
+        clock = self.clock(clock_hz)[row]
         return int(np.count_nonzero(np.diff(clock[clock < n_clocks]) == 0))
+
+    @property
+    def n_changes(self) -> int:
+        """Rows but the first."""
+        return len(self.time) - 1
 
     @property
     def n_together(self) -> int:
@@ -197,15 +202,15 @@ class PinTrace(_Lines):
             raise ValueError("clocks of a pin trace must begin at 0 and must increase")
 
     @classmethod
-    def of(cls, recording: Recording, spec: TachometerSpec, *, whole: bool = True) -> "PinTrace":
+    def of(cls, recording: Recording, spec: TachometerSpec) -> "PinTrace":
         """Return what the pins of a core see of a recording: with nominal external ticks if the core takes them and
         there are none, and with probes that are always armed and a stream that is always ready.
 
         It raises ValueError if there are too many clocks to be told apart, more than `MAX_TICKS` ticks, or more than
-        the memory that is free can hold; if what is run is not held as a `whole`, for more than `MOST_IN_PIECES` ticks.
+        the memory that is free can hold.
         """
-        check_ticks(recording.duration, spec, MAX_TICKS if whole else MOST_IN_PIECES)
-        n_ticks = whole * recording.duration / float(spec.timing.tick_seconds)
+        check_ticks(recording.duration, spec)
+        n_ticks = recording.duration / float(spec.timing.tick_seconds)
         check_memory(bytes_of(spec, n_ticks, len(recording.time)), "what is run", "shorten it, or take longer ticks")
         return recording.place(spec.timing.clock_hz).completed(spec)
 

@@ -3,6 +3,8 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ from tachometry.sim.engines.waveform import Curve, add_curves
 from tachometry.sim.golden.pieces import Golden, in_pieces
 from tachometry.sim.signals.arrays import Ints
 from tachometry.sim.signals.axes import AxesTrace, Trace, of_axis
+from tachometry.sim.signals.flow import Flow
 from tachometry.sim.signals.progress import Bar, no_bar
 from tachometry.sim.signals.recording import PinTrace, Recording, packed
 from tachometry.sim.signals.run import Comparison, Run
@@ -52,7 +55,7 @@ class Axis:
     spec: TachometerSpec  # of a core of this axis alone
     run: Run  # its rows; of a run in pieces, the last ones
     tally: Tally  # numbers of all of them
-    recording: Recording
+    recording: Recording | Flow
     truth: Encoding | None  # what the shaft truly did, if it is known; with it `counts_in` and `error`
     n_merged: int  # edges that came too soon after another to be told apart
     # counts_in and counts_out: of the shaft, up to the last tick, and of the core
@@ -80,7 +83,7 @@ class Axis:
     def state_of_index(self) -> str | None:
         """State of the lines in which Z of quadrature is high for the longest time; None without Z."""
         recording, inverted = self.recording, self.spec.encoder.inverted
-        if recording.z is None or self.spec.encoder.sensor != "quadrature":
+        if isinstance(recording, Flow) or recording.z is None or self.spec.encoder.sensor != "quadrature":
             return None
         a, b, z = (getattr(recording, name) ^ np.uint8(name in inverted) for name in "abz")
         usual = np.bincount(packed([a, b]), np.diff(recording.time, append=recording.duration) * z).argmax()
@@ -94,7 +97,7 @@ class Simulation:
     spec: CoreSpec
     engine: str  # what has run the hardware
     wanted: int  # clocks that it was to run; after Ctrl-C it has run fewer
-    lockstep: Lockstep  # of a run in pieces, the last rows
+    lockstep: Lockstep  # of a run in pieces, the last rows, and pins of the first ones
     tally: Tally  # numbers of all rows of the core
     axes: tuple[Axis, ...]
 
@@ -119,36 +122,57 @@ def _fewest(spec: CoreSpec) -> int:
     return spec.tick.longest + spec.latency.tick
 
 
-def _placed(spec: CoreSpec, source: str, recordings: Sequence[Recording], pulses: Pulses, *, whole: bool) -> Trace:
-    """Return what the pins of a core see; ValueError if it does not last a tick, or has too many to be held `whole`."""
-    if spec.axes is not None:
-        trace: Trace = AxesTrace.placed(recordings, spec)
+def _held(recording: Recording | Flow, *, whole: bool) -> Recording | Flow:
+    """Return a recording as a whole, or in parts."""
+    if isinstance(recording, Flow):
+        return recording.whole() if whole else recording
+    return recording if whole else Flow.of(recording)
+
+
+def _placed(spec: CoreSpec, source: str, held: Sequence[Recording | Flow], pulses: Pulses) -> Iterator[Trace]:
+    """Yield what the pins of a core see, as a whole or in pieces; ValueError if it has too many ticks."""
+    wholes = [one for one in held if isinstance(one, Recording)]
+    if isinstance(held[0], Flow):
+        pulses(spec.tachometer)
+        yield from held[0].pieces(spec.tachometer, PIECE * spec.timing.tick_cycles)
+    elif spec.axes is not None:
+        yield AxesTrace.placed(wholes, spec)
     else:
-        trace = _pulsed(spec, source, PinTrace.of(recordings[0], spec, whole=whole), pulses)
-    if trace.n_clocks < (fewest := _fewest(spec)):
+        yield _pulsed(spec, source, PinTrace.of(wholes[0], spec), pulses)
+
+
+def _lasts(spec: CoreSpec, source: str, held: Recording | Flow, first: Trace) -> int:
+    """Return how many clocks are to be run; ValueError if there is nothing to report then."""
+    duration = held.duration if isinstance(held, Flow) else None
+    n_clocks = first.n_clocks if duration is None else max(int(duration * spec.timing.clock_hz), 1)
+    if n_clocks < (fewest := _fewest(spec)):
         raise ValueError(
             f"{source} must last at least {fewest} clocks of --clock ({format_time(spec.tick.seconds(fewest))}), "
-            f"a tick and its latency, not {trace.n_clocks}"
+            f"a tick and its latency, not {n_clocks}"
         )
-    return trace
+    return n_clocks
 
 
 def simulate(
-    spec: CoreSpec, source: str, recordings: Sequence[Recording], truths: Sequence[Encoding] | None, running: Running
+    spec: CoreSpec,
+    source: str,
+    recordings: Sequence[Recording | Flow],
+    truths: Sequence[Encoding] | None,
+    running: Running,
 ) -> Simulation:
-    """Run hardware and golden model on a recording for each axis.
+    """Run hardware and golden model on a recording for each axis, which may come in parts.
 
-    - `source`: What messages call that which the recordings come from.
-    - `truths`: What the shaft of each axis truly did.
-
-    It raises ValueError if the recordings do not last a tick, or have too many.
+    `source` is what messages call that which they come from, and `truths` what the shaft of each axis truly did. It
+    raises ValueError if they do not last a tick, or have too many.
     """
     chosen = pick(running.engine)
-    engine = getattr(chosen, "in_pieces", None)
+    engine: Any = getattr(chosen, "in_pieces", None)
     whole = running.whole or engine is None or not in_pieces(spec.tachometer)
-    trace = _placed(spec, source, recordings, running.pulses, whole=whole)
-    shown, vcd = running.window(spec, trace.n_clocks), running.vcd
+    held = [_held(recording, whole=whole) for recording in recordings]
     tally, speed = Tally(spec.tachometer), truths[0].true_speed if truths else None
+    trace = next(pins := _placed(spec, source, held, running.pulses))
+    n_clocks = _lasts(spec, source, held[0], trace)
+    shown, vcd = running.window(spec, trace.n_clocks), running.vcd
 
     def take(run: Run) -> None:
         tally.count(run)
@@ -156,34 +180,33 @@ def simulate(
             tally.hold(run, speed)
         running.sink(run, tally)
 
-    with running.bar("simulating", trace.n_clocks, "clocks", rate=True) as progress:
+    with running.bar("simulating", n_clocks, "clocks", rate=True) as progress:
         watch = Watch(vcd, shown, progress)
-        if isinstance(trace, PinTrace) and not whole:
-            found = _in_pieces(spec.tachometer, trace, engine, watch, take)
+        if whole:
+            take((found := lockstep(spec, trace, chosen, watch=watch, fewest=_fewest(spec))).actual)
         else:
-            found = lockstep(spec, trace, chosen, watch=watch, fewest=_fewest(spec))
-            take(found.actual)
+            engine = partial(engine, n_clocks=n_clocks, watch=watch)
+            found = _in_pieces(spec.tachometer, chain([trace], pins), engine, take)
     missing = " (there is no C++ compiler)" if (running.engine, chosen.name) == ("auto", "pysim") else ""
-    known: Sequence[Encoding | None] = truths or [None] * len(recordings)
-    axes = tuple(_axis(spec, found.actual, tally, n, *of) for n, of in enumerate(zip(recordings, known, strict=True)))
+    known: Sequence[Encoding | None] = truths or [None] * len(held)
+    axes = tuple(_axis(spec, found.actual, tally, n, *of) for n, of in enumerate(zip(held, known, strict=True)))
     if vcd is not None:
         add_curves(vcd, spec.timing.clock_hz, (shown[0], min(shown[1], found.actual.n_clocks)), _curves(axes))
-    return Simulation(spec, chosen.name + missing, trace.n_clocks, found, tally, axes)
+    return Simulation(spec, chosen.name + missing, n_clocks, found, tally, axes)
 
 
 def _in_pieces(
-    spec: TachometerSpec, trace: PinTrace, engine: Any, watch: Watch, take: Callable[[Run], object]
+    spec: TachometerSpec, pieces: Iterator[Any], engine: Callable[..., Iterator[Run]], take: Callable[[Run], object]
 ) -> Lockstep:
-    """Run a trace as `lockstep` does, but some ticks at a time, of which `take` is given the rows.
+    """Run a trace in pieces as `lockstep` does the whole; `take` is given the rows of each.
 
-    `engine` is `CompiledEngine.in_pieces`.
+    `engine` is `CompiledEngine.in_pieces` of so many clocks.
     """
-    model, comparison, size = Golden(spec), Comparison(), PIECE * spec.timing.tick_cycles
-    last = Run(0, {})
+    model, comparison, last = Golden(spec), Comparison(), Run(0, {})
+    first = next(pieces)
 
-    def pieces() -> Iterator[PinTrace]:
-        for begin in range(0, trace.n_clocks, size):
-            pins = trace.part(begin, min(begin + size, trace.n_clocks))
+    def expected() -> Iterator[PinTrace]:
+        for pins in chain([first], pieces):
             with held_back():
                 comparison.expect(model.run(pins))
             yield pins
@@ -195,14 +218,14 @@ def _in_pieces(
         return run if len(run.ticks) else Run(run.n_clocks, last.tables)
 
     try:
-        for run in engine(spec, pieces(), trace.n_clocks, watch):
+        for run in engine(spec, expected()):
             last = add(run)
     except KeyboardInterrupt as early:
         last = add(early.run) if isinstance(early, Interrupted) else last
         if last.n_clocks < _fewest(spec):
             raise
     comparison.end(last.n_clocks)
-    return Lockstep(trace, last, last, comparison.n_mismatches, comparison.first)
+    return Lockstep(first, last, last, comparison.n_mismatches, comparison.first)
 
 
 def _curves(axes: Sequence[Axis]) -> dict[str, Curve]:
@@ -217,7 +240,9 @@ def _curves(axes: Sequence[Axis]) -> dict[str, Curve]:
     return found
 
 
-def _axis(core: CoreSpec, run: Run, tally: Tally, number: int, recording: Recording, truth: Encoding | None) -> Axis:
+def _axis(
+    core: CoreSpec, run: Run, tally: Tally, number: int, recording: Recording | Flow, truth: Encoding | None
+) -> Axis:
     """Return the results of an axis; `tally` is that of the core, and `run` has the last rows of a run in pieces."""
     if core.axes is not None:
         return _axis_of_many(core, run, number, recording, truth)
@@ -246,7 +271,7 @@ def _sampled(clock: int, clock_hz: int) -> float:
     return instant
 
 
-def _axis_of_many(spec: AxesSpec, run: Run, axis: int, recording: Recording, truth: Encoding | None) -> Axis:
+def _axis_of_many(spec: AxesSpec, run: Run, axis: int, recording: Recording | Flow, truth: Encoding | None) -> Axis:
     own, alone, counts_in, error = of_axis(spec, run, axis), spec.tachometer, None, None
     tally = Tally(alone)
     tally.count(own)

@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from tachometry.sim.signals.run import Mismatch, Run, Table, compare
+from tachometry.sim.signals.run import Comparison, Mismatch, Run, Table, compare
 from tachometry.spec import METHODS, Encoder, TachometerSpec, Timing
 from tachometry.spec.core.index import Index
 
@@ -83,3 +83,24 @@ def test_rows_that_only_one_run_has(method: str) -> None:
                 assert [found.signal for found in first] == [f"{strobe}.{name}" for name in ("clock", *names)]
                 assert all(found.row == kept.stop for found in first)
                 assert all((found.expected is None) == (pair[0] is fewer) for found in first)
+
+
+def test_pieces_are_compared_as_the_whole() -> None:
+    """Golden rows come one by one, and a row ahead; two cells are wrong, the last rows of one strobe are not there."""
+    spec = spec_of("mt")
+    run = run_of(spec)
+    for strobe, name in cells(spec):
+        for row in range(N_ROWS):
+            wrong = with_cell(with_cell(run, strobe, name, row, 1), strobe, name, N_ROWS - 1, 1)
+            wrong.tables["decode_error"] = run.tables["decode_error"].rows(slice(row))
+            comparison = Comparison()
+            for nth in range(N_ROWS + 1):
+                sides = (
+                    (comparison.expect, run, slice(nth, nth + 1)),
+                    (comparison.add, wrong, slice(max(nth - 1, 0), nth)),
+                )
+                for take, of, rows in sides:
+                    take(Run(0, {each: table.rows(rows) for each, table in of.tables.items()}))
+            comparison.end(run.n_clocks)
+            count, first = compare(run, wrong)
+            assert (comparison.n_mismatches, {*comparison.first}) == (count, {*first})

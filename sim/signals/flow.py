@@ -1,0 +1,103 @@
+"""A recording that comes in parts, as a motion makes it or a file is read, and of which one part is held at a time."""
+
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tachometry.sim.signals.recording import MOST_IN_PIECES, PinTrace, Recording, check_ticks
+from tachometry.sim.signals.source import Source
+from tachometry.spec import TachometerSpec
+
+ROWS = 1 << 16  # of a part
+
+
+class Part(NamedTuple):
+    """Holds the next rows of a recording, which may be none."""
+
+    time: NDArray[np.float64]  # shape (n,), seconds: the first row of all is at 0
+    level: NDArray[np.uint8]  # shape (n,): a bit for each line, the first lowest
+    until: float  # seconds: no later row is before it; of the last part, the duration
+
+
+Parts = Generator[Part, None, None]
+
+
+@dataclass
+class Flow:
+    """Gives a recording in parts, once: all together, or as pieces of what the pins see.
+
+    What it says of itself is, before its end, of the parts that have come.
+    """
+
+    lines: tuple[str, ...]
+    parts: Parts
+    check: Callable[[int], object] = lambda _: None  # raises ValueError if so many changes are too many to be held
+    duration: float | None = None  # seconds, if it is known
+    source: Source | None = None
+    # as of `Recording`
+    n_changes: int = -1
+    n_together: int = 0
+    _n_merged: int = 0
+    _held: Recording | None = None  # rows of the piece that has come last, and of later ones
+
+    @classmethod
+    def of(cls, recording: Recording) -> "Flow":
+        """Return the flow of a recording that is there as a whole."""
+
+        def parts() -> Parts:
+            time, level = recording.time, recording.level
+            for begin in range(0, len(time), ROWS):
+                until = time[begin + ROWS] if begin + ROWS < len(time) else recording.duration
+                yield Part(time[begin : begin + ROWS], level[begin : begin + ROWS], float(until))
+
+        return cls((*recording.wires,), parts(), duration=recording.duration, source=recording.source)
+
+    def whole(self) -> Recording:
+        """Return the recording; ValueError if it has too many changes."""
+        self.check(0)
+        held = list[Part]()
+        for part in self._counted():
+            held.append(part)
+            self.check(self.n_changes)
+        time, level = np.concatenate([part.time for part in held]), np.concatenate([part.level for part in held])
+        return Recording.of_level(time, level, held[-1].until, self.lines)
+
+    def pieces(self, spec: TachometerSpec, size: int) -> Iterator[PinTrace]:
+        """Yield what the pins of a core see, at most `size` clocks at a time.
+
+        It raises ValueError for more than `MOST_IN_PIECES` ticks, or if clocks are too many to be told apart.
+        """
+        clock_hz, begin, held = spec.timing.clock_hz, 0, Part(np.empty(0), np.empty(0, dtype=np.uint8), 0.0)
+        for time, level, until in self._counted():
+            check_ticks(until, spec, MOST_IN_PIECES)
+            held = Part(np.append(held.time, time), np.append(held.level, level), until)
+            n_clocks = max(int(until * clock_hz), until == self.duration)
+            while begin < n_clocks:
+                self._n_merged = self.n_merged(clock_hz, begin)
+                end = min(begin + size, n_clocks)
+                self._held = Recording.of_level(*held, self.lines)
+                yield self._held.place(clock_hz).completed(spec).part(begin, end)
+                first = int(np.searchsorted(self._held.clock(clock_hz), end)) - 1
+                held = Part(np.append(0.0, held.time[first + 1 :]), held.level[first:], until)
+                begin = end
+
+    def n_merged(self, clock_hz: int, n_clocks: int) -> int:
+        """Return as `Recording.n_merged`, of pieces up to the one that has come last, in which clock `n_clocks` is."""
+        return self._n_merged + (self._held.n_merged(clock_hz, n_clocks) if self._held else 0)
+
+    def _counted(self) -> Iterator[Part]:
+        """Yield the parts, and count what is in them; the duration is known with the last one."""
+        part: Part | None = next(self.parts)
+        last = np.empty(0, dtype=np.uint8)
+        while part is not None:
+            following = next(self.parts, None)
+            if following is None:
+                self.duration = part.until
+            level = np.append(last, part.level)
+            self.n_changes += len(part.time)
+            self.n_together += Recording.of_level(np.zeros(len(level)), level, 0.0, self.lines).n_together
+            yield part
+            part, last = following, level[-1:]
