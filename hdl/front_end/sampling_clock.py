@@ -55,12 +55,10 @@ class SamplingClock(Box):
 
     @property
     def idle(self) -> tuple[Idle, ...]:
-        if self._lead:
-            return ()
         if self.states:
-            return (IdleCounter("state", order=self.states),)
+            return (IdleCounter("state", order=self.states[: len(self.states) - self._lead]),)
         # Of two clocks none is worth skipping, and one bit goes by the name of what it is connected to.
-        return (IdleCounter("left", -1, (-1,)),) if self._tick_cycles > 2 else ()
+        return (IdleCounter("left", -1, (-1, self._lead - 1)),) if self._tick_cycles > 2 else ()
 
     def build(self, m: Module) -> None:
         if self._tick_cycles == 1:

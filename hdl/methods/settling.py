@@ -12,7 +12,8 @@ class SettlingPlace(Box):
 
     A place that is 3/8 count away begins to wait when the velocity has fallen to half of that at the last count.
     Half a count is its limit then; the limit halves each time the velocity halves again. Of a place that is far away
-    the low bits alone are compared. `taken` is high in the clock in which the update is taken. Latency: 0.
+    the low bits alone are compared. `taken` is high in the clock in which the update is taken, and velocity and place
+    have been the same for four clocks.
     """
 
     def __init__(self, settling: Settling, place_width: int, velocity_width: int) -> None:
@@ -34,14 +35,16 @@ class SettlingPlace(Box):
         stays = Signal()
         ahead = Signal(len(near) - 1)
         now = Signal.like(limit)
-        m.d.comb += [
+        ends = Signal()
+        m.d.sync += [
             size.eq(velocity ^ velocity[-1].replicate(len(velocity))),
             slow.eq(size <= mark),
             ahead.eq(near ^ back.replicate(len(near))),
             stays.eq(self.forced & (waits | ((ahead >= half - (half >> 2)) & (slow | (limit < half))))),
             now.eq(Mux(slow, limit >> 1, limit)),
-            self.settled.eq(Mux(stays & (ahead > now), (now ^ back.replicate(len(near))).as_signed(), self.between)),
+            ends.eq(stays & (ahead > now)),
         ]
+        m.d.comb += self.settled.eq(Mux(ends, (now ^ back.replicate(len(near))).as_signed(), self.between))
         with m.If(self.taken):
             m.d.sync += waits.eq(stays)
             with m.If(~self.forced):

@@ -37,7 +37,7 @@ class TrackMethod(Box):
         self._reads = spec.encoder.sampled is not None
         self.tick_counts = None if self._reads else TickCounts(spec.form, spec.timing.max_ticks)
         self.machine = TrackMachine(spec.program)
-        self.left = SamplingClock(spec.latency.datapath - 1)
+        self.left = SamplingClock(spec.latency.datapath - 1, 5 if spec.settling else 0)
         super().__init__(
             {
                 **datapath_members(spec),
@@ -107,7 +107,8 @@ class TrackMethod(Box):
         if spec.settling is None:
             whole = (position << spec.position_fine_bits) + (machine.position_fine >> shift)
             return whole + machine.position_fine[shift - 1]
-        between = (machine.position_fine >> shift) + machine.position_fine[shift - 1]
+        between = Signal(signed(len(machine.position_fine) - shift + 1))
+        m.d.sync += between.eq((machine.position_fine >> shift) + machine.position_fine[shift - 1])
         m.submodules.settling = box = SettlingPlace(spec.settling, len(between), spec.velocity.native)
         m.d.comb += [
             box.between.eq(between),
