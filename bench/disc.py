@@ -23,7 +23,9 @@ FIRST_SEED, COAST = 1201, "ramp:150rad/s:60rad/s:2400ms"  # 40 turns
 ENCODER = {"lines": "500", "index": "yes"}
 BASE = {**ENCODER, "clock": "48MHz", "tick": "20us", "max-speed": "400rad/s"}
 MT = {"max-time": "10ms"}
-METHODS = {"track": {"max-time": "100ms"}, "mt": MT, "mt, 1 ms": MT | {"min-time": "1ms"}, "s": MT}
+TRACK, SECTORS = {"max-time": "100ms"}, {"disc-table": "sectors"}  # without a map they have zeros
+METHODS = {"track": TRACK, "mt": MT, "mt, 1 ms": MT | {"min-time": "1ms"}, "s": MT}
+METHODS |= {"track, sectors": TRACK | SECTORS, "mt, sectors": MT | SECTORS}
 DISCS = {
     "off centre": "real eccentricity=0.25",
     "magnetic": "jitter=0.05 nonuniformity=0.02",
@@ -40,7 +42,8 @@ MOTIONS = {
     "ramp": ("ramp:0:100rad/s:400ms", 0.04),
     "reversals": ("sine:50rad/s:5Hz:400ms", 0.1),
 }
-GUIDE = [("track", "50 rad/s"), ("track", "ramp"), ("track", "reversals"), ("mt", "50 rad/s"), ("mt, 1 ms", "50 rad/s")]
+GUIDE = [("track", "50 rad/s"), ("track", "ramp"), ("track, sectors", "ramp"), ("track", "reversals")]
+GUIDE += [(method, "50 rad/s") for method in ("mt", "mt, sectors", "mt, 1 ms")]
 
 
 def encoder_of(disc: str, seed: int) -> VirtualEncoder:

@@ -82,21 +82,14 @@ class Client:
         """Write a map of the disc, and return whether the core has it then; it forgets its place in the turn.
 
         `displacement` is where each edge lies, in counts, as in the file of `tachometry calibrate`. While captures are
-        held the map cannot be read back: False. It raises KeyError if the core has no table that is written; ValueError
-        if the map has another number of edges, or one that does not fit; then nothing is written.
+        held the map cannot be read back: False. It raises what `HostRegisters.disc_entries` raises; then nothing is
+        written.
         """
-        about = self.registers.disc
-        if about is None or not about["writable"]:
-            raise KeyError("there is no map of the disc that is written: see --disc-table")
-        unit, number = about["counts_per_lsb"], about["entries"]
-        if len(displacement) != number:
-            raise ValueError(f"displacement must have {number} edges, not {len(displacement)}")
-        entries = [round(each / unit) for each in displacement]
-        if not -128 <= min(entries) <= max(entries) < 128:
-            raise ValueError(f"displacement must be from {-128 * unit:g} to {127 * unit:g} counts")
-        for edge, entry in enumerate(entries):
-            self.write("DISC_ADDRESS", edge)
-            self.write("DISC_DATA", self.registers.with_fields("DISC_DATA", entry & 255, {"write": 1}))
+        entries = self.registers.disc_entries(displacement)
+        for address, entry in enumerate(entries):
+            self.write("DISC_ADDRESS", address)
+            value = entry & self.registers.mask("DISC_DATA", "value")
+            self.write("DISC_DATA", self.registers.with_fields("DISC_DATA", value, {"write": 1}))
         return all(self._has_entry(*each) for each in enumerate(entries))
 
     def turn_disc(self, by: int) -> None:

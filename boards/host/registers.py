@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tachometry.boards.host.snapshot import Snapshot, lsb_of
+from tachometry.spec.formats.sectors import sectors_of
 
 
 class HostRegisters:
@@ -64,6 +65,27 @@ class HostRegisters:
         value, *acts = self._registers[name]["fields"]
         turns = round(degrees / lsb_of(value["unit"])) % (1 << value["width"])
         return turns | sum(self.mask(name, one["name"]) for one in acts)
+
+    def disc_entries(self, displacement: Sequence[float]) -> list[int]:
+        """Return entries of the core's table for a map of the disc: where each edge lies, in counts.
+
+        It raises KeyError if the core has no table that is written; ValueError if the map has another number of edges,
+        or one that does not fit.
+        """
+        about = self.disc
+        if about is None or not about["writable"]:
+            raise KeyError("there is no map of the disc that is written: see --disc-table")
+        unit, edges, most = about["counts_per_lsb"], about["edges"], 1 << about["bits"] - 1
+        if len(displacement) != edges:
+            raise ValueError(f"displacement must have {edges} edges, not {len(displacement)}")
+        if about["form"] == "edges":
+            entries = shown = [round(each / unit) for each in displacement]
+        else:
+            lines = sectors_of(tuple(displacement), about["sectors"], unit, about["quarters"])
+            entries, shown = [*lines.entries], [*lines.displacements]
+        if not -most <= min(shown) <= max(shown) < most:
+            raise ValueError(f"displacement must be from {-most * unit:g} to {(most - 1) * unit:g} counts")
+        return entries
 
     def written(self, name: str, value: int) -> list[tuple[int, int]]:
         """Return offsets and words to be written for a value of a register, or of two; KeyError if there is none,

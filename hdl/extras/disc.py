@@ -13,7 +13,7 @@ from tachometry.hdl.wires.ports import Box, only_if
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.disc import SLIPS_BITS, DiscMap
 from tachometry.spec.formats.displacement import DISPLACED, ENTRY_BITS, MAPPED, Displacement
-from tachometry.spec.formats.sectors import Sectors
+from tachometry.spec.formats.sectors import SLOPE_BITS, Sectors
 
 
 class Gates(Box):
@@ -31,18 +31,17 @@ class Gates(Box):
     def __init__(
         self, table: Sequence[int] | Sectors, place: int | None, form: Displacement, *, writable: bool, looks: bool
     ) -> None:
-        edges = table.edges if isinstance(table, Sectors) else len(table)
-        self._edges, self._table, self._place, self._shift = edges, table, place, form.shift
-        self._writable, self._looks, edge = writable, looks, range(edges)
-        indexed = place is not None
+        edges, bits = (table.edges, SLOPE_BITS) if isinstance(table, Sectors) else (len(table), ENTRY_BITS)
+        self._edges, self._table, self._place, self._form = edges, table, place, form
+        self._writable, self._looks, indexed, entry = writable, looks, place is not None, signed(bits)
         super().__init__(
             {
                 "step": In(signed(2)),
                 **dict.fromkeys(("disc_bypass", "disc_forget"), In(1)),
                 **only_if(indexed, index_seen=In(1), clear=In(1), disc_slip=Out(1), disc_slips=Out(SLIPS_BITS)),
-                **only_if(not indexed, disc_turn=In(1), disc_turn_by=In(edge)),
-                **only_if(writable, disc_write=In(1), disc_address=In(edge), disc_data=In(ENTRY_BITS)),
-                **only_if(writable, disc_entry=Out(signed(ENTRY_BITS))),
+                **only_if(not indexed, disc_turn=In(1), disc_turn_by=In(range(edges))),
+                **only_if(writable, disc_write=In(1), disc_address=In(range(len(table))), disc_data=In(entry)),
+                **only_if(writable, disc_entry=Out(entry)),
                 **dict.fromkeys(("disc_used", "disc_sure", MAPPED), Out(1)),
                 **dict.fromkeys(DISPLACED, Out(signed(form.width))),
             }
@@ -63,7 +62,7 @@ class Gates(Box):
         (counted,) = delay(m, step[0])
         (shows,) = delay(m, counted)
         latest = Signal.like(self.displaced)
-        m.d.sync += [self.displaced.eq(entry << self._shift), latest.eq(self.displaced_before)]
+        m.d.sync += [self.displaced.eq(entry << self._form.shift), latest.eq(self.displaced_before)]
         with m.If(~(self.disc_used & (counted | self._looks))):  # the reset of a flip-flop is free
             m.d.sync += self.displaced.eq(0)
         m.d.comb += [self.displaced_before.eq(Mux(shows, self.displaced, latest)), self.mapped.eq(self.disc_used)]
@@ -120,9 +119,12 @@ class Gates(Box):
         if not isinstance(self._table, Sectors):
             return self._read(m, Mux(back, place, moved), writes, self._table)
         assert self._place is not None
-        m.submodules.table = table = SectorTable(self._table, self._place)
+        m.submodules.table = table = SectorTable(self._table, self._place, self._form.entry_bits, self._writable)
         m.d.comb += [table.place.eq(place), table.back.eq(back), table.ends.eq(ends), table.counted.eq(step[0])]
         m.d.comb += table.seen.eq(seen)
+        if self._writable:
+            m.d.comb += [table.write.eq(writes), table.address.eq(self.disc_address), table.data.eq(self.disc_data)]
+            m.d.comb += self.disc_entry.eq(table.shown)
         return table.entry
 
     def _turn(self, m: Module, step: Signal, place: Signal, trust: Signal) -> None:

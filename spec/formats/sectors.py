@@ -14,7 +14,8 @@ _FINEST_BITS = 14  # of a slope times the edges of a sector, below a count
 class Sectors:
     """Edge 0 has the value 0, and each next edge that of the one before and the slope of its sector of 2^`bits` edges.
 
-    The displacement of an edge is its value, rounded to 2^`fine`, and what the edges of its quarter share.
+    The last slope is that from the last edge to edge 0. The displacement of an edge is its value, rounded to 2^`fine`,
+    and what the edges of its quarter share.
     """
 
     edges: int
@@ -25,14 +26,27 @@ class Sectors:
 
     @property
     def values(self) -> tuple[int, ...]:
-        """The values of all edges, and the one that edge 0 would have behind the last one."""
-        return tuple(accumulate((self.slopes[edge >> self.bits] for edge in range(self.edges)), initial=0))
+        """The values of all edges."""
+        return tuple(accumulate((self.slopes[edge >> self.bits] for edge in range(self.edges - 1)), initial=0))
+
+    def __len__(self) -> int:
+        return len(self.entries)
+
+    @property
+    def depth(self) -> int:
+        """Slopes in a memory that has them."""
+        return 1 << (len(self.slopes) - 1).bit_length()
+
+    @property
+    def entries(self) -> tuple[int, ...]:
+        """The table as a program writes it: as many slopes as a memory has, then what the edges of quarters share."""
+        return *self.slopes, *[0] * (self.depth - len(self.slopes)), *self.quarters
 
     @property
     def displacements(self) -> tuple[int, ...]:
         """The displacements of all edges."""
         own, half = self.quarters or (0,), 1 << self.fine - 1
-        return tuple((value + half >> self.fine) + own[edge % len(own)] for edge, value in enumerate(self.values[:-1]))
+        return tuple((value + half >> self.fine) + own[edge % len(own)] for edge, value in enumerate(self.values))
 
     @property
     def width(self) -> int:
@@ -68,6 +82,7 @@ def sectors_of(displacement: tuple[float, ...], most: int, unit: float, quarters
         change = (knots[(sector + 1) % number] - knots[0]) * scale
         slopes.append(round((change - total) / length))
         total += slopes[-1] * length
+    slopes.append(slopes[-1] - total)
     if not max(map(abs, slopes)) < 1 << SLOPE_BITS - 1:
         raise ValueError(f"must have more sectors than {number} of {1 << bits} edges, which would change by 2 counts")
     return Sectors(edges, bits, fine, tuple(slopes), tuple(round(one / unit) for one in own) if quarters else ())

@@ -168,8 +168,8 @@ def _accesses(case: Case, registers: RegisterMap, trace: PinTrace) -> list[Acces
             address = int(rng.choice(len(writes), p=writes / writes.sum()))
             clears = registers.registers[address].name == "CONTROL"
             data = 1 if clears else int(rng.integers(1 << rng.integers(1, 9)))
-            acts = any(field.single and field.low == 8 for field in registers.registers[address].fields)
-            accesses.append(Access(clock, address, data | (acts & clock) << 8))
+            acts = [field.low for field in registers.registers[address].fields if field.single and field.low in (8, 16)]
+            accesses.append(Access(clock, address, data | sum((clock & 1) << low for low in acts)))
         elif rng.random() < 0.36:
             accesses.append(Access(clock, int(rng.choice(len(reads), p=reads / reads.sum()))))
     return accesses

@@ -98,6 +98,12 @@ BOUNDED = (
     Mapped("t", "disc=other.json disc-table=edges bounds=yes max-speed=100rev/s", edges=100, late=True),
     Mapped("mt", "disc=slow.json disc-table=sectors index=yes bounds=yes", edges=100, late=True),
 )
+WRITTEN = (
+    Mapped("mt", "disc-table=sectors:9 index=yes", edges=100),
+    Mapped("track", "disc-table=sectors:20 index=yes tick=300clk max-time=3000clk max-speed=20rev/s", 60, 90_000),
+    Mapped("t", "disc-table=sectors index=yes bounds=yes", edges=100, late=True),
+    Mapped("s", "disc-table=sectors:11 index=yes", edges=100, late=True),
+)
 # Beside what shows a place of the shaft.
 _FINE = "disc=far.json index=yes tick=400clk max-time=4000clk"
 BESIDE = (
@@ -109,6 +115,7 @@ BESIDE = (
 BUS = (
     Case("mt", "disc=far.json index=yes position-modulo=rev/4", swings=True),
     Case("t", "disc=other.json disc-table=edges", edges=60),
+    Case("mt", "disc-table=sectors:5 index=yes", swings=True),
 )
 
 
@@ -119,8 +126,8 @@ def rule(case: Case) -> None:
     assert not any(used[[bypass[clock] == 1 for clock in case.run().ticks.clock]])
 
 
-test_cores = agreeing(CASES + TRACKED + BOUNDED + SLOW + BESIDE, rule)
-test_first_bus, test_second_bus = map(on_a_bus, BUS)
+test_cores = agreeing(CASES + TRACKED + BOUNDED + SLOW + WRITTEN + BESIDE, rule)
+test_first_bus, test_second_bus, test_third_bus = map(on_a_bus, BUS)
 test_refusals = refused({"disc-table=edges": "disc_table must not be given with method m"})
 
 
@@ -147,7 +154,6 @@ test_refusals = refused({"disc-table=edges": "disc_table must not be given with 
             "disc_table must be auto, edges or sectors:N, N from 4 to 256, not none",
         ),
         ("mt", "disc-table=auto", "disc_table must be edges without --disc"),
-        ("mt", "disc-table=sectors", "disc_table must be edges without --disc: no program writes sectors"),
         ("t", "disc=other.json disc-table=sectors", "must be edges without an index in a state of the lines"),
         ("mt", "disc=steep.json disc-table=sectors:4 index=yes", "must have more sectors than 4 of 32 edges, which"),
         ("mt", "disc=far.json timer=tick", "timer must be clock with --disc"),
@@ -180,20 +186,19 @@ def turning(spec: Any, places: Any, apart: int = 23, **levels: Any) -> PinTrace:
     ("text", "wrong"),
     [
         ("", ""),
-        ("[sector]", "[self.place >> table.bits]"),
+        (" - begins", ""),
         *(pytest.param(*one, marks=nightly) for one in (
-            ("half + values[-1]", "half"),
-            ("half + values[self._index]", "half"),
-            ("ends & ~back", "0"),
-            ("Mux(back, value, moved)", "moved"),
-            ("self.place + ~self.back", "self.place"),
+            ("Mux(self.ends, len(table.slopes) - 1, ", "Mux(0, 0, "),
+            ("half + at_index", "half"),
+            ("Mux(was, value, moved)", "moved"),
+            ("self.place + ~back", "self.place"),
         )),
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("method", ["mt", pytest.param("track", marks=nightly)])
 def test_sectors_follow_a_shaft_both_ways(method: str, text: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Over edge 0 and the borders of sectors, on lines that do not close."""
-    slopes = np.random.default_rng(5).integers(-99, 99, 7)
+    slopes = np.random.default_rng(5).integers(-99, 99, 8)
     lines = Sectors(EDGES, 4, 6, tuple(slopes.tolist()), (9, -7, 5, -8))
     monkeypatch.setattr(of_disc, "sectors_of", lambda *_: lines)
     words = "max-time=3000clk tick=300clk" if method == "track" else ""
@@ -209,9 +214,9 @@ def test_sectors_are_the_nearest_line() -> None:
     angle, noise = np.arange(2000) * np.pi / 1000, np.random.default_rng(3).normal(0, 0.1, 2000)
     for far, left in ((np.sin(angle), 0.003), (np.sin(angle) + np.tile((0.1, 0, 0.1, 0), 500), 0.003), (noise, 0.1)):
         lines = sectors_of(tuple(far.tolist()), 32, 1 / 960, True)
-        wrong = np.array(lines.values[:-1]) / 960 / 2**lines.fine + np.tile(lines.quarters, 500) / 960 - far
-        assert (len(lines.slopes), lines.bits) == (32, 6)
-        assert len(sectors_of(tuple(far[:100].tolist()), 32, 1 / 960, True).slopes) == 25
+        wrong = np.array(lines.values) / 960 / 2**lines.fine + np.tile(lines.quarters, 500) / 960 - far
+        assert (len(lines.slopes), lines.bits) == (33, 6)
+        assert len(sectors_of(tuple(far[:100].tolist()), 32, 1 / 960, True).slopes) == 26
         assert np.std(wrong) < left
         assert np.abs(np.fft.rfft(wrong)[1:7]).max() * 2 / 2000 < 0.003
 

@@ -1,6 +1,6 @@
 """Golden model of `spec.core.extras.disc`."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -14,7 +14,6 @@ from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.disc import DOUBTFUL, SEEN, SLIPS_BITS, SURE, UNKNOWN, DiscMap
-from tachometry.spec.formats.displacement import ENTRY_BITS
 from tachometry.spec.formats.sectors import Sectors
 
 
@@ -24,15 +23,20 @@ def displaced(extra: DiscMap, view: View) -> Steps:
     counts, form, found = spec.encoder.encoder_counts, extra.displacement(spec), _places(extra, view)
     writes, through = _writes(extra, view.trace), np.append(0, np.cumsum(steps.step))
 
+    lines = extra.sectors(spec)
+
+    def at_edge(table: Ints, edge: Ints) -> Ints:
+        return _on_lines(lines, form.entry_bits, table, edge) if lines else table[edge % counts]
+
     def is_used(clock: Ints) -> NDArray[np.bool_]:
         return (found.at("trust", clock + 1) & 1 == 1) & (view.trace.line_at("disc_bypass", clock + 1) == 0)
 
     def of_edge(passed: Ints, clock: Ints) -> Ints:
         """Return the displacement of an edge by the counts since reset below it."""
         used = np.flatnonzero(is_used(clock))
-        edge = (passed + found.at("moved", clock))[used] % counts
+        edge = (passed + found.at("moved", clock))[used]
         value = np.zeros(len(clock), np.int64)
-        value[used] = _contents(extra, spec, writes, edge, clock[used]) << form.shift
+        value[used] = _contents(extra, spec, writes, clock[used], at_edge, edge) << form.shift
         return value
 
     value = np.where(steps.step == 0, 0, of_edge(through[:-1] + (steps.step > 0), steps.clock))
@@ -76,7 +80,8 @@ def shown(
         number = np.searchsorted(slips, clock) - np.searchsorted(slips, cleared, side="right")
         columns["disc_slips"] = np.clip(number, 0, (1 << SLIPS_BITS) - 1)
     if extra.writable:
-        entry = _contents(extra, spec, found["disc_writes"], pins.at("disc_address", clock - 1), clock - 1)
+        address = pins.at("disc_address", clock - 1)
+        entry = _contents(extra, spec, found["disc_writes"], clock - 1, np.take, _row(extra, spec, address))
         columns["disc_entry"] = np.where(clock > 0, entry, 0)
     return columns
 
@@ -84,30 +89,41 @@ def shown(
 def _writes(extra: DiscMap, trace: PinTrace) -> Table:
     """Return the clocks in which the table is written, with the edge and what is written."""
     clock = trace.high("disc_write") + 1 if extra.writable else np.empty(0, np.int64)
-    data, half = trace.line_at("disc_data", clock), 1 << ENTRY_BITS - 1
-    return Table(clock, {"edge": trace.line_at("disc_address", clock), "data": (data + half) % (2 * half) - half})
+    return Table(clock, {name: trace.line_at(f"disc_{name}", clock) for name in ("address", "data")})
 
 
-def _contents(extra: DiscMap, spec: TachometerSpec, writes: Table, edge: Ints, clock: Ints) -> Ints:
-    """Return the entry of each edge in a clock, which has all writes before it."""
-    counts, value, done = spec.encoder.encoder_counts, np.zeros(len(edge), np.int64), 0
-    table = np.zeros(1 << (counts - 1).bit_length(), np.int64)
-    table[:counts] = extra.entries(spec) if (lines := extra.sectors(spec)) is None else _on_lines(lines)
+def _contents(
+    extra: DiscMap, spec: TachometerSpec, writes: Table, clock: Ints, find: Callable[[Ints, Ints], Ints], at: Ints
+) -> Ints:
+    """Return what a table has at some places in a clock, which has all writes before it."""
+    entries, value, done = extra.entries(spec), np.zeros(len(at), np.int64), 0
+    table = np.zeros(1 << (len(entries) - 1).bit_length(), np.int64)
+    table[: len(entries)] = entries
+    row, bits = _row(extra, spec, writes.address), extra.entry_bits(spec)
     epoch = np.searchsorted(writes.clock, clock)
     for until in np.unique(epoch).tolist():
-        for row in range(done, until):
-            table[writes.edge[row]] = writes.data[row]
+        for one in range(done, until):
+            table[row[one]] = _signed(writes.data[one], bits)
         done, now = until, epoch == until
-        value[now] = table[edge[now]]
+        value[now] = find(table, at[now])
     return value
 
 
-def _on_lines(lines: Sectors) -> Ints:
-    """Return the displacements of all edges from the slopes of the sectors."""
-    edge = np.arange(lines.edges)
-    value = np.cumsum(np.array(lines.slopes)[edge >> lines.bits])
-    rounded = np.append(0, value[:-1]) + (1 << lines.fine - 1) >> lines.fine
-    return rounded + np.array(lines.quarters or (0,))[edge % (len(lines.quarters) or 1)]
+def _row(extra: DiscMap, spec: TachometerSpec, address: Ints) -> Ints:
+    """Return the entry at an address; quarters repeat."""
+    return address if (lines := extra.sectors(spec)) is None else np.minimum(address, lines.depth + address % 4)
+
+
+def _signed(value: Ints, bits: int) -> Ints:
+    return (value + (1 << bits - 1)) % (1 << bits) - (1 << bits - 1)
+
+
+def _on_lines(lines: Sectors, bits: int, table: Ints, edge: Ints) -> Ints:
+    """Return the displacements of edges since the latest index from the slopes of sectors, which need not close."""
+    slopes = np.append(table[np.arange(lines.edges - 1) >> lines.bits], table[len(lines.slopes) - 1])
+    turns, place = np.divmod(edge, lines.edges)
+    value = np.append(0, np.cumsum(slopes))[place] + turns * slopes.sum() + (1 << lines.fine - 1) >> lines.fine
+    return _signed(value + (table[lines.depth + edge % 4] if lines.quarters else 0), bits)
 
 
 def _turns(view: View, busy: Ints) -> list[tuple[int, int]]:

@@ -13,7 +13,7 @@ from tachometry.spec.core.extras.extra import Event, Extra
 from tachometry.spec.core.front_end import FrontEnd, Pin
 from tachometry.spec.core.numbers import Numbers
 from tachometry.spec.formats.displacement import ENTRY_BITS, FINEST, Displacement
-from tachometry.spec.formats.sectors import Sectors, sectors_of
+from tachometry.spec.formats.sectors import SLOPE_BITS, Sectors, sectors_of
 from tachometry.spec.language.field import Draft, Field
 from tachometry.spec.language.option import ParameterError, option
 from tachometry.spec.language.port import TICK, Port, held, pin, strobe
@@ -28,7 +28,7 @@ _METHODS = ("t", "mt", "s", "track")
 _DISC = """Map of the disc that tachometry calibrate has written. Each count is then placed where its edge lies. The \
 map is used from the first index on. Without --index, or with --index-at edge, DISC_TURN must say where it lies."""
 _TABLE = """Table of the map. edges has 8 bits for each edge, which a program may write; it is empty without --disc. \
-sectors:N has a slope of 16 bits for each of up to N parts of a turn (32), and takes no block RAM."""
+sectors:N has a slope of 16 bits for each of up to N parts of a turn (32); without --disc a program writes it."""
 
 
 @dataclass(frozen=True)
@@ -93,12 +93,15 @@ class DiscMap(Extra):
     @property
     def writable(self) -> bool:
         """Whether a program may write the table."""
-        return self.table == "edges"
+        return self.table == "edges" or (self.table != "auto" and self.file is None)
 
     def displacement(self, spec: Numbers) -> Displacement:
         if table := self.sectors(spec):
-            form = replace(_format(spec, sectors=True), entry_bits=table.width)
-            return replace(form, steepest=_steepest(table.displacements))
+            form = _format(spec, sectors=True)
+            if self.writable:
+                most = max(2, spec.encoder.encoder_counts / 1024) / form.unit  # off centre by some 0.3 degrees
+                return replace(form, entry_bits=1 + math.ceil(math.log2(most)))
+            return replace(form, entry_bits=table.width, steepest=_steepest(table.displacements))
         known = self.file.disc.displacement if self.file else ()
         worst = max(0.99 * self.writable, *map(abs, known), 0)  # counts; what a program writes may be about 1
         form = _format(spec)
@@ -111,23 +114,28 @@ class DiscMap(Extra):
         if form != "sectors":
             return None
         try:
-            if self.file is None:
-                raise ValueError("must be edges without --disc: no program writes sectors")
             if self.index_place(spec) is None:
-                raise ValueError("must be edges without an index in a state of the lines")
-            known, unit = self.file.disc.displacement, _format(spec, sectors=True).unit
+                raise ValueError("must be edges without an index in a state of the lines: type --index")
+            known, unit = self._known(spec), _format(spec, sectors=True).unit
             quarters = spec.facts.update_by != "tick" and len(known) % 4 == 0  # `track` learns them
             return sectors_of(known, int(number or _SECTORS), float(unit), quarters)
         except ValueError as error:
             raise ParameterError("disc_table", str(error)) from error
 
     def entries(self, spec: Numbers) -> tuple[int, ...]:
-        """Return the table of edges after configuration."""
-        return self._entries(spec, self.displacement(spec))
+        """Return the table after configuration, as a program writes it."""
+        lines = self.sectors(spec)
+        return lines.entries if lines else self._entries(spec, self.displacement(spec))
 
     def _entries(self, spec: Numbers, form: Displacement) -> tuple[int, ...]:
-        known = self.file.disc.displacement if self.file else (0.0,) * spec.encoder.encoder_counts
-        return tuple(round(each / float(form.unit)) for each in known)
+        return tuple(round(each / float(form.unit)) for each in self._known(spec))
+
+    def _known(self, spec: Numbers) -> tuple[float, ...]:
+        return self.file.disc.displacement if self.file else (0.0,) * spec.encoder.encoder_counts
+
+    def entry_bits(self, spec: Numbers) -> int:
+        """Return bits of an entry of the table, signed."""
+        return SLOPE_BITS if self.sectors(spec) else ENTRY_BITS
 
     def index_place(self, spec: Numbers) -> int | None:
         """Return the place in the turn at which the index comes; None without one in a state of the lines."""
@@ -184,14 +192,17 @@ class DiscMap(Extra):
             return f"DISC_{register}", field, Pin(port, act=field in ("forget", "now", "write"))
 
         bits = (spec.encoder.encoder_counts - 1).bit_length()
+        entry = self.entry_bits(spec) if self.writable else 0
         yield row("CONTROL", "bypass", "bypass", "The map is not used while this is high.")
         yield row("CONTROL", "forget", "forget", "Forgets the place in the turn, and with it the use of the map.")
         if self.index_place(spec) is None:
             yield row("TURN", "by", "turn_by", "Counts by which disc_turn moves the place, less than a turn.", bits)
             yield row("TURN", "now", "turn", "Moves the place by disc_turn_by of the next clock; the map is then used.")
         if self.writable:
-            yield row("ADDRESS", "edge", "address", "Edge that disc_write writes, and disc_entry shows.", bits)
-            yield row("DATA", "value", "data", "Displacement that is written, signed.", ENTRY_BITS)
+            bits = (len(self.entries(spec)) - 1).bit_length()
+            what = "Entry" if self.sectors(spec) else "Edge"
+            yield row("ADDRESS", "edge", "address", f"{what} that disc_write writes, and disc_entry shows.", bits)
+            yield row("DATA", "value", "data", "Entry that is written, signed.", entry)
             yield row("DATA", "write", "write", "Writes disc_data of the next clock, and forgets the place.")
 
     def pins(self, spec: Numbers) -> Iterable[Pin]:
@@ -206,7 +217,7 @@ class DiscMap(Extra):
             yield strobe("disc_slip", "An index is not where the map expects it: counts were lost, or added.")
         if self.writable:
             text = "Entry of the table at disc_address. It also changes between ticks."
-            yield held(TICK, "disc_entry", ENTRY_BITS, signed=True, help=text)
+            yield held(TICK, "disc_entry", self.entry_bits(spec), signed=True, help=text)
 
     def registers(self, spec: Numbers) -> Iterable[Draft]:
         for name, rows in groupby(self._inputs(spec), lambda row: row[0]):
@@ -223,10 +234,12 @@ class DiscMap(Extra):
 
     def entry(self, spec: Numbers) -> dict[str, Any]:
         unit, sectors = float(self.displacement(spec).unit), self.sectors(spec)
-        table, own, size = (sectors.slopes, sectors.quarters, 2) if sectors else (self.entries(spec), (), 1)
-        content = b"".join((each % (1 << 8 * size)).to_bytes(size, "little") for each in (*table, *own))
+        table, size = self.entries(spec), self.entry_bits(spec) // 8
+        content = b"".join((each % (1 << 8 * size)).to_bytes(size, "little") for each in table)
         return {
             "form": "sectors" if sectors else "edges", "entries": len(table), "counts_per_lsb": unit,
+            "edges": spec.encoder.encoder_counts, "sectors": sectors and len(sectors.slopes) - 1,
+            "quarters": bool(sectors and sectors.quarters), "bits": self.displacement(spec).entry_bits,
             "index_place": self.index_place(spec), "writable": self.writable,
             "sha256": hashlib.sha256(content).hexdigest() if self.file else None,
             "error_counts": self.file.disc.error if self.file else None,

@@ -130,8 +130,9 @@ def test_a_manifest_without_registers_is_refused() -> None:
         client.Client(lambda offset: 0, lambda offset, value: None, described)
 
 
-def test_a_map_of_the_disc_is_written_and_read_back() -> None:
-    texts = {"ppr": "2", "clock": "1MHz", "tick": "20clk", "max-time": "60clk", "index": "yes", "disc-table": "edges"}
+@pytest.mark.parametrize(("form", "range_"), [("edges", "-6.4 to 6.35"), ("sectors", "-3.2 to 3.15")])
+def test_a_map_of_the_disc_is_written_and_read_back(form: str, range_: str) -> None:
+    texts = {"ppr": "2", "clock": "1MHz", "tick": "20clk", "max-time": "60clk", "index": "yes", "disc-table": form}
     spec = of_texts("mt", texts)
     trace = PinTrace.of(VirtualEncoder(2, index=True).record(parse_motion("stop:9ms")).recording, spec).completed(spec)
     board, described = GoldenBoard(RegisterMap(spec), trace, 9), manifest(spec, "spindle")
@@ -140,8 +141,8 @@ def test_a_map_of_the_disc_is_written_and_read_back() -> None:
     assert bench.write_disc(displacement)
     bench.hold(True)
     assert not bench.write_disc(displacement)
-    few, far = displacement[:7], [7.0] * 8
-    for wrong, message in ((few, "must have 8 edges, not 7"), (far, "from -6.4 to 6.35 counts")):
+    few, far = displacement[:7], [7.0, -7.0] * 4
+    for wrong, message in ((few, "must have 8 edges, not 7"), (far, f"from {range_} counts")):
         with pytest.raises(ValueError, match=message):
             bench.write_disc(wrong)
     spec, trace, described = case("s", 4)

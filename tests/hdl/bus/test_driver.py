@@ -414,11 +414,12 @@ def test_what_is_written_in_c_is_what_the_client_in_python_writes(tmp_path: Path
             client.write(name, value)
 
 
-def test_a_map_of_the_disc_is_written_and_read_back(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("form", "entries", "bits"), [("edges", 100, 8), ("sectors:100", 36, 16)])
+def test_a_map_of_the_disc_is_written_and_read_back(form: str, entries: int, bits: int, tmp_path: Path) -> None:
     """The table is in memory here; one entry is read back wrong."""
-    texts = {"ppr": "25", "clock": "1MHz", "tick": "20clk", "max-time": "60clk", "index": "yes", "disc-table": "edges"}
+    texts = {"ppr": "25", "clock": "1MHz", "tick": "20clk", "max-time": "60clk", "index": "yes", "disc-table": form}
     registers = RegisterMap(of_texts("mt", texts))
-    entries = [(7 * edge) % 41 - 20 for edge in range(100)]
+    table = [((7 * edge) % 41 - 20) * (bits // 8) ** 8 for edge in range(entries)]
     places = {one.name: one.offset for one in registers}
     (first,) = (one.offset for one in registers if one.captures)
     address, data, shown = (places[f"DISC_{name}"] for name in ("ADDRESS", "DATA", "ENTRY"))
@@ -426,18 +427,18 @@ def test_a_map_of_the_disc_is_written_and_read_back(tmp_path: Path) -> None:
 #include <stdio.h>
 #include "spindle_driver.h"
 static uint32_t edge, taken;
-static uint8_t table[100];
+static uint{bits}_t table[{entries}];
 static uint32_t reads(void *wrong, uint32_t offset) {{
-  if (offset == {first}) taken = (uint32_t)(int8_t)(table[edge] ^ (wrong && edge == 73));
+  if (offset == {first}) taken = (uint32_t)(int{bits}_t)(table[edge] ^ (wrong && edge == 13));
   return offset == {shown} ? taken : 0;
 }}
 static void writes(void *wrong, uint32_t offset, uint32_t value) {{
   (void)wrong;
   if (offset == {address}) edge = value;
-  if (offset == {data} && value >> 8 == 1) table[edge] = (uint8_t)value;
+  if (offset == {data} && value >> {bits} == 1) table[edge] = (uint{bits}_t)value;
 }}
 int main(void) {{
-  static const int8_t entries[] = {{{", ".join(map(str, entries))}}};
+  static const int{bits}_t entries[] = {{{", ".join(map(str, table))}}};
   const struct spindle_bus right = {{reads, writes, 0}}, wrong = {{reads, writes, &edge}};
   printf("%d %d\\n", spindle_write_disc(&right, entries), spindle_write_disc(&wrong, entries));
   return 0;
