@@ -9,7 +9,7 @@ from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.extras.sectors import SectorTable
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import Box, only_if
+from tachometry.hdl.wires.ports import Box, drive, only_if
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.disc import SLIPS_BITS, DiscMap
 from tachometry.spec.formats.displacement import DISPLACED, ENTRY_BITS, MAPPED, Displacement
@@ -120,10 +120,9 @@ class Gates(Box):
             return self._read(m, Mux(back, place, moved), writes, self._table)
         assert self._place is not None
         m.submodules.table = table = SectorTable(self._table, self._place, self._form.entry_bits, self._writable)
-        m.d.comb += [table.place.eq(place), table.back.eq(back), table.ends.eq(ends), table.counted.eq(step[0])]
-        m.d.comb += table.seen.eq(seen)
+        drive(m, table, {"place": place, "back": back, "ends": ends, "counted": step[0], "seen": seen})
         if self._writable:
-            m.d.comb += [table.write.eq(writes), table.address.eq(self.disc_address), table.data.eq(self.disc_data)]
+            drive(m, table, {"write": writes, "address": self.disc_address, "data": self.disc_data})
             m.d.comb += self.disc_entry.eq(table.shown)
         return table.entry
 
