@@ -29,12 +29,10 @@ class CarriedReciprocal(Box):
     def __init__(self, reciprocal: carried_reciprocal.CarriedReciprocal) -> None:
         self._reciprocal = reciprocal
         super().__init__(
-            {
-                "m": In(range(reciprocal.max_m + 1)),
-                "moves": In(1),  # the last clock with this m, which is answered
-                "q": Out(reciprocal.quotient_width),
-                "r": Out(reciprocal.remainder_width),
-            }
+            m=In(range(reciprocal.max_m + 1)),
+            moves=In(1),  # the last clock with this m, which is answered
+            q=Out(reciprocal.quotient_width),
+            r=Out(reciprocal.remainder_width),
         )
 
     def build(self, m: Module) -> None:

@@ -36,18 +36,16 @@ class Divider(Box):
         self._nearest = nearest
         self._zeros = zeros
         super().__init__(
-            {
-                "start": In(1),
-                "dividend": In(signed(divisor_width + integer_bits + 1)),  # its sum with `addend` is divided
-                "addend": In(signed(divisor_width + integer_bits + 1)),
-                "divisor": In(divisor_width),  # positive; valid with `start`, as both parts of the dividend
-                "running": Out(1),  # a digit is found in this clock
-                "digit": Out(1),  # of the quotient in two's complement, the sign first and inverted
-                "last": Out(1),  # if `running`, no digit follows this one
-                "done": Out(1),  # one clock: the quotient is new
-                **only_if(not nearest, quotient=Out(signed(self._steps + 1))),  # held until the next start
-                "by": Out(divisor_width),  # the divisor, held until the next start
-            }
+            start=In(1),
+            dividend=In(signed(divisor_width + integer_bits + 1)),  # its sum with `addend` is divided
+            addend=In(signed(divisor_width + integer_bits + 1)),
+            divisor=In(divisor_width),  # positive; valid with `start`, as both parts of the dividend
+            running=Out(1),  # a digit is found in this clock
+            digit=Out(1),  # of the quotient in two's complement, the sign first and inverted
+            last=Out(1),  # if `running`, no digit follows this one
+            done=Out(1),  # one clock: the quotient is new
+            **only_if(not nearest, quotient=Out(signed(self._steps + 1))),  # held until the next start
+            by=Out(divisor_width),  # the divisor, held until the next start
         )
         # Counts down to −1.
         self._left = Signal(signed((self._steps - 1).bit_length() + 1), name="left", reset_less=True)

@@ -94,17 +94,15 @@ class Quotient(Box):
         }
         results = {name: signed(width) for name, (width, _, _) in quotients.items()} | travels.members
         super().__init__(
-            {
-                **only_if(constant is None, m=m, moves=In(1)),
-                "load": In(1),  # `base` and `numerator` are valid
-                # The clock after `load`, with `m` and `tag`; m has been valid as long as its reciprocal takes.
-                "start": In(1),
-                "base": In(signed(min(len(box.base) for box in self.scalers.values()))),
-                "numerator": In(signed(numerator_width)),
-                "tag": In(tag),
-                # Quotients by their names, `m` if it is not constant, and the fields of the tag; held until the next.
-                "results": Out(stream.Signature(data.StructLayout(results), always_ready=True)),
-            }
+            **only_if(constant is None, m=m, moves=In(1)),
+            load=In(1),  # `base` and `numerator` are valid
+            # The clock after `load`, with `m` and `tag`; m has been valid as long as its reciprocal takes.
+            start=In(1),
+            base=In(signed(min(len(box.base) for box in self.scalers.values()))),
+            numerator=In(signed(numerator_width)),
+            tag=In(tag),
+            # Quotients by their names, `m` if it is not constant, and the fields of the tag; held until the next.
+            results=Out(stream.Signature(data.StructLayout(results), always_ready=True)),
         )
 
     def build(self, m: Module) -> None:

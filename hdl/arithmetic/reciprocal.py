@@ -18,11 +18,9 @@ class LookedUpReciprocal(Box):
     def __init__(self, reciprocal: spec.Reciprocal) -> None:
         self._reciprocal = reciprocal
         super().__init__(
-            {
-                "m": In(range(reciprocal.max_m + 1)),  # 1 … max_m
-                "moves": In(1),  # not used: see `DividedReciprocal`
-                "q": Out(reciprocal.width),
-            }
+            m=In(range(reciprocal.max_m + 1)),  # 1 … max_m
+            moves=In(1),  # not used: see `DividedReciprocal`
+            q=Out(reciprocal.width),
         )
 
     def build(self, m: Module) -> None:
@@ -43,11 +41,9 @@ class DividedReciprocal(Box):
     def __init__(self, reciprocal: spec.DividedReciprocal) -> None:
         self._reciprocal = reciprocal
         super().__init__(
-            {
-                "m": In(range(reciprocal.max_m + 1)),  # 1 … max_m
-                "moves": In(1),  # the last clock with this m
-                "q": Out(reciprocal.width),
-            }
+            m=In(range(reciprocal.max_m + 1)),  # 1 … max_m
+            moves=In(1),  # the last clock with this m
+            q=Out(reciprocal.width),
         )
 
     def build(self, m: Module) -> None:

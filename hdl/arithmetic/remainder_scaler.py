@@ -51,16 +51,14 @@ class RemainderScaler(Box):
         self._steps = numerator_width
         self._digits = reciprocal.digits
         super().__init__(
-            {
-                "load": In(1),  # with `base` and `numerator`
-                "start": In(1),  # the clock after `load`, with `tag`
-                "base": In(signed(base_width)),
-                "numerator": In(signed(numerator_width)),
-                "tag": In(tag),
-                "q": In(reciprocal.quotient_width),  # quotient and remainder, valid in the clock after `start`
-                "r": In(reciprocal.remainder_width),
-                "results": Out(scaled_stream(base_width + reciprocal.frac_bits, tag)),  # held until the next
-            }
+            load=In(1),  # with `base` and `numerator`
+            start=In(1),  # the clock after `load`, with `tag`
+            base=In(signed(base_width)),
+            numerator=In(signed(numerator_width)),
+            tag=In(tag),
+            q=In(reciprocal.quotient_width),  # quotient and remainder, valid in the clock after `start`
+            r=In(reciprocal.remainder_width),
+            results=Out(scaled_stream(base_width + reciprocal.frac_bits, tag)),  # held until the next
         )
 
     def build(self, m: Module) -> None:

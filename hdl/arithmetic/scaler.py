@@ -32,15 +32,13 @@ class _Scaler(Box):
         self._frac_bits = reciprocal.frac_bits
         self._scale_bits = reciprocal.scale_bits
         super().__init__(
-            {
-                "load": In(1),  # with `base` and `numerator`
-                "start": In(1),  # the clock after `load`, with `q` and `tag`
-                "base": In(signed(base_width)),
-                "numerator": In(signed(numerator_width)),
-                "tag": In(tag),
-                "q": In(reciprocal.width),
-                "results": Out(scaled_stream(base_width + reciprocal.frac_bits, tag)),  # held until the next
-            }
+            load=In(1),  # with `base` and `numerator`
+            start=In(1),  # the clock after `load`, with `q` and `tag`
+            base=In(signed(base_width)),
+            numerator=In(signed(numerator_width)),
+            tag=In(tag),
+            q=In(reciprocal.width),
+            results=Out(scaled_stream(base_width + reciprocal.frac_bits, tag)),  # held until the next
         )
 
 

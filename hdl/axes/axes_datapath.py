@@ -67,23 +67,21 @@ class AxesDatapath(Box):
         output = axis.velocity.output
         self.velocity_output = None if output is None else PipelinedVelocityOutput(output, update_layout(axis))
         super().__init__(
-            {
-                "complete": In(1),  # `count` is handed over; the turns begin with the clock after that of axis 0
-                "slot": In(range(spec.slots)),  # that the count belongs to
-                "count": In(signed(axis.tick.longest.bit_length() + 1)),
-                **only_if(axis.front_end.index_resets, handed_position=In(signed(axis.position_width))),  # else a sum
-                "tick": Out(1),  # one clock for every axis in every tick
-                "axis": Out(len(self.turns.axis)),  # valid with `tick`, as are the next four
-                "pulse_count": Out(signed(axis.widths.count)),
-                "position": Out(signed(axis.position_width)),
-                "overflow": Out(1),
-                "standstill": Out(1),
-                "velocity_valid": Out(1),  # only together with `tick`: all below are new
-                "velocity": Out(signed(axis.velocity.width)),
-                "interval": Out(axis.widths.interval),
-                "forced": Out(1),
-                **only_if(output is not None, velocity_overflow=Out(1)),
-            }
+            complete=In(1),  # `count` is handed over; the turns begin with the clock after that of axis 0
+            slot=In(range(spec.slots)),  # that the count belongs to
+            count=In(signed(axis.tick.longest.bit_length() + 1)),
+            **only_if(axis.front_end.index_resets, handed_position=In(signed(axis.position_width))),  # else a sum
+            tick=Out(1),  # one clock for every axis in every tick
+            axis=Out(len(self.turns.axis)),  # valid with `tick`, as are the next four
+            pulse_count=Out(signed(axis.widths.count)),
+            position=Out(signed(axis.position_width)),
+            overflow=Out(1),
+            standstill=Out(1),
+            velocity_valid=Out(1),  # only together with `tick`: all below are new
+            velocity=Out(signed(axis.velocity.width)),
+            interval=Out(axis.widths.interval),
+            forced=Out(1),
+            **only_if(output is not None, velocity_overflow=Out(1)),
         )
 
     @property

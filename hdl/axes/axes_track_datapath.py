@@ -53,19 +53,17 @@ class AxesTrackDatapath(Box):
             layout = shown_layout(layout, axis.velocity.output)
         self._update = layout
         super().__init__(
-            {
-                "complete": In(1),  # `count` is handed over; the turns begin with the clock after that of axis 0
-                "slot": In(range(spec.slots)),  # that the count belongs to
-                "count": In(counts_layout(axis.form)),
-                # With `count`, where the index resets it; else the position is the sum of the counts.
-                **only_if(axis.front_end.index_resets, handed_position=In(signed(axis.position_width))),
-                "tick": Out(1),  # one clock for every axis in every tick
-                "velocity_valid": Out(1),
-                "axis": Out(range(max(spec.axes, 2))),  # valid with `tick`, as are all others
-                **{name: Out(shape) for name, shape in tick_layout(axis).members.items()},
-                **{name: Out(shape) for name, shape in layout.members.items()},
-                **only_if(axis.extras, native_velocity=Out(signed(axis.velocity.native))),
-            }
+            complete=In(1),  # `count` is handed over; the turns begin with the clock after that of axis 0
+            slot=In(range(spec.slots)),  # that the count belongs to
+            count=In(counts_layout(axis.form)),
+            # With `count`, where the index resets it; else the position is the sum of the counts.
+            **only_if(axis.front_end.index_resets, handed_position=In(signed(axis.position_width))),
+            tick=Out(1),  # one clock for every axis in every tick
+            velocity_valid=Out(1),
+            axis=Out(range(max(spec.axes, 2))),  # valid with `tick`, as are all others
+            **{name: Out(shape) for name, shape in tick_layout(axis).members.items()},
+            **{name: Out(shape) for name, shape in layout.members.items()},
+            **only_if(axis.extras, native_velocity=Out(signed(axis.velocity.native))),
         )
 
     @property

@@ -35,17 +35,15 @@ class AxisCounters(Box):
         self._slots = slots
         self._decoding = decoding
         super().__init__(
-            {
-                "slot": In(range(slots)),
-                **dict.fromkeys(("first", "last"), In(1)),  # of this round, see `Rounds`
-                "ready": In(1),  # the levels of this round and of the one before are those of the lines
-                **dict.fromkeys(("level_a", "level_b"), In(1)),  # of the axis whose slot it is
-                "axis": Out(range(slots)),  # that the other outputs belong to
-                "step": Out(signed(2)),
-                "decode_error": Out(1),  # both lines changed
-                "complete": Out(1),  # the tick of this axis is over
-                "count": Out(count),  # sum of its steps in this tick
-            }
+            slot=In(range(slots)),
+            **dict.fromkeys(("first", "last"), In(1)),  # of this round, see `Rounds`
+            ready=In(1),  # the levels of this round and of the one before are those of the lines
+            **dict.fromkeys(("level_a", "level_b"), In(1)),  # of the axis whose slot it is
+            axis=Out(range(slots)),  # that the other outputs belong to
+            step=Out(signed(2)),
+            decode_error=Out(1),  # both lines changed
+            complete=Out(1),  # the tick of this axis is over
+            count=Out(count),  # sum of its steps in this tick
         )
 
     def build(self, m: Module) -> None:

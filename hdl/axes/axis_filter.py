@@ -22,15 +22,13 @@ class AxisFilter(Box):
         self._looks = looks
         self._lines = tuple(lines)
         super().__init__(
-            {
-                "slot": In(range(slots)),
-                **dict.fromkeys(("first", "last", "ready", "real"), In(1)),  # of this round, see `Rounds`
-                **{f"level_{name}": In(1) for name in lines},  # of the axis whose slot it is
-                "seen_slot": Out(range(slots)),  # of the axis that the other outputs belong to
-                **dict.fromkeys(("seen_first", "seen_last", "seen_ready"), Out(1)),
-                # `known`: the level before the present one is one of the line as well.
-                **{f"{what}_{name}": Out(1) for name in lines for what in ("filtered", "known")},
-            }
+            slot=In(range(slots)),
+            **dict.fromkeys(("first", "last", "ready", "real"), In(1)),  # of this round, see `Rounds`
+            **{f"level_{name}": In(1) for name in lines},  # of the axis whose slot it is
+            seen_slot=Out(range(slots)),  # of the axis that the other outputs belong to
+            **dict.fromkeys(("seen_first", "seen_last", "seen_ready"), Out(1)),
+            # `known`: the level before the present one is one of the line as well.
+            **{f"{what}_{name}": Out(1) for name in lines for what in ("filtered", "known")},
         )
 
     def build(self, m: Module) -> None:

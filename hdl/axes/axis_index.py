@@ -21,17 +21,15 @@ class AxisIndex(Box):
         self._slots = slots
         self._resets = resets
         super().__init__(
-            {
-                "slot": In(range(slots)),
-                "ready": In(1),  # of this round, see `Rounds`
-                "level_z": In(1),  # of the axis whose slot it is
-                "known": In(1),  # the levels of this round and of the one before are those of the line
-                "step": In(signed(2)),  # of the slot three clocks ago
-                "axis": Out(range(slots)),  # that the other outputs belong to
-                "index_valid": Out(1),  # one clock per rise
-                "index_position": Out(signed(width)),  # sum of the steps of this axis
-                "position": Out(signed(width)),  # the same, but 0 with a rise that resets
-            }
+            slot=In(range(slots)),
+            ready=In(1),  # of this round, see `Rounds`
+            level_z=In(1),  # of the axis whose slot it is
+            known=In(1),  # the levels of this round and of the one before are those of the line
+            step=In(signed(2)),  # of the slot three clocks ago
+            axis=Out(range(slots)),  # that the other outputs belong to
+            index_valid=Out(1),  # one clock per rise
+            index_position=Out(signed(width)),  # sum of the steps of this axis
+            position=Out(signed(width)),  # the same, but 0 with a rise that resets
         )
 
     def build(self, m: Module) -> None:

@@ -31,15 +31,13 @@ class AxisWindow(Box):
             }
         )
         super().__init__(
-            {
-                "clears": In(1),  # the next state is that of a reset
-                "state": In(state),
-                "m_e": In(count),  # of this tick; 0 with `clears`
-                "next": Out(state),
-                "numerator": Out(signed(numerator_width)),
-                "update": Out(1),  # the window closes
-                "forced": Out(1),  # it closes without an alteration
-            }
+            clears=In(1),  # the next state is that of a reset
+            state=In(state),
+            m_e=In(count),  # of this tick; 0 with `clears`
+            next=Out(state),
+            numerator=Out(signed(numerator_width)),
+            update=Out(1),  # the window closes
+            forced=Out(1),  # it closes without an alteration
         )
 
     def build(self, m: Module) -> None:

@@ -18,13 +18,11 @@ class HeldOutputs(Box):
         self._axes = axes
         self._names: Sequence[str] = tuple(values)
         super().__init__(
-            {
-                "strobe": In(1),
-                "axis": In(axis_width),  # that the values belong to
-                **{name: In(shape) for name, shape in values.items()},
-                # The latest value of each axis, at first 0.
-                **{f"{name}_{axis}": Out(shape) for axis in range(axes) for name, shape in values.items()},
-            }
+            strobe=In(1),
+            axis=In(axis_width),  # that the values belong to
+            **{name: In(shape) for name, shape in values.items()},
+            # The latest value of each axis, at first 0.
+            **{f"{name}_{axis}": Out(shape) for axis in range(axes) for name, shape in values.items()},
         )
 
     def build(self, m: Module) -> None:

@@ -21,17 +21,15 @@ class Rounds(Box):
         # A round is a clock of this box.
         self.sampling_clock = SamplingClock(rounds) if external is None else ExternalTick(*external, synchronous=True)
         super().__init__(
-            {
-                "slot": Out(range(slots)),
-                "first": Out(1, init=1),  # in the first round of a tick
-                "last": Out(1),  # in its last round
-                "ready": Out(1),  # the warm-up is over
-                "real": Out(1),  # the level is one of the line, though that of the round before need not be
-                # Synchronous; if it has been high in a round, and not in the one before, a tick ends with the next.
-                **only_if(external, tick_in=In(1)),
-                # See `ExternalTick`; in the first clock of the second round after.
-                **only_if(external, tick_error=Out(1)),
-            }
+            slot=Out(range(slots)),
+            first=Out(1, init=1),  # in the first round of a tick
+            last=Out(1),  # in its last round
+            ready=Out(1),  # the warm-up is over
+            real=Out(1),  # the level is one of the line, though that of the round before need not be
+            # Synchronous; if it has been high in a round, and not in the one before, a tick ends with the next.
+            **only_if(external, tick_in=In(1)),
+            # See `ExternalTick`; in the first clock of the second round after.
+            **only_if(external, tick_error=Out(1)),
         )
 
     def build(self, m: Module) -> None:

@@ -51,18 +51,16 @@ class TrackTurns(Box):
         self._own = range(machine, spec.axes, spec.plan.machines)
         self.machine = TrackMachine(*(axis.at(number, spec.delay(number)).program for number in self._own))
         super().__init__(
-            {
-                # As in `AxesTrackDatapath`.
-                "complete": In(1),
-                "slot": In(range(spec.slots)),
-                "count": In(counts_layout(axis.form)),
-                **only_if(axis.front_end.index_resets, handed_position=In(signed(axis.position_width))),
-                "length": In(range(axis.form.longest_tick + 1)),  # rounds of the tick
-                "comes": Out(1),  # `SHOWN_AFTER` clocks before the results are shown
-                "axis": Out(range(max(spec.axes, 2))),  # that has its turn
-                # Results hold from the clock before they are shown to the end of the turn, all else from `comes` on.
-                "turn": Out(turn_layout(axis)),
-            }
+            # As in `AxesTrackDatapath`.
+            complete=In(1),
+            slot=In(range(spec.slots)),
+            count=In(counts_layout(axis.form)),
+            **only_if(axis.front_end.index_resets, handed_position=In(signed(axis.position_width))),
+            length=In(range(axis.form.longest_tick + 1)),  # rounds of the tick
+            comes=Out(1),  # `SHOWN_AFTER` clocks before the results are shown
+            axis=Out(range(max(spec.axes, 2))),  # that has its turn
+            # Results hold from the clock before they are shown to the end of the turn, all else from `comes` on.
+            turn=Out(turn_layout(axis)),
         )
 
     def build(self, m: Module) -> None:

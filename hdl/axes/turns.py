@@ -15,12 +15,10 @@ class Turns(Box):
     def __init__(self, axes: int, cycles: int) -> None:
         self._axes = axes
         super().__init__(
-            {
-                "begin": In(1),  # the first turn begins in the next clock; not before the last one has ended
-                "axis": Out(range(max(axes, 2))),  # that has its turn
-                "clears": Out(1, init=1),  # it is a turn after reset
-                "step": Out(cycles, init=1),  # bit n in the n-th clock of a turn
-            }
+            begin=In(1),  # the first turn begins in the next clock; not before the last one has ended
+            axis=Out(range(max(axes, 2))),  # that has its turn
+            clears=Out(1, init=1),  # it is a turn after reset
+            step=Out(cycles, init=1),  # bit n in the n-th clock of a turn
         )
 
     def build(self, m: Module) -> None:

@@ -11,11 +11,9 @@ class SaturatingCounter(Box):
 
     def __init__(self, width: int) -> None:
         super().__init__(
-            {
-                "event": In(1),
-                "clear": In(1),  # the count is 0 in the next clock, an event in this one included
-                "count": Out(width),  # events up to the clock before
-            }
+            event=In(1),
+            clear=In(1),  # the count is 0 in the next clock, an event in this one included
+            count=Out(width),  # events up to the clock before
         )
 
     def build(self, m: Module) -> None:

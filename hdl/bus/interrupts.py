@@ -23,13 +23,11 @@ class Interrupts(Box):
     def __init__(self, registers: RegisterMap, axes: int = 1) -> None:
         self._events = [*registers.interrupts]
         super().__init__(
-            {
-                **{event: In(1) for event in self._events if event != "stall"},
-                **{f"irq_{kind}_{event}": flow for kind, flow in _KINDS.items() for event in self._events},
-                "ticks": In(axes),
-                "standstill": In(axes),  # the shaft of the axis stands still
-                "irq": Out(1),  # an enabled event waits, a clock later
-            }
+            **{event: In(1) for event in self._events if event != "stall"},
+            **{f"irq_{kind}_{event}": flow for kind, flow in _KINDS.items() for event in self._events},
+            ticks=In(axes),
+            standstill=In(axes),  # the shaft of the axis stands still
+            irq=Out(1),  # an enabled event waits, a clock later
         )
 
     def build(self, m: Module) -> None:

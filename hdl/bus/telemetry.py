@@ -43,13 +43,11 @@ class TelemetrySender(Box):
         self._first, self._words = captured[0], len(captured)
         self._bit_cycles = bit_cycles
         super().__init__(
-            {
-                "native": Out(native_port(registers.address_width - 2)),
-                "send": In(1),  # a frame is wanted; it is left out if the one before has not begun
-                "wait": In(1),  # none may begin
-                "busy": Out(1),  # one is under way
-                "line": Out(1, init=1),  # high when idle
-            }
+            native=Out(native_port(registers.address_width - 2)),
+            send=In(1),  # a frame is wanted; it is left out if the one before has not begun
+            wait=In(1),  # none may begin
+            busy=Out(1),  # one is under way
+            line=Out(1, init=1),  # high when idle
         )
 
     def build(self, m: Module) -> None:

@@ -48,19 +48,17 @@ class CommandGenerator(Box):
         self._form = form
         self._multiplier = multiplier
         super().__init__(
-            {
-                "tick": In(1),
-                "enable": In(1),  # where it is low the position is commanded, at rest
-                "position": In(signed(form.position_width)),
-                "mode": In(MODE_WIDTH),
-                "velocity": In(signed(WORD)),
-                "acceleration": In(WORD),
-                "amplitude": In(signed(AMPLITUDE_WIDTH)),
-                "rate": In(WORD),
-                "command_position": Out(signed(form.position_width + POSITION_FRAC_BITS)),
-                "command_velocity": Out(signed(form.command_width)),
-                "command_acceleration": Out(signed(form.acceleration_width)),
-            }
+            tick=In(1),
+            enable=In(1),  # where it is low the position is commanded, at rest
+            position=In(signed(form.position_width)),
+            mode=In(MODE_WIDTH),
+            velocity=In(signed(WORD)),
+            acceleration=In(WORD),
+            amplitude=In(signed(AMPLITUDE_WIDTH)),
+            rate=In(WORD),
+            command_position=Out(signed(form.position_width + POSITION_FRAC_BITS)),
+            command_velocity=Out(signed(form.command_width)),
+            command_acceleration=Out(signed(form.acceleration_width)),
         )
 
     def build(self, m: Module) -> None:

@@ -16,10 +16,8 @@ class ControlClock(Box):
     def __init__(self, first: int, period: int, *, tells: bool = False) -> None:
         self._first, self._period = first, period
         super().__init__(
-            {
-                "tick": Out(1),
-                **only_if(tells, coming=Out(1)),  # in the clock before
-            }
+            tick=Out(1),
+            **only_if(tells, coming=Out(1)),  # in the clock before
         )
 
     @property

@@ -73,25 +73,23 @@ class Controller(Box):
             gains = dict.fromkeys(GAIN_PORTS.values(), In(form.gain_bits))
             gains["current_limit"] = In(form.current_limit.bit_length())
         super().__init__(
-            {
-                "tick": In(1),
-                "due": In(1),  # there is an update: y and w are to be changed
-                "held": In(signed(form.velocity_width)),
-                "position": In(signed(form.position_width)),
-                "enable": In(1),
-                "command_position": In(signed(form.position_width + form.position_bits)),
-                "command_velocity": In(signed(form.command_width)),
-                "command_acceleration": In(signed(form.acceleration_width)),
-                "n": In(range(form.longest + 1)),
-                "current_sum": In(signed(signed_width(form.most_sum))),  # ΣI
-                "clear": Out(1),  # one clock: the update has been used
-                "valid": Out(1),  # one clock: `current` is that of this control tick
-                "current": Out(current),
-                "saturated": Out(1),
-                "y": Out(signed(signed_width(form.most_y))),  # in step with `valid`
-                "w": Out(signed(signed_width(form.most_w))),
-                **gains,
-            }
+            tick=In(1),
+            due=In(1),  # there is an update: y and w are to be changed
+            held=In(signed(form.velocity_width)),
+            position=In(signed(form.position_width)),
+            enable=In(1),
+            command_position=In(signed(form.position_width + form.position_bits)),
+            command_velocity=In(signed(form.command_width)),
+            command_acceleration=In(signed(form.acceleration_width)),
+            n=In(range(form.longest + 1)),
+            current_sum=In(signed(signed_width(form.most_sum))),  # ΣI
+            clear=Out(1),  # one clock: the update has been used
+            valid=Out(1),  # one clock: `current` is that of this control tick
+            current=Out(current),
+            saturated=Out(1),
+            y=Out(signed(signed_width(form.most_y))),  # in step with `valid`
+            w=Out(signed(signed_width(form.most_w))),
+            **gains,
         )
 
     @property

@@ -16,12 +16,10 @@ class HeldInputs(Box):
         shapes = {name: member.shape for name, member in members(ports).items()}
         self._names = tuple(shapes)
         super().__init__(
-            {
-                "coming": In(1),  # a control tick is in the next clock
-                "freeze": In(1),
-                **{f"given_{name}": In(shape) for name, shape in shapes.items()},
-                **{name: Out(shape) for name, shape in shapes.items()},
-            }
+            coming=In(1),  # a control tick is in the next clock
+            freeze=In(1),
+            **{f"given_{name}": In(shape) for name, shape in shapes.items()},
+            **{name: Out(shape) for name, shape in shapes.items()},
         )
 
     def build(self, m: Module) -> None:

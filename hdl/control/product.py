@@ -14,13 +14,11 @@ class _Product(Box):
 
     def __init__(self, word_width: int, factor_bits: int) -> None:
         super().__init__(
-            {
-                "start": In(1),
-                "word": In(signed(word_width)),  # from `start` on, until `done`
-                "factor": In(factor_bits),  # with `start`
-                "done": Out(1),  # one clock: the product is valid
-                "product": Out(signed(word_width)),
-            }
+            start=In(1),
+            word=In(signed(word_width)),  # from `start` on, until `done`
+            factor=In(factor_bits),  # with `start`
+            done=Out(1),  # one clock: the product is valid
+            product=Out(signed(word_width)),
         )
 
 

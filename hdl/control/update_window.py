@@ -21,19 +21,17 @@ class UpdateWindow(Box):
         self._longest = form.longest
         limit = form.current_limit.bit_length() + 1
         super().__init__(
-            {
-                "update": In(1),
-                "measured": In(1),  # with `update`: a measurement; else the velocity is only held until one comes
-                "tick": In(1),
-                "clear": In(1),  # the window has been used, and a new one begins
-                "add": In(1),  # a control tick is over, and `current` is that of its end
-                "velocity": In(signed(form.velocity_width)),  # valid with `update`
-                "current": In(signed(limit)),
-                "held": Out(signed(form.velocity_width)),
-                "due": Out(1),  # valid with `tick`: the window is to be used
-                "n": Out(range(form.longest + 1)),
-                "current_sum": Out(signed(form.most_sum.bit_length() + 1)),  # ΣI
-            }
+            update=In(1),
+            measured=In(1),  # with `update`: a measurement; else the velocity is only held until one comes
+            tick=In(1),
+            clear=In(1),  # the window has been used, and a new one begins
+            add=In(1),  # a control tick is over, and `current` is that of its end
+            velocity=In(signed(form.velocity_width)),  # valid with `update`
+            current=In(signed(limit)),
+            held=Out(signed(form.velocity_width)),
+            due=Out(1),  # valid with `tick`: the window is to be used
+            n=Out(range(form.longest + 1)),
+            current_sum=Out(signed(form.most_sum.bit_length() + 1)),  # ΣI
         )
 
     def build(self, m: Module) -> None:

@@ -20,11 +20,9 @@ class AxesRegisterCore(Box):
         self.tachometer = AxesTachometer(registers.axes)
         self.bank = RegisterBank(registers)
         super().__init__(
-            {
-                **members(registers.core_ports),
-                "bus": In(native_port(registers.address_width - 2)),
-                "capture": In(1),  # captures in every clock in which it is high
-            }
+            **members(registers.core_ports),
+            bus=In(native_port(registers.address_width - 2)),
+            capture=In(1),  # captures in every clock in which it is high
         )
 
     def build(self, m: Module) -> None:

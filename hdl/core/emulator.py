@@ -46,23 +46,21 @@ class EncoderEmulator(Box):
         self._index_place = index_place
         self._complemented = complemented
         super().__init__(
-            {
-                "speed": In(signed(PHASE_WIDTH)),  # phase a clock that it goes to
-                "rate": In(PHASE_WIDTH),  # change of the speed in two clocks, in 2^-16; 0: at once
-                # How late B rises, A falls and B falls, in 2^-10 periods.
-                **{name: In(signed(ERROR_WIDTH)) for name in ("phase_error", "duty_a", "duty_b")},
-                "jitter": In(JITTER_WIDTH),  # bits that take part in the random movement, in 2^-10 periods
-                "bounce": In(BOUNCE_WIDTH),  # clocks for which a line bounces after an edge
-                "drop": In(DROP_WIDTH),  # edges of 256 that are left out
-                "glitches": In(NOISE_WIDTH),  # clocks of 65536 in which both A and B have the wrong level
-                "broken": In(WIRES_WIDTH),  # of A, B and Z: the line is high
-                "stuck": In(WIRES_WIDTH),  # of A, B and Z: it stays as it is
-                "jump": In(1),  # turns by half a period
-                "a": Out(1),
-                "b": Out(1),
-                **only_if(lines_per_rev is not None, z=Out(1)),  # in one quarter of a period in each revolution
-                **{f"{line}_n": Out(1) for line in complemented},
-            }
+            speed=In(signed(PHASE_WIDTH)),  # phase a clock that it goes to
+            rate=In(PHASE_WIDTH),  # change of the speed in two clocks, in 2^-16; 0: at once
+            # How late B rises, A falls and B falls, in 2^-10 periods.
+            **{name: In(signed(ERROR_WIDTH)) for name in ("phase_error", "duty_a", "duty_b")},
+            jitter=In(JITTER_WIDTH),  # bits that take part in the random movement, in 2^-10 periods
+            bounce=In(BOUNCE_WIDTH),  # clocks for which a line bounces after an edge
+            drop=In(DROP_WIDTH),  # edges of 256 that are left out
+            glitches=In(NOISE_WIDTH),  # clocks of 65536 in which both A and B have the wrong level
+            broken=In(WIRES_WIDTH),  # of A, B and Z: the line is high
+            stuck=In(WIRES_WIDTH),  # of A, B and Z: it stays as it is
+            jump=In(1),  # turns by half a period
+            a=Out(1),
+            b=Out(1),
+            **only_if(lines_per_rev is not None, z=Out(1)),  # in one quarter of a period in each revolution
+            **{f"{line}_n": Out(1) for line in complemented},
         )
 
     def build(self, m: Module) -> None:

@@ -15,16 +15,14 @@ class EmulatedLine(Box):
 
     def __init__(self, *, whole: bool = False) -> None:
         super().__init__(
-            {
-                "ideal": In(1),  # the line as it should be
-                "drop": In(1),  # an edge in this clock is left out: the line keeps its level until the next edge
-                "bounce": In(BOUNCE_WIDTH),  # clocks for which the line bounces
-                "random": In(1),  # whether a line that bounces has the wrong level
-                "noise": In(1),  # the line has the wrong level
-                "broken": In(1),
-                "line": Out(1),
-                **only_if(whole, whole=Out(1)),  # the line as it would be if it were not broken
-            }
+            ideal=In(1),  # the line as it should be
+            drop=In(1),  # an edge in this clock is left out: the line keeps its level until the next edge
+            bounce=In(BOUNCE_WIDTH),  # clocks for which the line bounces
+            random=In(1),  # whether a line that bounces has the wrong level
+            noise=In(1),  # the line has the wrong level
+            broken=In(1),
+            line=Out(1),
+            **only_if(whole, whole=Out(1)),  # the line as it would be if it were not broken
         )
 
     def build(self, m: Module) -> None:

@@ -28,11 +28,9 @@ class RegisterCore(Box):
         self.tachometer = tachometer_of(registers.spec) if self.loop is None else self.loop.tachometer
         self.bank = RegisterBank(registers)
         super().__init__(
-            {
-                **members(registers.core_ports),
-                "bus": In(native_port(registers.address_width - 2)),
-                "capture": In(1),  # captures in every clock in which it is high
-            }
+            **members(registers.core_ports),
+            bus=In(native_port(registers.address_width - 2)),
+            capture=In(1),  # captures in every clock in which it is high
         )
 
     def build(self, m: Module) -> None:

@@ -35,16 +35,14 @@ class Gates(Box):
         self._edges, self._table, self._place, self._form = edges, table, place, form
         self._writable, self._looks, indexed, entry = writable, looks, place is not None, signed(bits)
         super().__init__(
-            {
-                "step": In(signed(2)),
-                **dict.fromkeys(("disc_bypass", "disc_forget"), In(1)),
-                **only_if(indexed, index_seen=In(1), clear=In(1), disc_slip=Out(1), disc_slips=Out(SLIPS_BITS)),
-                **only_if(not indexed, disc_turn=In(1), disc_turn_by=In(range(edges))),
-                **only_if(writable, disc_write=In(1), disc_address=In(range(len(table))), disc_data=In(entry)),
-                **only_if(writable, disc_entry=Out(entry)),
-                **dict.fromkeys(("disc_used", "disc_sure", MAPPED), Out(1)),
-                **dict.fromkeys(DISPLACED, Out(signed(form.width))),
-            }
+            step=In(signed(2)),
+            **dict.fromkeys(("disc_bypass", "disc_forget"), In(1)),
+            **only_if(indexed, index_seen=In(1), clear=In(1), disc_slip=Out(1), disc_slips=Out(SLIPS_BITS)),
+            **only_if(not indexed, disc_turn=In(1), disc_turn_by=In(range(edges))),
+            **only_if(writable, disc_write=In(1), disc_address=In(range(len(table))), disc_data=In(entry)),
+            **only_if(writable, disc_entry=Out(entry)),
+            **dict.fromkeys(("disc_used", "disc_sure", MAPPED), Out(1)),
+            **dict.fromkeys(DISPLACED, Out(signed(form.width))),
         )
 
     @classmethod

@@ -98,17 +98,15 @@ class Gates(Box):
             index = {"index_valid": In(1), "index_position": In(position), "index_error": Out(position)}
             index |= {"preset_rises": In(1)} if turn.presets else {}
         super().__init__(
-            {
-                **dict.fromkeys(("level_a", "level_b", "ready", "decode_error", "clear"), In(1)),
-                **{f"equal_{line}": In(1) for line in complements},
-                "step": In(signed(2)),
-                **index,
-                **({"index_missed": In(1)} if misses else {}),
-                "seen": Out(1),
-                "health": Out(FAULT_WIDTH),
-                "faults": Out(FAULTS_WIDTH),
-                "fault": Out(1),
-            }
+            **dict.fromkeys(("level_a", "level_b", "ready", "decode_error", "clear"), In(1)),
+            **{f"equal_{line}": In(1) for line in complements},
+            step=In(signed(2)),
+            **index,
+            **({"index_missed": In(1)} if misses else {}),
+            seen=Out(1),
+            health=Out(FAULT_WIDTH),
+            faults=Out(FAULTS_WIDTH),
+            fault=Out(1),
         )
 
     @classmethod

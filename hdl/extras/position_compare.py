@@ -52,15 +52,13 @@ class Gates(Box):
         self._compare, self._clocks, self._latency, self._aims = compare, clocks, latency, aims
         position = signed(width)
         super().__init__(
-            {
-                **self._inputs(width),
-                "position_compare": Out(1),
-                "position_compare_valid": Out(1),
-                "position_compare_position": Out(position),
-                "position_compare_count": Out(COUNT_WIDTH),
-                **only_if(compare.depth, **dict(zip(LIST_PINS, (In(position), In(1), In(1)), strict=True))),
-                **only_if(compare.depth, position_compare_waiting=Out(range(compare.depth + 1))),
-            }
+            **self._inputs(width),
+            position_compare=Out(1),
+            position_compare_valid=Out(1),
+            position_compare_position=Out(position),
+            position_compare_count=Out(COUNT_WIDTH),
+            **only_if(compare.depth, **dict(zip(LIST_PINS, (In(position), In(1), In(1)), strict=True))),
+            **only_if(compare.depth, position_compare_waiting=Out(range(compare.depth + 1))),
         )
 
     def _inputs(self, width: int) -> dict[str, Any]:

@@ -49,17 +49,15 @@ class Gates(Box):
             shown |= {"fine": signed(fine.width), "age": fine.age_width}
             fine_inputs = {"velocity_valid": In(1), "position_fine": In(signed(fine.width))}
         super().__init__(
-            {
-                "level_probe": In(self._probes),
-                "ready_probe": In(self._probes),
-                "step": In(signed(2)),
-                "next_position": In(signed(position_width)),
-                "probe_edges": In(2 * self._probes, init=packed(edges)),
-                "probe_arm": In(self._probes),
-                **fine_inputs,
-                "probed": Out(self._probes),
-                **{f"probe_{name}_{k}": Out(shape) for k in range(self._probes) for name, shape in shown.items()},
-            }
+            level_probe=In(self._probes),
+            ready_probe=In(self._probes),
+            step=In(signed(2)),
+            next_position=In(signed(position_width)),
+            probe_edges=In(2 * self._probes, init=packed(edges)),
+            probe_arm=In(self._probes),
+            **fine_inputs,
+            probed=Out(self._probes),
+            **{f"probe_{name}_{k}": Out(shape) for k in range(self._probes) for name, shape in shown.items()},
         )
 
     @classmethod

@@ -24,16 +24,14 @@ class SectorTable(Box):
     def __init__(self, table: Sectors, index: int, width: int, writable: bool) -> None:
         self._table, self._index, self._width, self._writable = table, index, width, writable
         super().__init__(
-            {
-                "place": In(range(table.edges)),
-                "back": In(1),  # the direction of the latest step
-                "ends": In(1),  # that step crosses edge 0
-                "counted": In(1),
-                "seen": In(1),  # an index sets the place
-                "entry": Out(signed(width)),
-                **only_if(writable, write=In(1), address=In(range(len(table))), data=In(signed(SLOPE_BITS))),
-                **only_if(writable, shown=Out(signed(SLOPE_BITS))),
-            }
+            place=In(range(table.edges)),
+            back=In(1),  # the direction of the latest step
+            ends=In(1),  # that step crosses edge 0
+            counted=In(1),
+            seen=In(1),  # an index sets the place
+            entry=Out(signed(width)),
+            **only_if(writable, write=In(1), address=In(range(len(table))), data=In(signed(SLOPE_BITS))),
+            **only_if(writable, shown=Out(signed(SLOPE_BITS))),
         )
 
     def build(self, m: Module) -> None:

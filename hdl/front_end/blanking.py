@@ -22,11 +22,9 @@ class Blanking(Box):
         self._clocks = clocks
         self._starts = starts
         super().__init__(
-            {
-                "level": In(1),
-                "ready": In(1),  # low while the level before this one is not real: its change is none
-                "held": Out(1),
-            }
+            level=In(1),
+            ready=In(1),  # low while the level before this one is not real: its change is none
+            held=Out(1),
         )
 
     @property

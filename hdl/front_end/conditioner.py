@@ -34,17 +34,15 @@ class InputConditioner(Box):
         self._complemented = complemented
         self._blanked = blanked
         super().__init__(
-            {
-                **{name: In(1) for name in lines},  # asynchronous pins
-                **{f"level_{name}": Out(1) for name in lines},  # synchronised and filtered
-                # From the first clock on in which the level of this line before the present one is real as well.
-                **{f"ready_{name}": Out(1) for name in lines},
-                **{f"{name}_n": In(1) for name in complemented},
-                # The line and its complement are real and equal, filtered neither, two clocks after the pins.
-                **{f"equal_{name}": Out(1) for name in complemented},
-                "clear": In(1),  # `filtered_edges` is 0 in the next clock
-                "filtered_edges": Out(16),  # edges that the filter has kept out, two for each glitch; stays at 65534
-            }
+            **{name: In(1) for name in lines},  # asynchronous pins
+            **{f"level_{name}": Out(1) for name in lines},  # synchronised and filtered
+            # From the first clock on in which the level of this line before the present one is real as well.
+            **{f"ready_{name}": Out(1) for name in lines},
+            **{f"{name}_n": In(1) for name in complemented},
+            # The line and its complement are real and equal, filtered neither, two clocks after the pins.
+            **{f"equal_{name}": Out(1) for name in complemented},
+            clear=In(1),  # `filtered_edges` is 0 in the next clock
+            filtered_edges=Out(16),  # edges that the filter has kept out, two for each glitch; stays at 65534
         )
         self._filters = {name: GlitchFilter(filter_clocks) for name in lines if filter_clocks}
 

@@ -26,13 +26,11 @@ class QuadratureDecoder(Box):
         self._decoding = decoding
         self._reverse = reverse
         super().__init__(
-            {
-                "level_a": In(1),
-                "level_b": In(1),
-                "ready": In(1),  # low while the level before this one is not real: neither a step nor an error
-                "step": Out(signed(2)),  # −1, 0 or +1
-                "decode_error": Out(1),  # both lines changed
-            }
+            level_a=In(1),
+            level_b=In(1),
+            ready=In(1),  # low while the level before this one is not real: neither a step nor an error
+            step=Out(signed(2)),  # −1, 0 or +1
+            decode_error=Out(1),  # both lines changed
         )
 
     def build(self, m: Module) -> None:
@@ -71,13 +69,11 @@ class SensorDecoder(Box):
         self._wheel = wheel
         lines = {f"level_{line}": In(1) for line in encoder.kind.lines}
         super().__init__(
-            {
-                **lines,
-                "ready": In(1),  # low while the levels before these are not real: neither a step nor an error
-                "step": Out(signed(2)),  # −1, 0 or +1
-                "decode_error": Out(1),  # the lines did what they should not
-                **only_if(wheel, index=Out(1), synced=Out(1)),  # see `wheel_of`
-            }
+            **lines,
+            ready=In(1),  # low while the levels before these are not real: neither a step nor an error
+            step=Out(signed(2)),  # −1, 0 or +1
+            decode_error=Out(1),  # the lines did what they should not
+            **only_if(wheel, index=Out(1), synced=Out(1)),  # see `wheel_of`
         )
 
     def build(self, m: Module) -> None:

@@ -28,16 +28,14 @@ class EncoderMaster(Box):
 
     def __init__(self, reads: Reads) -> None:
         super().__init__(
-            {
-                **members(reads.ports),
-                "start": In(1),
-                "sample": Out(reads.width),  # valid with the strobe, as are the others
-                "sample_valid": Out(1),
-                "sample_age": Out(reads.age_width),  # clocks since the encoder took its position
-                "sample_ok": Out(1),
-                "sample_warning": Out(1),
-                "reason": Out(2),  # why not `sample_ok`: NO_ANSWER, WRONG_CHECK, ERROR_BIT
-            }
+            **members(reads.ports),
+            start=In(1),
+            sample=Out(reads.width),  # valid with the strobe, as are the others
+            sample_valid=Out(1),
+            sample_age=Out(reads.age_width),  # clocks since the encoder took its position
+            sample_ok=Out(1),
+            sample_warning=Out(1),
+            reason=Out(2),  # why not `sample_ok`: NO_ANSWER, WRONG_CHECK, ERROR_BIT
         )
 
     def _synchronise(self, m: Module, reads: Reads, frame: Frame) -> None:

@@ -32,11 +32,9 @@ class ExternalTick(Box):
         self._latency = latency
         self._synchronous = synchronous
         super().__init__(
-            {
-                "tick_in": In(1),  # asynchronous; each level must hold for a clock
-                "last": Out(1),  # high in the last clock of every window
-                "tick_error": Out(1),  # a tick came too early, or did not come
-            }
+            tick_in=In(1),  # asynchronous; each level must hold for a clock
+            last=Out(1),  # high in the last clock of every window
+            tick_error=Out(1),  # a tick came too early, or did not come
         )
 
     def build(self, m: Module) -> None:

@@ -22,13 +22,11 @@ class GlitchFilter(Box):
             raise ValueError(f"clocks must be at least 1, not {clocks}")
         self._clocks = clocks
         super().__init__(
-            {
-                "level": In(1),
-                "valid": In(1),  # the level is one of the line
-                "filtered": Out(1),
-                "known": Out(1),  # `filtered` is a level that has held long enough
-                "swallowed": Out(1),  # one clock: a level went back before it had held long enough, with two edges
-            }
+            level=In(1),
+            valid=In(1),  # the level is one of the line
+            filtered=Out(1),
+            known=Out(1),  # `filtered` is a level that has held long enough
+            swallowed=Out(1),  # one clock: a level went back before it had held long enough, with two edges
         )
 
     @property

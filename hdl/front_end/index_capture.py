@@ -21,16 +21,14 @@ class IndexCapture(Box):
         self._late, self._early = latency - 2, early
         self._once = once
         super().__init__(
-            {
-                "level_z": In(1),
-                "ready": In(1),  # the level before the present one is real
-                "position": In(signed(width)),  # the position of the next clock
-                **only_if(once, arm=In(1)),  # the next index is taken; as late as a rise
-                **only_if(once, homed=Out(1)),  # the index was taken, since `arm`
-                "rises": Out(1),  # high a clock before `index_valid`
-                "index_position": Out(signed(width)),  # held until the next index
-                "index_valid": Out(1),  # one clock per index
-            }
+            level_z=In(1),
+            ready=In(1),  # the level before the present one is real
+            position=In(signed(width)),  # the position of the next clock
+            **only_if(once, arm=In(1)),  # the next index is taken; as late as a rise
+            **only_if(once, homed=Out(1)),  # the index was taken, since `arm`
+            rises=Out(1),  # high a clock before `index_valid`
+            index_position=Out(signed(width)),  # held until the next index
+            index_valid=Out(1),  # one clock per index
         )
         self.seen = Signal(name="seen") if once else self.rises
         self.first = Signal(name="first") if early and latency > 2 else self.seen

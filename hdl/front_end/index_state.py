@@ -29,13 +29,11 @@ class IndexState(Box):
         self._state, self._after, self._latency = packed_levels(state), packed_levels(after), latency
         self._alone = len(state) == 1
         super().__init__(
-            {
-                "level": In(len(state)),  # levels of the lines, the first lowest
-                "step": In(signed(2)),
-                "level_z": In(1),
-                "ready": In(1),  # all levels, and those of the clock before, are real
-                **dict.fromkeys(("index", "index_wide", "index_missed"), Out(1)),
-            }
+            level=In(len(state)),  # levels of the lines, the first lowest
+            step=In(signed(2)),
+            level_z=In(1),
+            ready=In(1),  # all levels, and those of the clock before, are real
+            **dict.fromkeys(("index", "index_wide", "index_missed"), Out(1)),
         )
 
     def build(self, m: Module) -> None:

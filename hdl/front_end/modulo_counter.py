@@ -22,11 +22,9 @@ class ModuloCounter(Box):
         self._modulus = modulus
         self._latency = latency
         super().__init__(
-            {
-                "step": In(signed(2)),
-                "clear": In(1),  # the count is 0 in the next clock, whatever has been counted
-                "count": Out(range(math.ceil(modulus))),
-            }
+            step=In(signed(2)),
+            clear=In(1),  # the count is 0 in the next clock, whatever has been counted
+            count=Out(range(math.ceil(modulus))),
         )
 
     def build(self, m: Module) -> None:

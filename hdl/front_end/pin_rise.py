@@ -19,12 +19,10 @@ class PinRise(Box):
     def __init__(self, latency: int) -> None:
         self._latency = latency
         super().__init__(
-            {
-                "level": In(1),
-                "ready": In(1),  # the level before the present one is real
-                "asked": In(1),
-                "rises": Out(1),
-            }
+            level=In(1),
+            ready=In(1),  # the level before the present one is real
+            asked=In(1),
+            rises=Out(1),
         )
 
     def build(self, m: Module) -> None:

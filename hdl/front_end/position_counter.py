@@ -25,14 +25,12 @@ class PositionCounter(Box):
         self._loads = preset is not None
         position = Out(signed(width))
         super().__init__(
-            {
-                "step": In(signed(2)),
-                "clear": In(1),  # `position` is 0 in the next clock, whatever has been counted
-                **only_if(self._loads, load=In(1)),  # `position` is `value` and the step that comes in the next clock
-                **only_if(self._loads, value=In(signed(width), init=preset)),
-                "next": position,  # `position` of the next clock, if it is not cleared
-                "position": position,
-            }
+            step=In(signed(2)),
+            clear=In(1),  # `position` is 0 in the next clock, whatever has been counted
+            **only_if(self._loads, load=In(1)),  # `position` is `value` and the step that comes in the next clock
+            **only_if(self._loads, value=In(signed(width), init=preset)),
+            next=position,  # `position` of the next clock, if it is not cleared
+            position=position,
         )
 
     def build(self, m: Module) -> None:

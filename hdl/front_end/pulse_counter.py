@@ -33,19 +33,17 @@ class PulseCounter(Box):
         self._staged = staged
         count = signed(max_count.bit_length() + 1)
         super().__init__(
-            {
-                "step": In(signed(2)),
-                "last": In(1),  # high in the last clock of a window
-                **only_if(stretched, beyond=In(1)),  # with `last`: `overflow` is to be raised for this window anyway
-                "tick": Out(1),  # one clock, when `pulse_count` is new
-                "pulse_count": Out(count),  # m_e, held until the next tick
-                "overflow": Out(1),  # m_e was saturated; held as long as m_e
-                "coming": Out(1),  # `tick` is high in the next clock
-                "next_count": Out(count),  # what `pulse_count` is then; valid with `coming`
-                # Sum of the steps after the latest `tick`'s window, up to the clock before; if staged, up to two clocks
-                # before that.
-                **only_if(not stretched, open_sum=Out(signed(tick_cycles.bit_length() + 1))),
-            }
+            step=In(signed(2)),
+            last=In(1),  # high in the last clock of a window
+            **only_if(stretched, beyond=In(1)),  # with `last`: `overflow` is to be raised for this window anyway
+            tick=Out(1),  # one clock, when `pulse_count` is new
+            pulse_count=Out(count),  # m_e, held until the next tick
+            overflow=Out(1),  # m_e was saturated; held as long as m_e
+            coming=Out(1),  # `tick` is high in the next clock
+            next_count=Out(count),  # what `pulse_count` is then; valid with `coming`
+            # Sum of the steps after the latest `tick`'s window, up to the clock before; if staged, up to two clocks
+            # before that.
+            **only_if(not stretched, open_sum=Out(signed(tick_cycles.bit_length() + 1))),
         )
 
     def build(self, m: Module) -> None:

@@ -27,27 +27,25 @@ class SampledPosition(Box):
         count = signed(spec.widths.count)
         self._zeroed = spec.encoder.zero is not None
         super().__init__(
-            {
-                **{port.name: In(port.width) for port in sampled.ports(longest)},
-                "last": In(1),  # high in the last clock of a window
-                **only_if(self._zeroed, zero=In(signed(spec.position_width), init=spec.encoder.zero or 0)),
-                "tick": Out(1),
-                "pulse_count": Out(count),  # counts since the read before; 0 without a read, or without one before
-                "overflow": Out(1),  # it was saturated
-                "coming": Out(1),  # `tick` is high in the next clock
-                "next_count": Out(count),  # what `pulse_count` is then
-                "position": Out(signed(spec.position_width)),
-                "position_valid": Out(1),
-                "decode_error": Out(1),  # a read is not taken
-                "number": Out(1),  # of reads that were taken in the tick: the last one, or none
-                "times": Out(range(self._most_age + longest)),  # clocks from when the shaft was there to its end
-                "length": Out(range(longest + 1), init=spec.timing.tick_cycles),  # clocks of the tick
-                "phase": Out(sampled.width),  # the read
-                "silent": Out(range(spec.timing.max_ticks + 1), init=spec.timing.max_ticks),  # ticks since a read
-                "forgets": Out(1),  # tracking begins anew after the tick
-                "jump": Out(1),  # a read is not taken, as it is too far from the one before
-                "elapsed": Out(range(spec.timing.max_ticks + 1), init=spec.timing.max_ticks),  # from the read before
-            }
+            **{port.name: In(port.width) for port in sampled.ports(longest)},
+            last=In(1),  # high in the last clock of a window
+            **only_if(self._zeroed, zero=In(signed(spec.position_width), init=spec.encoder.zero or 0)),
+            tick=Out(1),
+            pulse_count=Out(count),  # counts since the read before; 0 without a read, or without one before
+            overflow=Out(1),  # it was saturated
+            coming=Out(1),  # `tick` is high in the next clock
+            next_count=Out(count),  # what `pulse_count` is then
+            position=Out(signed(spec.position_width)),
+            position_valid=Out(1),
+            decode_error=Out(1),  # a read is not taken
+            number=Out(1),  # of reads that were taken in the tick: the last one, or none
+            times=Out(range(self._most_age + longest)),  # clocks from when the shaft was there to its end
+            length=Out(range(longest + 1), init=spec.timing.tick_cycles),  # clocks of the tick
+            phase=Out(sampled.width),  # the read
+            silent=Out(range(spec.timing.max_ticks + 1), init=spec.timing.max_ticks),  # ticks since a read
+            forgets=Out(1),  # tracking begins anew after the tick
+            jump=Out(1),  # a read is not taken, as it is too far from the one before
+            elapsed=Out(range(spec.timing.max_ticks + 1), init=spec.timing.max_ticks),  # from the read before
         )
         # Of the window that has not ended.
         self.open_number = Signal()

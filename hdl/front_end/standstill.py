@@ -19,12 +19,10 @@ class Standstill(Box):
     def __init__(self, max_ticks: int, count_width: int, *, max_shift: int = 0) -> None:
         self._max_ticks = max_ticks
         super().__init__(
-            {
-                "tick": In(1),
-                "m_e": In(signed(count_width)),  # valid with `tick`
-                **only_if(max_shift, shift=In(range(max_shift + 1))),  # with `tick`: it is 2^shift nominal ones
-                "standstill": Out(1),  # from `tick` on, until the next
-            }
+            tick=In(1),
+            m_e=In(signed(count_width)),  # valid with `tick`
+            **only_if(max_shift, shift=In(range(max_shift + 1))),  # with `tick`: it is 2^shift nominal ones
+            standstill=Out(1),  # from `tick` on, until the next
         )
 
     def build(self, m: Module) -> None:

@@ -13,13 +13,11 @@ class _Wheel(Box):
     def __init__(self, wheel: ToothWheel) -> None:
         self._wheel = wheel
         super().__init__(
-            {
-                "tooth": In(1),  # high in the clock of a tooth, never in two clocks in a row
-                "filled": Out(1),  # high in the clock of a tooth of the full wheel, there or not
-                "index": Out(1),  # this tooth is the first one after the gap, the longest row or the extra tooth
-                "error": Out(1),  # this tooth is in the gap, or no extra one
-                "synced": Out(1),  # the place is known, from the clock after a tooth on
-            }
+            tooth=In(1),  # high in the clock of a tooth, never in two clocks in a row
+            filled=Out(1),  # high in the clock of a tooth of the full wheel, there or not
+            index=Out(1),  # this tooth is the first one after the gap, the longest row or the extra tooth
+            error=Out(1),  # this tooth is in the gap, or no extra one
+            synced=Out(1),  # the place is known, from the clock after a tooth on
         )
 
 

@@ -21,13 +21,11 @@ class AlterationDetector(Box):
         self._seldom = seldom
         shape = signed(count_width)
         super().__init__(
-            {
-                "coming": In(1),  # `tick` follows
-                "tick": In(1),
-                "next_count": In(shape),  # m_e(i), valid with `coming`
-                "pulse_count": In(shape),  # the last m_e whose `tick` has come; valid with `coming` and with `tick`
-                "alteration": Out(1),  # from `tick` on, until the next
-            }
+            coming=In(1),  # `tick` follows
+            tick=In(1),
+            next_count=In(shape),  # m_e(i), valid with `coming`
+            pulse_count=In(shape),  # the last m_e whose `tick` has come; valid with `coming` and with `tick`
+            alteration=Out(1),  # from `tick` on, until the next
         )
 
     def build(self, m: Module) -> None:

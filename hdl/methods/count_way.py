@@ -24,15 +24,13 @@ class CountWay(Box):
         self._low = 0 if displacement is None else displacement.low + 1
         most = 3 * half if displacement is None else 3 * half + 2 * displacement.most
         super().__init__(
-            {
-                "step_before": In(signed(2)),  # the step of the next clock
-                "decays_before": In(1),  # in the next clock, without a step, the velocity may decay
-                "negative_before": In(1),  # and is negative
-                "moves_before": Out(1),  # the step of the next clock leads to another edge
-                **({} if displacement is None else {"displaced_before": In(signed(displacement.width))}),
-                "way": Out(signed(most.bit_length() + 1)),
-                "negative": Out(1),  # the sign of the last count up to this clock
-            }
+            step_before=In(signed(2)),  # the step of the next clock
+            decays_before=In(1),  # in the next clock, without a step, the velocity may decay
+            negative_before=In(1),  # and is negative
+            moves_before=Out(1),  # the step of the next clock leads to another edge
+            **({} if displacement is None else {"displaced_before": In(signed(displacement.width))}),
+            way=Out(signed(most.bit_length() + 1)),
+            negative=Out(1),  # the sign of the last count up to this clock
         )
 
     def build(self, m: Module) -> None:

@@ -20,15 +20,13 @@ class DtShift(Box):
     def __init__(self, spec: RairanTachometer, width: int) -> None:
         self._spec = spec
         super().__init__(
-            {
-                "opens": In(1),  # a window begins
-                "anew": In(1),  # with a count that has nothing to do with the window before
-                "nominal": In(1),  # the last clock of a nominal dt
-                "n": In(width),  # Ndt1 of the window that ends, or Nep1 − 1 if `high`
-                "high": In(1),
-                "shift": Out(range(spec.times.max_tick_shift + 1)),  # k of the window
-                "last": Out(1),  # with `nominal`: dt·2^k ends; without latency
-            }
+            opens=In(1),  # a window begins
+            anew=In(1),  # with a count that has nothing to do with the window before
+            nominal=In(1),  # the last clock of a nominal dt
+            n=In(width),  # Ndt1 of the window that ends, or Nep1 − 1 if `high`
+            high=In(1),
+            shift=Out(range(spec.times.max_tick_shift + 1)),  # k of the window
+            last=Out(1),  # with `nominal`: dt·2^k ends; without latency
         )
 
     def build(self, m: Module) -> None:

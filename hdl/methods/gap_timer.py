@@ -19,17 +19,15 @@ class GapTimer(Box):
         self._max_periods = max_periods
         self._on_lattice = on_lattice
         super().__init__(
-            {
-                "coming": In(1),  # a tick ends in the next clock
-                "count_before": In(1),  # there is a count in the next clock; on the lattice only if `coming`
-                "period": Out(1),  # a timer period ends; one does with every tick
-                "count": Out(1),  # something was counted in this period
-                "age": Out(range(max_periods + 1), init=1),  # periods since the last count with this; with `period`
-                "opened": Out(1),  # there was a count in the last `max_periods`; valid with `period`
-                "overdue": Out(1),  # the last count was `max_periods` ago, and this period has none
-                "overdue_before": Out(1),  # the same a clock earlier
-                "silent_before": Out(1),  # in the next clock a tick ends in which there was no count
-            }
+            coming=In(1),  # a tick ends in the next clock
+            count_before=In(1),  # there is a count in the next clock; on the lattice only if `coming`
+            period=Out(1),  # a timer period ends; one does with every tick
+            count=Out(1),  # something was counted in this period
+            age=Out(range(max_periods + 1), init=1),  # periods since the last count with this; with `period`
+            opened=Out(1),  # there was a count in the last `max_periods`; valid with `period`
+            overdue=Out(1),  # the last count was `max_periods` ago, and this period has none
+            overdue_before=Out(1),  # the same a clock earlier
+            silent_before=Out(1),  # in the next clock a tick ends in which there was no count
         )
 
     def build(self, m: Module) -> None:

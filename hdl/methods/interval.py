@@ -34,19 +34,17 @@ class IntervalAccumulator(Box):
         self._cancel = cancel
         self._seldom = seldom
         super().__init__(
-            {
-                "tick": In(1),
-                "moves": In(1),  # m_s moves on: once for every tick, with it or as long after it as m_s is needed
-                "alteration": In(1),  # valid from `tick` on, until m_s moves
-                "pulse_count": In(signed(count_width)),  # m_e(i) from `tick` on, until the next
-                "next_count": In(signed(count_width)),  # m_e(i), valid in the clock before `tick`
-                "numerator": Out(signed(numerator_width)),  # d0 + d1, or d1; valid in the clock before `tick`
-                "m_s": Out(range(max_ticks + 1), init=1),  # ticks; like the next two, from `tick` on until it moves
-                "closes": Out(1),  # the window closes
-                "forced": Out(1),  # it closes without an alteration
-                "update": Out(1),  # the window closes in this tick
-                "standstill": Out(1),  # from `tick` on: nothing was counted in more than `max_ticks` ticks in a row
-            }
+            tick=In(1),
+            moves=In(1),  # m_s moves on: once for every tick, with it or as long after it as m_s is needed
+            alteration=In(1),  # valid from `tick` on, until m_s moves
+            pulse_count=In(signed(count_width)),  # m_e(i) from `tick` on, until the next
+            next_count=In(signed(count_width)),  # m_e(i), valid in the clock before `tick`
+            numerator=Out(signed(numerator_width)),  # d0 + d1, or d1; valid in the clock before `tick`
+            m_s=Out(range(max_ticks + 1), init=1),  # ticks; like the next two, from `tick` on until it moves
+            closes=Out(1),  # the window closes
+            forced=Out(1),  # it closes without an alteration
+            update=Out(1),  # the window closes in this tick
+            standstill=Out(1),  # from `tick` on: nothing was counted in more than `max_ticks` ticks in a row
         )
 
     def build(self, m: Module) -> None:

@@ -26,11 +26,9 @@ class MovingSum(Box):
     def __init__(self, length: int, *, count_width: int, sum_width: int) -> None:
         self._length = length
         super().__init__(
-            {
-                "tick": In(1),
-                "m_e": In(signed(count_width)),  # valid with `tick`
-                "total": Out(signed(sum_width)),  # valid with `tick`
-            }
+            tick=In(1),
+            m_e=In(signed(count_width)),  # valid with `tick`
+            total=Out(signed(sum_width)),  # valid with `tick`
         )
 
     def build(self, m: Module) -> None:

@@ -46,29 +46,27 @@ class QuotientVelocity(Box):
         )
         self.bound_dividers = {name: _bound_divider(spec) for name in (BOUNDS if spec.bounds else ())}
         super().__init__(
-            {
-                # In the next clock
-                "ends_before": In(1),  # a measurement ends with a count, only if `free_before`
-                "overdue_before": In(1),  # a 0 is forced
-                "silent_before": In(1),  # a tick was silent
-                "free_before": Out(1),  # no measurement is being divided
-                "decays_before": Out(1),
-                "negative_before": Out(1),  # the velocity is negative
-                # In this clock
-                "ends": Out(1),
-                "decays": Out(1),  # a division begins that lets the velocity decay
-                # Two distances in half counts, times the timer periods in a tick, whose sum is divided: those of a
-                # measurement, of a decay, or 0.
-                "dividend": In(signed(spec.form.distance_width + 1)),
-                "addend": In(signed(spec.form.distance_width + 1)),
-                "distance": In(signed(spec.form.distance_width)),  # with `ends`: their sum in counts, else 0
-                "divisor": In(spec.widths.interval),  # time in timer periods
-                "beyond_in": In(1),  # with `dividend`: the velocity is too high to be measured
-                **{name: In(width) for name, width in stamped(spec).items()},
-                **only_if(spec.bounds, known=In(1)),  # there are bounds
-                **only_if(spec.bounds, was_negative=In(1)),  # the last count was
-                "updates": Out(update_stream(update_layout(spec))),
-            }
+            # In the next clock
+            ends_before=In(1),  # a measurement ends with a count, only if `free_before`
+            overdue_before=In(1),  # a 0 is forced
+            silent_before=In(1),  # a tick was silent
+            free_before=Out(1),  # no measurement is being divided
+            decays_before=Out(1),
+            negative_before=Out(1),  # the velocity is negative
+            # In this clock
+            ends=Out(1),
+            decays=Out(1),  # a division begins that lets the velocity decay
+            # Two distances in half counts, times the timer periods in a tick, whose sum is divided: those of a
+            # measurement, of a decay, or 0.
+            dividend=In(signed(spec.form.distance_width + 1)),
+            addend=In(signed(spec.form.distance_width + 1)),
+            distance=In(signed(spec.form.distance_width)),  # with `ends`: their sum in counts, else 0
+            divisor=In(spec.widths.interval),  # time in timer periods
+            beyond_in=In(1),  # with `dividend`: the velocity is too high to be measured
+            **{name: In(width) for name, width in stamped(spec).items()},
+            **only_if(spec.bounds, known=In(1)),  # there are bounds
+            **only_if(spec.bounds, was_negative=In(1)),  # the last count was
+            updates=Out(update_stream(update_layout(spec))),
         )
 
     def build(self, m: Module) -> None:

@@ -28,14 +28,12 @@ class RairanMethod(Box):
 
     def __init__(self, spec: RairanTachometer) -> None:
         super().__init__(
-            {
-                "step_now": In(signed(2)),
-                "last": Out(1),  # the present clock is the last of dt, and so of a tick
-                "beyond": Out(1),  # Nep1 is saturated; valid with `last`
-                **datapath_members(spec),
-                # With `tick`: k of its window.
-                **only_if(spec.adaptive, tick_shift=Out(range(spec.times.max_tick_shift + 1))),
-            }
+            step_now=In(signed(2)),
+            last=Out(1),  # the present clock is the last of dt, and so of a tick
+            beyond=Out(1),  # Nep1 is saturated; valid with `last`
+            **datapath_members(spec),
+            # With `tick`: k of its window.
+            **only_if(spec.adaptive, tick_shift=Out(range(spec.times.max_tick_shift + 1))),
         )
         self._spec = spec
         self.counters = RairanCounters(spec)

@@ -20,23 +20,21 @@ class RairanCounters(Box):
         self._spec = spec
         ratio = spec.method_ports if spec.paper_exact else ()
         super().__init__(
-            {
-                "step": In(signed(2)),
-                "last": Out(1),  # high in the clock in which dt ends; without latency
-                "beyond": Out(1),  # there were more counts in this dt than Cep can hold; valid with `last`
-                "update": Out(1),  # a new estimate, or an old one found too large
-                # Ndt1, or Nep1 − 1 if `high`; 0 stands for the velocity 0. As all below, held until the next update.
-                "n": Out(range(max(spec.widths.max_pulse_count, spec.timing.max_ticks) + 1)),
-                "high": Out(1),  # the regime
-                "backward": Out(1),
-                "forced": Out(1),  # the last update came without a count
-                "at_rest": Out(1),  # and at the maximum time
-                # Nep1 and Ndt1 as they are before anything has come.
-                **{port.name: Out(port.width, init=int(port.name == "n_dt1")) for port in ratio},
-                **only_if(spec.adaptive, shift=Out(range(spec.times.max_tick_shift + 1))),  # n is that of dt·2^shift
-                **only_if(spec.bounds, loose=Out(1)),  # n implies no least speed
-                **only_if(spec.bounds, unsynced=Out(1)),  # its measurement did not begin in step with dt
-            }
+            step=In(signed(2)),
+            last=Out(1),  # high in the clock in which dt ends; without latency
+            beyond=Out(1),  # there were more counts in this dt than Cep can hold; valid with `last`
+            update=Out(1),  # a new estimate, or an old one found too large
+            # Ndt1, or Nep1 − 1 if `high`; 0 stands for the velocity 0. As all below, held until the next update.
+            n=Out(range(max(spec.widths.max_pulse_count, spec.timing.max_ticks) + 1)),
+            high=Out(1),  # the regime
+            backward=Out(1),
+            forced=Out(1),  # the last update came without a count
+            at_rest=Out(1),  # and at the maximum time
+            # Nep1 and Ndt1 as they are before anything has come.
+            **{port.name: Out(port.width, init=int(port.name == "n_dt1")) for port in ratio},
+            **only_if(spec.adaptive, shift=Out(range(spec.times.max_tick_shift + 1))),  # n is that of dt·2^shift
+            **only_if(spec.bounds, loose=Out(1)),  # n implies no least speed
+            **only_if(spec.bounds, unsynced=Out(1)),  # its measurement did not begin in step with dt
         )
         # Cep − 1, and whether there is any.
         self.c_more = Signal(range(max(spec.widths.max_pulse_count, 2)))

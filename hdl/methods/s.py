@@ -31,13 +31,11 @@ class SMethod(Box):
         off, ticks = spec.displacement, spec.timing.max_ticks
         self.ends = None if off is None else WindowEnds(off, ticks, spec.form.kept_ticks)
         super().__init__(
-            {
-                **datapath_members(spec),
-                "coming": In(1),  # `tick` is high in the next clock
-                "next_count": In(signed(spec.widths.count)),  # what `pulse_count` is then; valid with `coming`
-                "standstill": Out(1),  # of the tick, see `IntervalAccumulator`
-                **({} if self.ends is None else {name: self.ends.signature.members[name] for name in _OF_EDGES}),
-            }
+            **datapath_members(spec),
+            coming=In(1),  # `tick` is high in the next clock
+            next_count=In(signed(spec.widths.count)),  # what `pulse_count` is then; valid with `coming`
+            standstill=Out(1),  # of the tick, see `IntervalAccumulator`
+            **({} if self.ends is None else {name: self.ends.signature.members[name] for name in _OF_EDGES}),
         )
         self.alteration = AlterationDetector(spec.widths.count, seldom=spec.latency.serial)
         self.interval_accumulator = IntervalAccumulator(

@@ -32,22 +32,20 @@ class TickCounts(Box):
         self._form = form
         self._max_ticks = max_ticks
         super().__init__(
-            {
-                "tick": In(1),  # the last clock of a tick
-                "step": In(signed(2)),
-                **({} if (off := form.displacement) is None else self._mapped(form, signed(off.width))),
-                "number": Out(form.number_bits),  # counts that an event takes: the first ones
-                "times": Out(form.times_bits),  # sum of the clocks from each of these to the end of the tick
-                # Sum of twice the places of their edges, in counts from the place at the beginning of the tick.
-                "places": Out(signed(form.places_bits)),
-                "kind": Out(2),  # lower one of both positions around the edge of the last of these, modulo 4
-                "down": Out(1),  # it went backward
-                "last": Out(range(form.longest_tick)),  # clocks from the last count to the end of the tick
-                "moved": Out(signed(form.moved_bits)),  # forward counts less backward ones
-                "end": Out(2),  # position at the end of the tick, since reset, modulo 4
-                "elapsed": Out(range(max_ticks + 1), init=max_ticks),  # ticks since the last one with counts before it
-                "length": Out(range(form.longest_tick + 1), init=form.tick_cycles),  # clocks of the tick
-            }
+            tick=In(1),  # the last clock of a tick
+            step=In(signed(2)),
+            **({} if (off := form.displacement) is None else self._mapped(form, signed(off.width))),
+            number=Out(form.number_bits),  # counts that an event takes: the first ones
+            times=Out(form.times_bits),  # sum of the clocks from each of these to the end of the tick
+            # Sum of twice the places of their edges, in counts from the place at the beginning of the tick.
+            places=Out(signed(form.places_bits)),
+            kind=Out(2),  # lower one of both positions around the edge of the last of these, modulo 4
+            down=Out(1),  # it went backward
+            last=Out(range(form.longest_tick)),  # clocks from the last count to the end of the tick
+            moved=Out(signed(form.moved_bits)),  # forward counts less backward ones
+            end=Out(2),  # position at the end of the tick, since reset, modulo 4
+            elapsed=Out(range(max_ticks + 1), init=max_ticks),  # ticks since the last one with counts before it
+            length=Out(range(form.longest_tick + 1), init=form.tick_cycles),  # clocks of the tick
         )
         # Those of the tick that has not ended.
         self.open_number = Signal.like(self.number)

@@ -39,22 +39,20 @@ class TrackMethod(Box):
         self.machine = TrackMachine(spec.program)
         self.left = SamplingClock(spec.latency.datapath - 1, 5 if spec.settling else 0)
         super().__init__(
-            {
-                **datapath_members(spec),
-                **only_if(not self._reads, step=In(signed(2))),  # as late as `tick`
-                **only_if(
-                    self._reads,
-                    number=In(1),
-                    times=In(spec.form.times_bits),
-                    phase=In(spec.form.period_bits),
-                    forgets=In(1),
-                    silent=In(range(spec.timing.max_ticks + 1)),
-                    elapsed=In(range(spec.timing.max_ticks + 1)),
-                    length=In(range(spec.tick.longest + 1)),
-                ),  # see `SampledPosition`
-                "position": In(signed(spec.position_width)),  # valid with `tick`
-                **({} if (off := spec.displacement) is None else dict.fromkeys(DISPLACED, In(signed(off.width)))),
-            }
+            **datapath_members(spec),
+            **only_if(not self._reads, step=In(signed(2))),  # as late as `tick`
+            **only_if(
+                self._reads,
+                number=In(1),
+                times=In(spec.form.times_bits),
+                phase=In(spec.form.period_bits),
+                forgets=In(1),
+                silent=In(range(spec.timing.max_ticks + 1)),
+                elapsed=In(range(spec.timing.max_ticks + 1)),
+                length=In(range(spec.tick.longest + 1)),
+            ),  # see `SampledPosition`
+            position=In(signed(spec.position_width)),  # valid with `tick`
+            **({} if (off := spec.displacement) is None else dict.fromkeys(DISPLACED, In(signed(off.width)))),
         )
 
     @property

@@ -25,17 +25,15 @@ class WindowEnds(Box):
         self._form = form
         self._moved_on, self._is_next = max_ticks - kept_ticks, max_ticks == 2 * kept_ticks
         super().__init__(
-            {
-                **dict.fromkeys(DISPLACED, In(signed(form.width))),
-                "step_before": In(signed(2)),  # the step of the next clock
-                "coming": In(1),
-                "rises": In(1),  # with `coming`: the tick has more counts than the one before
-                "tick": In(1),
-                "closes": In(1),  # with `tick`, like the next two: it closes a window
-                "forced": In(1),
-                "m_s": In(range(max_ticks + 1)),
-                "difference": Out(signed(form.width + 2)),  # the sum of both edges
-            }
+            **dict.fromkeys(DISPLACED, In(signed(form.width))),
+            step_before=In(signed(2)),  # the step of the next clock
+            coming=In(1),
+            rises=In(1),  # with `coming`: the tick has more counts than the one before
+            tick=In(1),
+            closes=In(1),  # with `tick`, like the next two: it closes a window
+            forced=In(1),
+            m_s=In(range(max_ticks + 1)),
+            difference=Out(signed(form.width + 2)),  # the sum of both edges
         )
 
     def build(self, m: Module) -> None:

@@ -59,11 +59,9 @@ class LowPass(Box):
         self._spec = spec
         self._clears = clears
         super().__init__(
-            {
-                "tick": In(1),
-                "updates": In(update_stream(layout)),
-                "filtered": Out(update_stream(layout)),  # held until the next
-            }
+            tick=In(1),
+            updates=In(update_stream(layout)),
+            filtered=Out(update_stream(layout)),  # held until the next
         )
 
     def build(self, m: Module) -> None:

@@ -18,13 +18,11 @@ class UpdateAge(Box):
         self._max_age = max_age
         self._fresh_width = fresh_width
         super().__init__(
-            {
-                "tick": In(1),
-                "update": In(1),
-                **only_if(fresh_width, fresh=In(fresh_width)),  # with `update`: ticks from its cause to it
-                "age": Out(range(max_age + 1)),
-                "before": Out(range(max_age + 1)),  # the age of the clock before
-            }
+            tick=In(1),
+            update=In(1),
+            **only_if(fresh_width, fresh=In(fresh_width)),  # with `update`: ticks from its cause to it
+            age=Out(range(max_age + 1)),
+            before=Out(range(max_age + 1)),  # the age of the clock before
         )
 
     def build(self, m: Module) -> None:

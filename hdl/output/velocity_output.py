@@ -32,11 +32,9 @@ class _VelocityOutput(Box):
             name: output.rounding(towards) for name, towards in VELOCITIES.items() if name in layout.members
         }
         super().__init__(
-            {
-                "updates": In(update_stream(layout)),  # an update stays until the next
-                # The update in the unit of the output, with `velocity_overflow`; held until the next.
-                "shown": Out(update_stream(shown_layout(layout, output))),
-            }
+            updates=In(update_stream(layout)),  # an update stays until the next
+            # The update in the unit of the output, with `velocity_overflow`; held until the next.
+            shown=Out(update_stream(shown_layout(layout, output))),
         )
 
     def _show(self, m: Module, update: data.View, totals: dict[str, Value]) -> data.View:

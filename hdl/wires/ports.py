@@ -1,6 +1,7 @@
 """Boxes; ports of the exported core as members of a component, and ports of boxes that have the same names."""
 
 from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 from amaranth import Module, ValueLike, signed
@@ -14,7 +15,10 @@ _FLOW = {"input": In, "output": Out}
 
 
 class Box(wiring.Component):
-    """Component that fills its own module."""
+    """Component that fills its own module; its members are given by their names, or as a dictionary."""
+
+    def __init__(self, signature: Mapping[str, Any] = MappingProxyType({}), /, **members: Any) -> None:
+        super().__init__({**signature, **members}, src_loc_at=1)
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
