@@ -47,8 +47,7 @@ class BoardTop(Elaboratable):
     """
 
     def __init__(self, core: wiring.Component, board: Board) -> None:
-        self._core = core
-        self._board = board
+        self._core, self._board = core, board
 
     def elaborate(self, platform: Any) -> Module:
         m = Module()

@@ -35,9 +35,7 @@ class Snapshot(Mapping[str, int]):
         units: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         self._values = MappingProxyType(dict(values))
-        self._units = units
-        self._flags = flags
-        self._rad_per_s_per_lsb = rad_per_s_per_lsb
+        self._units, self._flags, self._rad_per_s_per_lsb = units, flags, rad_per_s_per_lsb
 
     def __getitem__(self, name: str) -> int:
         return self._values[name]

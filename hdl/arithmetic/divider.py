@@ -32,9 +32,7 @@ class Divider(Box):
     ) -> None:
         self._integer_bits = integer_bits
         self._steps = integer_bits + scale_bits
-        self._scale_bits = scale_bits
-        self._nearest = nearest
-        self._zeros = zeros
+        self._scale_bits, self._nearest, self._zeros = scale_bits, nearest, zeros
         super().__init__(
             start=In(1),
             dividend=In(signed(divisor_width + integer_bits + 1)),  # its sum with `addend` is divided

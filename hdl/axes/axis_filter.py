@@ -18,8 +18,7 @@ class AxisFilter(Box):
     """
 
     def __init__(self, *, slots: int, looks: int, lines: Sequence[str]) -> None:
-        self._slots = slots
-        self._looks = looks
+        self._slots, self._looks = slots, looks
         self._lines = tuple(lines)
         super().__init__(
             slot=In(range(slots)),

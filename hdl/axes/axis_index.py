@@ -18,8 +18,7 @@ class AxisIndex(Box):
     """
 
     def __init__(self, *, slots: int, width: int, resets: bool) -> None:
-        self._slots = slots
-        self._resets = resets
+        self._slots, self._resets = slots, resets
         super().__init__(
             slot=In(range(slots)),
             ready=In(1),  # of this round, see `Rounds`

@@ -37,8 +37,7 @@ class AxisTickCounts(AxisCounters):
     """
 
     def __init__(self, *, slots: int, form: Tracking, decoding: int, reverse: bool = False) -> None:
-        self._reverse = reverse
-        self._form = form
+        self._reverse, self._form = reverse, form
         self._take(slots, decoding, counts_layout(form), BLOCK)
 
     def _add(self, m: Module, before: Any, first: Signal, ready: Signal, step: Signal) -> None:

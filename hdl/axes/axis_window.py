@@ -16,9 +16,7 @@ class AxisWindow(Box):
     def __init__(
         self, *, max_ticks: int, kept_ticks: int, count_width: int, numerator_width: int, cancel: bool
     ) -> None:
-        self._max_ticks = max_ticks
-        self._kept_ticks = kept_ticks
-        self._cancel = cancel
+        self._max_ticks, self._kept_ticks, self._cancel = max_ticks, kept_ticks, cancel
         count = signed(count_width)
         state = data.StructLayout(
             {

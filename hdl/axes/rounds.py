@@ -16,8 +16,7 @@ class Rounds(Box):
     """
 
     def __init__(self, slots: int, rounds: int, warm_up: int, external: tuple[int, int] | None = None) -> None:
-        self._slots = slots
-        self._warm_up = warm_up
+        self._slots, self._warm_up = slots, warm_up
         # A round is a clock of this box.
         self.sampling_clock = SamplingClock(rounds) if external is None else ExternalTick(*external, synchronous=True)
         super().__init__(

@@ -45,8 +45,7 @@ class CommandGenerator(Box):
     """
 
     def __init__(self, form: GeneratorForm, multiplier: str = "serial") -> None:
-        self._form = form
-        self._multiplier = multiplier
+        self._form, self._multiplier = form, multiplier
         super().__init__(
             tick=In(1),
             enable=In(1),  # where it is low the position is commanded, at rest

@@ -65,8 +65,7 @@ class Controller(Box):
     """
 
     def __init__(self, form: ControlForm, multiplier: str = "serial") -> None:
-        self._form = form
-        self._multiplier = multiplier
+        self._form, self._multiplier = form, multiplier
         current = signed(signed_width(form.current_limit))
         gains = {}
         if form.gain_bits:

@@ -42,9 +42,7 @@ class EncoderEmulator(Box):
     def __init__(
         self, lines_per_rev: int | None = None, index_place: int = 0, complemented: tuple[str, ...] = ()
     ) -> None:
-        self._lines_per_rev = lines_per_rev
-        self._index_place = index_place
-        self._complemented = complemented
+        self._lines_per_rev, self._index_place, self._complemented = lines_per_rev, index_place, complemented
         super().__init__(
             speed=In(signed(PHASE_WIDTH)),  # phase a clock that it goes to
             rate=In(PHASE_WIDTH),  # change of the speed in two clocks, in 2^-16; 0: at once

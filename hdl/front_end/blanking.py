@@ -19,8 +19,7 @@ class Blanking(Box):
     def __init__(self, clocks: int, starts: int | None = None) -> None:
         if clocks < 2:
             raise ValueError(f"clocks must be at least 2, not {clocks}")
-        self._clocks = clocks
-        self._starts = starts
+        self._clocks, self._starts = clocks, starts
         super().__init__(
             level=In(1),
             ready=In(1),  # low while the level before this one is not real: its change is none

@@ -29,9 +29,7 @@ class InputConditioner(Box):
         complemented: tuple[str, ...] = (),
         blanked: Mapping[str, Blanking] = MappingProxyType({}),
     ) -> None:
-        self._filter_clocks = filter_clocks
-        self._lines = lines
-        self._complemented = complemented
+        self._filter_clocks, self._lines, self._complemented = filter_clocks, lines, complemented
         self._blanked = blanked
         super().__init__(
             **{name: In(1) for name in lines},  # asynchronous pins

@@ -23,8 +23,7 @@ class QuadratureDecoder(Box):
     def __init__(self, decoding: int, *, reverse: bool = False) -> None:
         if decoding not in (1, 2, 4):
             raise ValueError(f"decoding must be 1, 2 or 4, not {decoding}")
-        self._decoding = decoding
-        self._reverse = reverse
+        self._decoding, self._reverse = decoding, reverse
         super().__init__(
             level_a=In(1),
             level_b=In(1),
@@ -65,8 +64,7 @@ class SensorDecoder(Box):
     """
 
     def __init__(self, encoder: Encoder, wheel: ToothWheel | None = None) -> None:
-        self._encoder = encoder
-        self._wheel = wheel
+        self._encoder, self._wheel = encoder, wheel
         lines = {f"level_{line}": In(1) for line in encoder.kind.lines}
         super().__init__(
             **lines,

@@ -27,9 +27,7 @@ class ExternalTick(Box):
     def __init__(self, min_cycles: int, max_cycles: int, latency: int = 2, *, synchronous: bool = False) -> None:
         if not 2 <= min_cycles <= max_cycles:
             raise ValueError(f"min_cycles must be from 2 to {max_cycles}, not {min_cycles}")
-        self._min_cycles = min_cycles
-        self._max_cycles = max_cycles
-        self._latency = latency
+        self._min_cycles, self._max_cycles, self._latency = min_cycles, max_cycles, latency
         self._synchronous = synchronous
         super().__init__(
             tick_in=In(1),  # asynchronous; each level must hold for a clock

@@ -19,8 +19,7 @@ class ModuloCounter(Box):
     """
 
     def __init__(self, modulus: Fraction | int, latency: int = 2) -> None:
-        self._modulus = modulus
-        self._latency = latency
+        self._modulus, self._latency = modulus, latency
         super().__init__(
             step=In(signed(2)),
             clear=In(1),  # the count is 0 in the next clock, whatever has been counted

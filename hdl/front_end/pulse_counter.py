@@ -27,10 +27,7 @@ class PulseCounter(Box):
     def __init__(self, tick_cycles: int, max_count: int, *, stretched: bool = False, staged: bool = False) -> None:
         if not 1 <= max_count <= tick_cycles:
             raise ValueError(f"max_count must be from 1 to {tick_cycles}, not {max_count}")
-        self._tick_cycles = tick_cycles
-        self._max_count = max_count
-        self._stretched = stretched
-        self._staged = staged
+        self._tick_cycles, self._max_count, self._stretched, self._staged = tick_cycles, max_count, stretched, staged
         count = signed(max_count.bit_length() + 1)
         super().__init__(
             step=In(signed(2)),

@@ -43,8 +43,7 @@ class SamplingClock(Box):
     def __init__(self, tick_cycles: int, lead: int = 0) -> None:
         if tick_cycles < 1:
             raise ValueError(f"tick_cycles must be at least 1, not {tick_cycles}")
-        self._tick_cycles = tick_cycles
-        self._lead = lead
+        self._tick_cycles, self._lead = tick_cycles, lead
         # `last` is high in the last clock of every window.
         super().__init__({"last": Out(1), **only_if(lead, early=Out(1))})
 

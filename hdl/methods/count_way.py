@@ -18,9 +18,7 @@ class CountWay(Box):
     """
 
     def __init__(self, half: int, *, decays: bool, reversals: bool, displacement: Displacement | None = None) -> None:
-        self._half = half
-        self._decays = decays
-        self._reversals = reversals
+        self._half, self._decays, self._reversals = half, decays, reversals
         self._low = 0 if displacement is None else displacement.low + 1
         most = 3 * half if displacement is None else 3 * half + 2 * displacement.most
         super().__init__(

@@ -16,8 +16,7 @@ class GapTimer(Box):
     """
 
     def __init__(self, max_periods: int, *, on_lattice: bool) -> None:
-        self._max_periods = max_periods
-        self._on_lattice = on_lattice
+        self._max_periods, self._on_lattice = max_periods, on_lattice
         super().__init__(
             coming=In(1),  # a tick ends in the next clock
             count_before=In(1),  # there is a count in the next clock; on the lattice only if `coming`

@@ -29,10 +29,7 @@ class IntervalAccumulator(Box):
     ) -> None:
         if max_ticks < 2:
             raise ValueError(f"max_ticks must be at least 2, not {max_ticks}")
-        self._max_ticks = max_ticks
-        self._kept_ticks = kept_ticks
-        self._cancel = cancel
-        self._seldom = seldom
+        self._max_ticks, self._kept_ticks, self._cancel, self._seldom = max_ticks, kept_ticks, cancel, seldom
         super().__init__(
             tick=In(1),
             moves=In(1),  # m_s moves on: once for every tick, with it or as long after it as m_s is needed

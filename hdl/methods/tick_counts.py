@@ -29,8 +29,7 @@ class TickCounts(Box):
     """Adds up times and places of the counts of each tick, valid from two clocks after it until the next ends."""
 
     def __init__(self, form: Tracking, max_ticks: int) -> None:
-        self._form = form
-        self._max_ticks = max_ticks
+        self._form, self._max_ticks = form, max_ticks
         super().__init__(
             tick=In(1),  # the last clock of a tick
             step=In(signed(2)),

@@ -56,8 +56,7 @@ class LowPass(Box):
     """
 
     def __init__(self, spec: low_pass.LowPass, layout: data.StructLayout, *, clears: bool = False) -> None:
-        self._spec = spec
-        self._clears = clears
+        self._spec, self._clears = spec, clears
         super().__init__(
             tick=In(1),
             updates=In(update_stream(layout)),

@@ -15,8 +15,7 @@ class UpdateAge(Box):
     """
 
     def __init__(self, max_age: int, fresh_width: int = 0) -> None:
-        self._max_age = max_age
-        self._fresh_width = fresh_width
+        self._max_age, self._fresh_width = max_age, fresh_width
         super().__init__(
             tick=In(1),
             update=In(1),

@@ -174,9 +174,7 @@ class Play:
         self._library = ctypes.CDLL(str(library))
         self._library.tachometer_new.restype = ctypes.c_void_p
         self._library.tachometer_delete.argtypes = (ctypes.c_void_p,)
-        self._design = design
-        self.window = window
-        self._every_clock = every_clock
+        self._design, self.window, self._every_clock = design, window, every_clock
         self.done = self.skipped = 0  # clocks
         self._columns = 1 + len(design.outputs)
         self._n_words = design.n_words

@@ -27,9 +27,7 @@ class Waveform:
     """
 
     def __init__(self, path: Path, clock_hz: int, widths: dict[str, tuple[int, bool]]) -> None:
-        self._path = path
-        self._clock_hz = clock_hz
-        self._widths = widths
+        self._path, self._clock_hz, self._widths = path, clock_hz, widths
         self._file = path.open("w", newline="\n")
         self._writer = VCDWriter(self._file, timescale="1 ps", date="")
         # Registered as undefined: the first sample defines them.

@@ -106,9 +106,7 @@ class GoldenEmulator:
     def __init__(
         self, lines_per_rev: int | None = None, index_place: int = 0, complemented: tuple[str, ...] = ()
     ) -> None:
-        self._lines_per_rev = lines_per_rev
-        self._index_place = index_place
-        self._complemented = complemented
+        self._lines_per_rev, self._index_place, self._complemented = lines_per_rev, index_place, complemented
         self._random = _Random()
         self._lines = [_Line(k, self._random) for k in range(2)]
         self._clock = self._speed = self._moved = self._turned = 0

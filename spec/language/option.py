@@ -27,9 +27,7 @@ class ParameterError(ValueError):
 
     def __init__(self, parameter: str, rest: str, brief: str = "", refused: Any = None) -> None:
         super().__init__(parameter, rest)
-        self.refused = refused
-        self.parameter = parameter
-        self.rest = rest
+        self.refused, self.parameter, self.rest = refused, parameter, rest
         self.brief = brief or f"refuses: {self}"
 
     def __str__(self) -> str:
