@@ -37,11 +37,7 @@ _OF_TICK = ("tick", "tick_cycles", "max_time", "max_ticks")  # parameters that a
 Build = Callable[[TachometerSpec], Any]  # makes of a core of one axis the core that is wanted
 
 
-def _alone(spec: TachometerSpec) -> TachometerSpec:
-    return spec
-
-
-def of_texts(method: str, texts: Mapping[str, str | None], build_core: Build = _alone) -> TachometerSpec:
+def of_texts(method: str, texts: Mapping[str, str | None], build_core: Build = lambda spec: spec) -> TachometerSpec:
     """Return the core that texts of options describe, as on the command line, in files of sweeps and in tests.
 
     - `method`: One of `METHODS`, or `auto`: track where its program fits the tick, else M/T where its division does,

@@ -237,12 +237,9 @@ OPTIONAL_CORE_OPTIONS = Group(_of_core("that of the board"), _read_core)
 _CAPTURED = ("ppr", "lines", "cpr", "pole-pairs", "decoding", "sensor", "reverse", "invert", "index", "index-at")
 
 
-def _captured() -> tuple[click.Option, ...]:
-    return _made_common(tuple(about for about in common_options() if about.name in _CAPTURED))
-
-
 CAPTURED_OPTIONS = Group(
-    [later("encoder-options", _captured)], lambda **given: dict(spec=of_texts("s", _taken(given)), **given)
+    [later("encoder-options", lambda: _made_common(tuple(one for one in common_options() if one.name in _CAPTURED)))],
+    lambda **given: dict(spec=of_texts("s", _taken(given)), **given),
 )
 """What captured lines must be known of, handed over as `spec`; all else of it does not matter."""
 

@@ -46,12 +46,9 @@ def _read(
             raise ValueError(f"--vcd-from must be before --vcd-to and the end of the run, clock {end}, not {begin}")
         return begin, end
 
-    def pulses(spec: TachometerSpec) -> dict[str, Ints]:
-        return _pulses(spec, pulse)
-
     if (vcd_from is not None or vcd_to is not None) and "--vcd" not in others["targets"]:
         raise ValueError("--vcd must be given together with --vcd-from and --vcd-to")
-    return dict(running=Running(engine, window, pulses), **others)
+    return dict(running=Running(engine, window, lambda spec: _pulses(spec, pulse)), **others)
 
 
 ENGINE_OPTIONS = Group(_OPTIONS, _read)

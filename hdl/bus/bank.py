@@ -36,7 +36,7 @@ class RegisterBank(Box):
                 "written": Out(1),  # a register is being written
                 # Settings as they were written last; those that act once are high in the clock of the write.
                 **{name: Out(shape, init=init) for name, (shape, init) in _shapes(registers.settings).items()},
-                **{field.port: In(_shape(field)) for field in registers.live},
+                **{field.port: In(Shape(field.width, field.signed)) for field in registers.live},
             }
         )
 
@@ -127,10 +127,6 @@ class RegisterBank(Box):
             m.d.comb += [counter.event.eq(events[name]), counter.clear.eq(self.clear)]
             counts[name] = counter.count
         return counts
-
-
-def _shape(field: Field) -> Shape:
-    return Shape(field.width, field.signed)
 
 
 def _shapes(fields: Iterable[Field]) -> dict[str, tuple[Shape, int]]:

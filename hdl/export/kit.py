@@ -3,7 +3,7 @@
 from tachometry.hdl.export.render import render_files
 from tachometry.spec import AxesSpec, Encoder, TachometerSpec
 from tachometry.spec.control import AnySpec
-from tachometry.spec.language.port import Port, arranged
+from tachometry.spec.language.port import arranged
 from tachometry.spec.registers.buses import Bus, ports_on
 
 # The files, and what --help says of them.
@@ -32,7 +32,7 @@ def kit(spec: AnySpec, name: str, bus: Bus | None = None) -> dict[str, str]:
         inputs=[port for port in ports if port.direction == "input"],
         outputs=[port for port in ports if port.direction == "output"],
         scales=_scales(spec),
-        help=_help,
+        help=lambda port: f"{port.help.rstrip('.')}; in {port.unit}." if port.unit else port.help,
         paths=_synchronizers(spec, bus),
         bits="" if spec.axes is None else "*",
         tick_cycles=spec.timing.tick_cycles,
@@ -47,10 +47,6 @@ def _scales(spec: AnySpec) -> dict[str, str]:
     lsb = f"{velocity.rad_per_s_per_lsb!r} rad/s"
     turn = counts if isinstance(counts, int) else f"({counts})"
     return {"velocity": f"2^-{velocity.frac_bits} {spec.tachometer.unit} = {lsb}", "position": f"2*pi/{turn} rad"}
-
-
-def _help(port: Port) -> str:
-    return f"{port.help.rstrip('.')}; in {port.unit}." if port.unit else port.help
 
 
 def _synchronizers(spec: AnySpec, bus: Bus | None) -> dict[str, list[str]]:

@@ -29,19 +29,9 @@ def comment(text: str, mark: str = "//") -> str:
     return "\n".join(f"{mark} {line}" for line in textwrap.wrap(text, 110, break_on_hyphens=False))
 
 
-def _literal(value: object) -> str:
-    """Return a string as Python and JSON write it."""
-    return json.dumps(value, ensure_ascii=False)
-
-
 def span(width: int) -> str:
     """Return the range of a declaration in Verilog, with a blank behind it; empty for one bit."""
     return f"[{width - 1}:0] " if width > 1 else ""
-
-
-def _shape(port: Port) -> str:
-    """Return what stands in Verilog between the kind of a signal and its name."""
-    return "signed " * port.signed + span(port.width)
 
 
 _PLAIN = "<- floor( ) - <= >= * ^2 x .. - pi -> +- u u sqrt inf".split()
@@ -83,9 +73,8 @@ def _vhdl_name(name: str) -> str:
 
 
 def _vhdl_type(port: Port) -> str:
-    if port.width == 1:
-        return "std_logic"
-    return f"{'signed' if port.signed else 'unsigned'}({port.width - 1} downto 0)"
+    kind = "signed" if port.signed else "unsigned"
+    return "std_logic" if port.width == 1 else f"{kind}({port.width - 1} downto 0)"
 
 
 # Doubled braces stand in Verilog and Python as they are, so a hole has other marks than Jinja's own.
@@ -99,11 +88,11 @@ _TEMPLATES = Environment(
     variable_end_string="}",
 )
 _TEMPLATES.globals |= {"notice": lambda mark: notice(mark).rstrip("\n"), "version": version}
-_TEMPLATES.filters |= {
-    "ascii": ascii_of,
-    "comment": comment,
-    "literal": _literal,
-    "shape": _shape,
-    "vhdl_name": _vhdl_name,
-    "vhdl_type": _vhdl_type,
-}
+_TEMPLATES.filters.update(
+    ascii=ascii_of,
+    comment=comment,
+    literal=lambda value: json.dumps(value, ensure_ascii=False),  # as Python writes it, too
+    shape=lambda port: "signed " * port.signed + span(port.width),  # between the kind of a signal and its name
+    vhdl_name=_vhdl_name,
+    vhdl_type=_vhdl_type,
+)

@@ -248,11 +248,8 @@ def others(spec: TachometerSpec) -> Iterator[TachometerSpec]:
 
 def _error(spec: TachometerSpec, worst: Plan | None) -> float | None:
     """Return the greatest error with a real disc, rounding included, in rad/s."""
-    return None if worst is None else float(worst.resolution[0] + worst.disc[0]) + _rounding(spec)
-
-
-def _rounding(spec: TachometerSpec) -> float:
-    return spec.velocity.rounding_lsb * spec.velocity.rad_per_s_per_lsb
+    rounding = spec.velocity.rounding_lsb * spec.velocity.rad_per_s_per_lsb
+    return None if worst is None else float(worst.resolution[0] + worst.disc[0]) + rounding
 
 
 def cells_of(spec: TachometerSpec) -> int | None:

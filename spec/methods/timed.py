@@ -191,11 +191,8 @@ class TimedTachometer(TachometerSpec):
     @cached_property
     def form(self) -> TimedForm:
         """Numbers of timer and divider."""
-        return TimedForm(**vars(self._quotient), velocity=self.velocity, decays=self._decays)
-
-    @property
-    def _decays(self) -> bool:
-        return self.bound_decay and not self.paper_exact
+        decays = self.bound_decay and not self.paper_exact
+        return TimedForm(**vars(self._quotient), velocity=self.velocity, decays=decays)
 
     @cached_property
     def latency(self) -> Latency:

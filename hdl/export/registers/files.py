@@ -47,11 +47,8 @@ def tables(registers: Iterable[Register]) -> str:
 
 
 def _kind(register: Register) -> str:
-    if register.constant:
-        return "constant"
-    if register.captures:
-        return "captures"
-    return "captured" if register.captured else "live"
+    kinds = {"constant": register.constant, "captures": register.captures, "captured": register.captured}
+    return next((kind for kind, holds in kinds.items() if holds), "live")
 
 
 def _bits(field: Field) -> str:

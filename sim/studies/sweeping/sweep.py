@@ -267,7 +267,8 @@ def run_point(point: Point) -> Row:
         "from_s": point.earliest,
         "read_delay_s": point.read_delay,
     }
-    return dict.fromkeys(COLUMNS) | figures | _core(spec) | _encoder(point.encoder) | point.values
+    encoder = {name: value(point.encoder) for name, (_, _, value) in _ENCODER.items()}
+    return dict.fromkeys(COLUMNS) | figures | _core(spec) | encoder | point.values
 
 
 def _core(spec: TachometerSpec) -> Row:
@@ -284,8 +285,3 @@ def _of(spec: TachometerSpec, field: str, unit: str) -> Any:
 
 def _seconds(spec: TachometerSpec, clocks: int | None) -> float | None:
     return None if clocks is None else float(spec.tick.seconds(clocks))
-
-
-def _encoder(encoder: VirtualEncoder) -> Row:
-    """Return columns of the encoder and what is wrong with it."""
-    return {name: value(encoder) for name, (_, _, value) in _ENCODER.items()}
