@@ -14,7 +14,7 @@ from tachometry.cli.files import Outputs
 from tachometry.cli.options.board import board_argument, boards_help, default_folder
 from tachometry.cli.options.core import BAUD, board_core_options
 from tachometry.cli.options.loop import LOOP
-from tachometry.cli.options.option import FilePath, GroupedCommand, option
+from tachometry.cli.options.option import FilePath, command, option
 from tachometry.cli.reports.build import print_build
 from tachometry.spec import TachometerSpec
 from tachometry.spec.control import LoopSpec
@@ -38,9 +38,7 @@ def _bus(name: str, baud: int | None, spec: TachometerSpec | LoopSpec) -> Bus:
     return bus
 
 
-@click.command(
-    cls=GroupedCommand,
-    epilog=f"""{boards_help()}
+@command(f"""{boards_help()}
 
 \b
 Examples:
@@ -48,8 +46,7 @@ Examples:
   tachometry build tang-nano-9k --ppr 2048 --filter 4 -o rig
   tachometry build ulx3s-85f --ppr 500 --max-speed 1000rad/s --loop \\
       --gains inputs -o drive
-  tachometry program tang-nano-9k rig""",
-)
+  tachometry program tang-nano-9k rig""")
 @board_argument
 @board_core_options(LOOP)
 @option("Files", "--name NAME", default="tachometer", help="Name of the Verilog module and of the files.")

@@ -18,7 +18,7 @@ from tachometry.boards.monitor.serial_port import SerialPort
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.capture import CAPTURE_OPTIONS
 from tachometry.cli.options.core import CAPTURED_OPTIONS
-from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
+from tachometry.cli.options.option import FilePath, command, option, output
 from tachometry.cli.reports.calibrate import print_calibration
 from tachometry.cli.reports.terminal import progress_bar
 from tachometry.sim.signals.recording import Recording
@@ -31,15 +31,12 @@ from tachometry.spec.registers.edges import BAUD
 _TIMES = 15  # recordings of a board
 
 
-@click.command(
-    cls=GroupedCommand,
-    epilog="""\b
+@command("""\b
 Examples:
   tachometry calibrate coast.sr --ppr 500 --index -o disc.json --plot disc.png
   tachometry calibrate coast1.csv coast2.csv --ppr 500
   tachometry calibrate later.sr --ppr 500 --index --against disc.json
-  tachometry calibrate /dev/ttyUSB1 --port --ppr 500 --index -o disc.json""",
-)
+  tachometry calibrate /dev/ttyUSB1 --port --ppr 500 --index -o disc.json""")
 @click.argument("capture", type=FilePath(), nargs=-1, required=True, metavar="CAPTURE…")
 @CAPTURED_OPTIONS
 @CAPTURE_OPTIONS

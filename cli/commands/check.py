@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from tachometry.cli.options.option import FilePath, GroupedCommand, option
+from tachometry.cli.options.option import FilePath, command, option
 from tachometry.cli.reports.check import print_checked
 from tachometry.cli.reports.terminal import activity
 from tachometry.hdl.export.ci import ci_files
@@ -19,14 +19,11 @@ from tachometry.spec.control import AnySpec
 from tachometry.spec.registers.buses import Bus
 
 
-@click.command(
-    cls=GroupedCommand,
-    epilog="""\b
+@command("""\b
 Examples:
   tachometry check rtl
   tachometry check . --no-simulation
-  tachometry check rtl/spindle.json --verilog synthesised.v --verilog cells.v""",
-)
+  tachometry check rtl/spindle.json --verilog synthesised.v --verilog cells.v""")
 @click.argument("places", type=FilePath(), nargs=-1, required=True, metavar="DIR|NAME.json…")
 @option(
     "Check",

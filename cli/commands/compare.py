@@ -13,7 +13,7 @@ from tachometry.cli.options.capture import CAPTURE_OPTIONS
 from tachometry.cli.options.core import COMMON_CORE_OPTIONS, Make
 from tachometry.cli.options.methods import named_methods
 from tachometry.cli.options.motion import FORMS, OPTIONAL_MOTION_OPTIONS, Recorder, delay, read_delay, shown_in_unit_of
-from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
+from tachometry.cli.options.option import FilePath, command, option, output
 from tachometry.cli.reports.compare import comparison_table, cost_table, print_comparison, shown_time
 from tachometry.cli.reports.terminal import progress_bar
 from tachometry.hdl.export import export
@@ -31,9 +31,7 @@ from tachometry.spec.language.units import parse_time
 _NO_VELOCITY = ("preset", "index-once", "position-modulo")
 
 
-@click.command(
-    cls=GroupedCommand,
-    epilog=f"""{FORMS}
+@command(f"""{FORMS}
 
 \b
 Examples:
@@ -45,8 +43,7 @@ Examples:
   tachometry compare --ppr 500 --clock 10MHz --tick 100us --tune \\
       --motion constant:100rad/s:400ms --from 100ms \\
       --jitter 0.05 --nonuniformity 0.1 --tradeoff delays.png
-  tachometry compare --ppr 500 --clock 200kHz --tick 1ms --replay ramp.sr""",
-)
+  tachometry compare --ppr 500 --clock 200kHz --tick 1ms --replay ramp.sr""")
 @COMMON_CORE_OPTIONS
 @option(
     "Methods",

@@ -7,7 +7,7 @@ import click
 from click.shell_completion import get_completion_class
 
 from tachometry.cli.files import Outputs
-from tachometry.cli.options.option import GroupedCommand
+from tachometry.cli.options.option import command
 
 # Where shells look for the script of a command by themselves, below the home directory; zsh needs a line in .zshrc.
 _PLACES = {
@@ -18,13 +18,10 @@ _PLACES = {
 _OF_ZSH = "for zsh, .zshrc must have once: fpath+=~/.zfunc; autoload -Uz compinit; compinit"
 
 
-@click.command(
-    cls=GroupedCommand,
-    epilog="""\b
+@command("""\b
 Examples:
   tachometry completion
-  tachometry completion fish""",
-)
+  tachometry completion fish""")
 @click.argument("shell", required=False, type=click.Choice([*_PLACES], case_sensitive=False), metavar="[bash|fish|zsh]")
 def completion(shell: str | None) -> int:
     """Let the shell complete commands, options and their values, from the next one that is opened.

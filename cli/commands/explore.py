@@ -5,17 +5,14 @@ from pathlib import Path
 
 import click
 
-from tachometry.cli.options.option import FilePath, GroupedCommand, option
+from tachometry.cli.options.option import FilePath, command, option
 
 
-@click.command(
-    cls=GroupedCommand,
-    epilog="""\b
+@command("""\b
 Examples:
   tachometry explore
   tachometry explore --port 8080
-  tachometry explore /dev/ttyUSB1 --manifest build/icebreaker/tachometer.json""",
-)
+  tachometry explore /dev/ttyUSB1 --manifest build/icebreaker/tachometer.json""")
 @click.argument("board", metavar="[PORT]", required=False)
 @option(
     "Page",

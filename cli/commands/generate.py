@@ -14,7 +14,7 @@ from tachometry.cli.options.axes import AXES
 from tachometry.cli.options.core import BAUD, BUS, FAMILY, core_options
 from tachometry.cli.options.loop import LOOP
 from tachometry.cli.options.motion import FORMS, OPTIONAL_MOTION_OPTIONS
-from tachometry.cli.options.option import FilePath, Group, GroupedCommand, option
+from tachometry.cli.options.option import FilePath, Group, command, option
 from tachometry.cli.reports.axes import axes_rows
 from tachometry.cli.reports.core import core_rows, size_rows
 from tachometry.cli.reports.loop import loop_rows
@@ -182,10 +182,8 @@ ASKED = Group(
 """All options of `generate` but where to write; handed over as `asked`."""
 
 
-@click.command(
-    cls=GroupedCommand,
-    help=_HELP,
-    epilog=f"""{FORMS}
+@command(
+    f"""{FORMS}
 
 \b
 Examples:
@@ -199,6 +197,7 @@ Examples:
       --kv 160 --observer 320rad/s -o drive
   tachometry generate --ppr 500 --max-speed 1000rad/s --loop \\
       --gains inputs --command generator --bus axi-lite -o drive""",
+    help=_HELP,
 )
 @ASKED
 @option(

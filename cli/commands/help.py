@@ -3,17 +3,16 @@
 import click
 
 from tachometry.cli.options.motion import FORMS
-from tachometry.cli.options.option import LONG, GroupedCommand
+from tachometry.cli.options.option import LONG, command
 from tachometry.cli.options.option_aliases import meant
 
 
-@click.command(
-    cls=GroupedCommand,
-    context_settings={"ignore_unknown_options": True},
-    epilog="""\b
+@command(
+    """\b
 Examples:
   tachometry help generate
   tachometry help generate --tick""",
+    context_settings={"ignore_unknown_options": True},
 )
 @click.argument("command", required=False, metavar="[COMMAND]")
 @click.argument("name", required=False, metavar="[--OPTION]")

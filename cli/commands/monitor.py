@@ -26,7 +26,7 @@ from tachometry.boards.monitor.session import Session, connected
 from tachometry.boards.monitor.watch import State, watch
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.core import OPTIONAL_CORE_OPTIONS, CoreTexts
-from tachometry.cli.options.option import FilePath, GroupedCommand, option, output
+from tachometry.cli.options.option import FilePath, command, option, output
 from tachometry.cli.options.target import SIMULATED, Target, target_of
 from tachometry.cli.reports.monitor import SelftestReport, display
 from tachometry.sim.signals.temporary import STOPS
@@ -37,9 +37,8 @@ _GROUP = "Monitor"
 _ORDERLY = 3.0  # seconds that an end may take before it can be interrupted
 
 
-@click.command(
-    cls=GroupedCommand,
-    epilog="""\b
+@command(
+    """\b
 PORT is one of:
   /dev/ttyUSB1, COM5, ...  the serial port of a board, with its --manifest
 """
@@ -63,7 +62,7 @@ Settings of the emulated encoder, for --set:
 Examples:
   tachometry monitor sim:icebreaker --ppr 500 --set speed=100rad/s
   tachometry monitor /dev/ttyUSB1 --manifest build/icebreaker/tachometer.json
-  tachometry monitor sim:icebreaker --ppr 500 --selftest""",
+  tachometry monitor sim:icebreaker --ppr 500 --selftest"""
 )
 @click.argument("port", metavar="PORT")
 @option(

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import click
-
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.axes import AXES
 from tachometry.cli.options.core import BAUD, BUS, FAMILY, Make, core_and_make_options
 from tachometry.cli.options.methods import Methods, named_methods
-from tachometry.cli.options.option import GroupedCommand, option, output
+from tachometry.cli.options.option import command, option, output
 from tachometry.cli.reports.plan import print_plan, print_plans
 from tachometry.sim.studies.estimate import Estimate
 from tachometry.sim.studies.plan import Plans, default_range
@@ -23,15 +21,12 @@ from tachometry.spec.registers.buses import bus_of, ports_on
 _SLOWEST = 1e-9  # counts per tick; keeps every number printable
 
 
-@click.command(
-    cls=GroupedCommand,
-    epilog="""\b
+@command("""\b
 Examples:
   tachometry plan --ppr 500 --max-speed 400rad/s
   tachometry plan --ppr 500 --methods all --plot methods.png
   tachometry plan --ppr 2048 --clock 100MHz --tick 50us --max-time 20ms \\
-      --speeds 1:6000rpm --plot plan.pdf --csv plan.csv""",
-)
+      --speeds 1:6000rpm --plot plan.pdf --csv plan.csv""")
 @core_and_make_options(AXES)
 @option(
     "Range",

@@ -8,19 +8,16 @@ import click
 
 from tachometry.boards.fpga.board import Board
 from tachometry.cli.options.board import board_argument, boards_help, default_folder
-from tachometry.cli.options.option import FilePath, GroupedCommand, option
+from tachometry.cli.options.option import FilePath, command, option
 from tachometry.cli.reports.terminal import activity
 
 
-@click.command(
-    cls=GroupedCommand,
-    epilog=f"""{boards_help()}
+@command(f"""{boards_help()}
 
 \b
 Examples:
   tachometry program icebreaker
-  tachometry program ulx3s-85f rig --flash""",
-)
+  tachometry program ulx3s-85f rig --flash""")
 @board_argument
 @click.argument("place", type=FilePath(), required=False, metavar="[FILE|DIR]")
 @option("Board", "--flash", is_flag=True, help="Write to the flash memory of the board, to stay.")

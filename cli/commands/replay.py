@@ -12,24 +12,21 @@ from tachometry.cli.options.axes import AXES
 from tachometry.cli.options.capture import CAPTURE_OPTIONS
 from tachometry.cli.options.core import core_options
 from tachometry.cli.options.engine import ENGINE_OPTIONS
-from tachometry.cli.options.option import FilePath, GroupedCommand
+from tachometry.cli.options.option import FilePath, command
 from tachometry.cli.options.outputs import OUTPUT_OPTIONS, outputs_of
 from tachometry.sim.signals.recording import Recording
 from tachometry.sim.studies.simulation import Running
 from tachometry.spec import CoreSpec
 
 
-@click.command(
-    cls=GroupedCommand,
-    epilog="""\b
+@command("""\b
 Examples:
   tachometry replay ramp.sr --ppr 500 --clock 200kHz --tick 1ms --trace v.csv
   tachometry replay scope.csv --time "t [us]" --a CH1 --b CH2 --ppr 1024 \\
       --clock 500kHz --tick 100us --plot run.png
 
 Without a C++ compiler, --engine pysim runs some 10,000 clocks a second: choose
-a --clock that is a few times the edge rate then. Edges closer than a clock are flagged as errors or lost.""",
-)
+a --clock that is a few times the edge rate then. Edges closer than a clock are flagged as errors or lost.""")
 @click.argument("capture", type=FilePath())
 @core_options(AXES)
 @CAPTURE_OPTIONS

@@ -7,14 +7,12 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-import click
-
 from tachometry.cli.files import Outputs
 from tachometry.cli.options.axes import AXES
 from tachometry.cli.options.core import core_options
 from tachometry.cli.options.engine import ENGINE_OPTIONS
 from tachometry.cli.options.motion import FORMS, MOTION_OPTIONS, Recorder, shown_in_unit_of
-from tachometry.cli.options.option import GroupedCommand
+from tachometry.cli.options.option import command
 from tachometry.cli.options.outputs import OUTPUT_OPTIONS, WHOLE, outputs_of, write_outputs, write_tables
 from tachometry.cli.reports.run import print_simulation
 from tachometry.cli.reports.terminal import progress_bar
@@ -26,9 +24,7 @@ from tachometry.sim.studies.simulation import simulate as simulation_of
 from tachometry.spec import CoreSpec
 
 
-@click.command(
-    cls=GroupedCommand,
-    epilog=f"""{FORMS}
+@command(f"""{FORMS}
 
 \b
 Examples:
@@ -41,8 +37,7 @@ Examples:
       --motion constant:15rpm:1s --bounce 5:1ms --filter 110 --plot knob.png
 
 Without a C++ compiler, --engine pysim runs some 10,000 clocks a second: choose
-a --clock that is a few times the edge rate then.""",
-)
+a --clock that is a few times the edge rate then.""")
 @core_options(AXES)
 @MOTION_OPTIONS
 @OUTPUT_OPTIONS

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from tachometry.cli.files import Outputs
-from tachometry.cli.options.option import GroupedCommand, option, output_folder
+from tachometry.cli.options.option import command, option, output_folder
 from tachometry.cli.reports.terminal import progress_bar
 from tachometry.cli.reports.verify import print_verification
 from tachometry.sim.captures.sigrok import write_sr
@@ -19,16 +19,13 @@ from tachometry.spec import METHODS
 _VERIFICATION = "Verification"
 
 
-@click.command(
-    cls=GroupedCommand,
-    epilog="""\b
+@command("""\b
 Examples:
   tachometry verify
   tachometry verify --methods s,rairan --engines cxxrtl --clocks 1000000000
 
 The first run builds every core for every engine, which takes most of the time;
-later ones find them in the cache.""",
-)
+later ones find them in the cache.""")
 @option(
     _VERIFICATION,
     "--methods LIST",

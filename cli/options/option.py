@@ -252,6 +252,11 @@ class GroupedCommand(click.Command):
         return {name: groups[name] for name in sorted(groups, key=RESEARCH.__eq__)}
 
 
+def command(epilog: str, **attributes: Any) -> Callable[[Callable[..., Any]], click.Command]:
+    """Decorate a function: a command that lists its options in groups, and whose help ends with `epilog`."""
+    return click.command(cls=GroupedCommand, epilog=epilog, **attributes)
+
+
 def option(group: str, name: str, *others: str, **attributes: Any) -> Callable[[Command], Command]:
     """Decorate a command with an option in a group; defaults are shown.
 
