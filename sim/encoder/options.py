@@ -67,6 +67,16 @@ _STUCK = "A shorted wire, such as a:200ms: constant from then on. Line a, b, z, 
 _INDEX_SKEW_S = """Delay of the index after A and B, such as 3us or -3us. In s, ms, us or ns; the index is then not \
 gated."""
 _INTERPOLATION = "Interpolation error of sampled positions, such as 0.15:1024. A sine of LSB with PERIODS a turn."
+_JITTER = """Gaussian jitter of the edges in time, such as 0.05 or 5%. Its standard deviation over the gap to the \
+nearer neighbour, below 0.5."""
+_NONUNIFORMITY = "Uneven disc: edges are off by up to FRACTION of a pitch. Below 0.5, the same in every turn."
+_ECCENTRICITY = "Disc off centre: edges are off by up to FRACTION of a pitch. The displacement is a sine over a turn."
+_PHASE_ERROR_DEG = """Phase error of B in electrical degrees, such as 5deg. B comes so many degrees later than 90 \
+after A; between -90 and 90."""
+_DUTY_ERROR_DEG = """Duty error in electrical degrees, such as 5 or 5deg. Pulses of A and B are as many degrees wider \
+than 180; between -90 and 90."""
+_ILLEGAL = "Probability that an edge comes together with the next. Both lines change at once then."
+_FRAME_ERRORS = "Probability that a read of a sampled position is wrong. Its frame shows that."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,45 +107,16 @@ class EncoderOptions:
     vibration: Vibration | None = option(  # noqa: RUF009
         None, _VIBRATION, metavar="AMPL:FREQ", group="Motion", parse=_vibration
     )
-    jitter: float = _fault(
-        "Gaussian jitter of the edges in time, such as 0.05 or 5%. Its standard deviation over the gap to "
-        "the nearer neighbour, below 0.5.",
-        "FRACTION",
-        number_reader(FRACTION),
-    )
-    nonuniformity: float = _fault(
-        "Uneven disc: edges are off by up to FRACTION of a pitch. Below 0.5, the same in every turn.",
-        "FRACTION",
-        number_reader(FRACTION),
-    )
-    eccentricity: float = _fault(
-        "Disc off centre: edges are off by up to FRACTION of a pitch. The displacement is a sine over a turn.",
-        "FRACTION",
-        number_reader(FRACTION),
-    )
-    phase_error_deg: float = _fault(
-        "Phase error of B in electrical degrees, such as 5deg. B comes so many degrees later than 90 "
-        "after A; between -90 and 90.",
-        "DEGREES",
-        number_reader(DEGREES, "deg"),
-        name="phase-error",
-    )
-    duty_error_deg: float = _fault(
-        "Duty error in electrical degrees, such as 5 or 5deg. Pulses of A and B are as many degrees wider "
-        "than 180; between -90 and 90.",
-        "DEGREES",
-        number_reader(DEGREES, "deg"),
-        name="duty-error",
-    )
+    jitter: float = _fault(_JITTER, "FRACTION", number_reader(FRACTION))
+    nonuniformity: float = _fault(_NONUNIFORMITY, "FRACTION", number_reader(FRACTION))
+    eccentricity: float = _fault(_ECCENTRICITY, "FRACTION", number_reader(FRACTION))
+    phase_error_deg: float = _fault(_PHASE_ERROR_DEG, "DEGREES", number_reader(DEGREES, "deg"), name="phase-error")
+    duty_error_deg: float = _fault(_DUTY_ERROR_DEG, "DEGREES", number_reader(DEGREES, "deg"), name="duty-error")
     bounce: Bounce | None = option(None, _BOUNCE, metavar="COUNT:TIME", parse=_bounce)  # noqa: RUF009
     lost: float = _fault(
         "Probability that a line misses a pulse, so two edges.", "PROBABILITY", number_reader(FRACTION)
     )
-    illegal: float = _fault(
-        "Probability that an edge comes together with the next. Both lines change at once then.",
-        "PROBABILITY",
-        number_reader(FRACTION),
-    )
+    illegal: float = _fault(_ILLEGAL, "PROBABILITY", number_reader(FRACTION))
     broken: LineFault | None = option(None, _BROKEN, metavar="LINE:TIME", parse=_line_fault)  # noqa: RUF009
     stuck: LineFault | None = option(None, _STUCK, metavar="LINE:TIME", parse=_line_fault)  # noqa: RUF009
     index_width: int = option(
@@ -146,12 +127,7 @@ class EncoderOptions:
         "Noise of sampled positions: standard deviation in LSB. At most 1000.", "LSB", number_reader(FRACTION)
     )
     interpolation: tuple[float, int] | None = option(None, _INTERPOLATION, metavar="LSB:PERIODS", parse=_interpolation)
-    frame_errors: float = _fault(
-        "Probability that a read of a sampled position is wrong. Its frame shows that.",
-        "P",
-        number_reader(FRACTION),
-        name="frame-errors",
-    )
+    frame_errors: float = _fault(_FRAME_ERRORS, "P", number_reader(FRACTION), name="frame-errors")
     seed: int = option(0, "Seed of all random numbers; equal seeds give equal files.", metavar="N", parse=_seed)
 
     def __post_init__(self) -> None:
