@@ -38,6 +38,9 @@ def _bus(name: str, baud: int | None, spec: TachometerSpec | LoopSpec) -> Bus:
     return bus
 
 
+_OUTPUT = "Folder of all files; files in it are overwritten. It is made if it does not exist. [default: build/BOARD]"
+
+
 @command(f"""{boards_help()}
 
 \b
@@ -50,14 +53,7 @@ Examples:
 @board_argument
 @board_core_options(LOOP)
 @option("Files", "--name NAME", default="tachometer", help="Name of the Verilog module and of the files.")
-@option(
-    "Files",
-    "--output DIR",
-    "-o",
-    "directory",
-    type=FilePath(file_okay=False),
-    help="Folder of all files; files in it are overwritten. It is made if it does not exist. [default: build/BOARD]",
-)
+@option("Files", "--output DIR", "-o", "directory", type=FilePath(file_okay=False), help=_OUTPUT)
 @option(
     "Files",
     "--bus",

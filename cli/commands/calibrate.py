@@ -30,6 +30,13 @@ from tachometry.spec.registers.edges import BAUD
 
 _TIMES = 15  # recordings of a board
 
+_ONE_SPEED = "Accept captures at one speed. Ripple of the torque in step with the turn is then part of the map."
+_AGAINST = "Check that it is the encoder of this map. Without --index, edges are then counted as there."
+_PORT = """Record from a board at the serial port CAPTURE. Its bitstream is from `tachometry build --bus edges`; it \
+records 15 times while the shaft coasts."""
+_ALIGN = """Align the core without an index at this serial port. It needs --against, and a capture that begins with \
+the reset of the core, whose --manifest `tachometry build` wrote."""
+
 
 @command("""\b
 Examples:
@@ -40,34 +47,10 @@ Examples:
 @click.argument("capture", type=FilePath(), nargs=-1, required=True, metavar="CAPTURE…")
 @CAPTURED_OPTIONS
 @CAPTURE_OPTIONS
-@option(
-    "Map",
-    "--one-speed",
-    is_flag=True,
-    help="Accept captures at one speed. Ripple of the torque in step with the turn is then part of the map.",
-)
-@option(
-    "Map",
-    "--against",
-    type=FilePath(),
-    metavar="FILE",
-    help="Check that it is the encoder of this map. Without --index, edges are then counted as there.",
-)
-@option(
-    "Map",
-    "--port",
-    is_flag=True,
-    help="Record from a board at the serial port CAPTURE. Its bitstream is from `tachometry build --bus edges`; it "
-    "records 15 times while the shaft coasts.",
-)
-@option(
-    "Map",
-    "--align",
-    type=FilePath(),
-    metavar="PORT",
-    help="Align the core without an index at this serial port. It needs --against, and a capture that begins with the "
-    "reset of the core, whose --manifest `tachometry build` wrote.",
-)
+@option("Map", "--one-speed", is_flag=True, help=_ONE_SPEED)
+@option("Map", "--against", type=FilePath(), metavar="FILE", help=_AGAINST)
+@option("Map", "--port", is_flag=True, help=_PORT)
+@option("Map", "--align", type=FilePath(), metavar="PORT", help=_ALIGN)
 @option("Map", "--manifest", type=FilePath(), metavar="FILE", help="Manifest of the board of --align.")
 @output("-o", "--output", "table", suffixes=(".json",), help="Write the map of the disc.")
 @output("--plot", suffixes=(".png", ".pdf", ".svg"), help="Draw the disc as it is, and with the map.")

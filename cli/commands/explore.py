@@ -7,6 +7,10 @@ import click
 
 from tachometry.cli.options.option import FilePath, command, option
 
+_MANIFEST = """Manifest that `tachometry build` wrote for the board. The page can then show the board at a serial PORT \
+live."""
+_PORT = "Port of 127.0.0.1 at which the page is. [default: one that is free]"
+
 
 @command("""\b
 Examples:
@@ -14,19 +18,8 @@ Examples:
   tachometry explore --port 8080
   tachometry explore /dev/ttyUSB1 --manifest build/icebreaker/tachometer.json""")
 @click.argument("board", metavar="[PORT]", required=False)
-@option(
-    "Page",
-    "--manifest FILE",
-    type=FilePath(dir_okay=False),
-    help="Manifest that `tachometry build` wrote for the board. The page can then show the board at a "
-    "serial PORT live.",
-)
-@option(
-    "Page",
-    "--port N",
-    type=click.IntRange(0, 65535),
-    help="Port of 127.0.0.1 at which the page is. [default: one that is free]",
-)
+@option("Page", "--manifest FILE", type=FilePath(dir_okay=False), help=_MANIFEST)
+@option("Page", "--port N", type=click.IntRange(0, 65535), help=_PORT)
 def explore(board: str | None, manifest: Path | None, port: int | None) -> int:
     """Configure a core in a page of the browser, and see what it does.
 

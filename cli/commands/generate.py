@@ -129,35 +129,26 @@ def _read(*, bus: str | None, target: str, **given: Any) -> dict[str, Any]:
     return dict(asked=Asked(spec=spec, bus=on, target=target, **asked), **given)
 
 
+_TESTBENCH = """Also write a test bench in cocotb. It checks the core in Icarus, Verilator and others: python \
+DIR/test_NAME.py. Without a --motion the shaft goes fast and slow, to and fro, and stops, at speeds that fit the \
+core."""
+_WRITER = "Writer of the Verilog. yosys is Amaranth's Yosys, with more names and no comments."
+_IRQ = """Add output irq and interrupt registers (with --bus). Its events are index, overflow (faster than \
+--max-speed), stall, error, and with --health and --over-speed what they watch."""
+_CI = """Also write a CI job that checks all cores of the repository. DIR/NAME_github.yml or DIR/NAME_gitlab.yml runs \
+tachometry check and a linter; the file has its place in a comment."""
+
+
 ASKED = Group(
     [
         core_options(AXES, LOOP),
         option("Files", "--name NAME", default="tachometer", help="Name of the Verilog module and of the files."),
-        option(
-            "Files",
-            "--testbench",
-            type=click.Choice(["cocotb"], case_sensitive=False),
-            help="Also write a test bench in cocotb. It checks the core in Icarus, Verilator and others: python "
-            "DIR/test_NAME.py. Without a --motion the shaft goes fast and slow, to and fro, and stops, at "
-            "speeds that fit the core.",
-        ),
+        option("Files", "--testbench", type=click.Choice(["cocotb"], case_sensitive=False), help=_TESTBENCH),
         BUS,
         BAUD,
         FAMILY,
-        option(
-            "Files",
-            "--writer",
-            type=click.Choice(WRITERS, case_sensitive=False),
-            default=WRITERS[0],
-            help="Writer of the Verilog. yosys is Amaranth's Yosys, with more names and no comments.",
-        ),
-        option(
-            "Files",
-            "--irq",
-            is_flag=True,
-            help="Add output irq and interrupt registers (with --bus). Its events are index, overflow (faster than "
-            "--max-speed), stall, error, and with --health and --over-speed what they watch.",
-        ),
+        option("Files", "--writer", type=click.Choice(WRITERS, case_sensitive=False), default=WRITERS[0], help=_WRITER),
+        option("Files", "--irq", is_flag=True, help=_IRQ),
         option(
             "Files",
             "--for",
@@ -168,18 +159,14 @@ ASKED = Group(
             + "; ".join(f"{name}: {target.help}" for name, target in TARGETS.items())
             + ".",
         ),
-        option(
-            "Files",
-            "--ci",
-            type=click.Choice(HOSTS),
-            help="Also write a CI job that checks all cores of the repository. DIR/NAME_github.yml or "
-            "DIR/NAME_gitlab.yml runs tachometry check and a linter; the file has its place in a comment.",
-        ),
+        option("Files", "--ci", type=click.Choice(HOSTS), help=_CI),
         OPTIONAL_MOTION_OPTIONS,
     ],
     _read,
 )
 """All options of `generate` but where to write; handed over as `asked`."""
+
+_OUTPUT = "Folder of all files; files in it are overwritten. It is made if it does not exist."
 
 
 @command(
@@ -200,15 +187,7 @@ Examples:
     help=_HELP,
 )
 @ASKED
-@option(
-    "Files",
-    "--output DIR",
-    "-o",
-    "directory",
-    type=FilePath(),
-    required=True,
-    help="Folder of all files; files in it are overwritten. It is made if it does not exist.",
-)
+@option("Files", "--output DIR", "-o", "directory", type=FilePath(), required=True, help=_OUTPUT)
 def generate(asked: Asked, directory: Path) -> int:
     """Write a core as Verilog, with its manifest and all that it takes to build it into a design."""
     core = f"{asked.name}.v"

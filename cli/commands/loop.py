@@ -22,6 +22,12 @@ from tachometry.sim.studies.sweeping.grid import Loops
 from tachometry.sim.studies.sweeping.run import LoopResult, run_loops
 from tachometry.spec import AUTO
 
+_VARY = """Option and its values: --vary kv=20,40. An option of core, controller, motor or encoder. LO..HI:N are N \
+values, evenly spaced, LO..HI:Nlog are spaced by a factor. It may be given several times: all combinations are run."""
+_METHODS = """Methods to run: auto, all, or names with commas between. auto chooses one as --method does. Names may \
+have options, as in mt:timer=tick."""
+_PLOT = "Figure of speed, error, current of the first seed. With several loops: the table, over the first axis."
+
 
 @click.command(
     cls=VaryingCommand,
@@ -39,29 +45,12 @@ Examples:
       --load 0.2Nm:800ms:200ms --phase-error 10 \\
       --vary tick=1ms,100us,20us --vary kv=40,80 --csv loops.csv""",
 )
-@option(
-    "Sweep",
-    "--vary NAME=VALUES",
-    multiple=True,
-    help="Option and its values: --vary kv=20,40. An option of core, controller, motor or encoder. "
-    "LO..HI:N are N values, evenly spaced, LO..HI:Nlog are spaced by a factor. It may be given "
-    "several times: all combinations are run.",
-)
-@option(
-    "Sweep",
-    "--methods LIST",
-    default=AUTO,
-    help="Methods to run: auto, all, or names with commas between. auto chooses one as --method does. "
-    "Names may have options, as in mt:timer=tick.",
-)
+@option("Sweep", "--vary NAME=VALUES", multiple=True, help=_VARY)
+@option("Sweep", "--methods LIST", default=AUTO, help=_METHODS)
 @option("Sweep", "--seeds N", type=int, default=6, help="Runs of each loop, with seeds from --seed on.")
 @JOBS
 @SCHEDULER
-@output(
-    "--plot",
-    suffixes=(".png", ".pdf", ".svg"),
-    help="Figure of speed, error, current of the first seed. With several loops: the table, over the first axis.",
-)
+@output("--plot", suffixes=(".png", ".pdf", ".svg"), help=_PLOT)
 @output("--log", help="CSV of the first seed, a row every 100 µs. It needs a single loop.")
 @output("--csv", help="CSV with a row per loop: the table.")
 @click.pass_obj

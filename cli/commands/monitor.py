@@ -36,6 +36,18 @@ from tachometry.spec.registers.demo import PERIOD_WIDTH, DemoMap
 _GROUP = "Monitor"
 _ORDERLY = 3.0  # seconds that an end may take before it can be interrupted
 
+_MANIFEST = "Manifest that `tachometry build` wrote for the board. It has the options of the core at a serial port."
+_SET = """Set the emulated encoder; it may be given several times. The board measures it from the time on when its \
+speed is set. All names are listed below."""
+_EVERY = "Time between frames of telemetry, in whole ticks. Frames that the line cannot carry are lost."
+_SELFTEST = """Test the board with its emulated encoder. It goes fast and slow, to and fro, stops, and makes errors; \
+every frame is compared with the golden model."""
+_SERVE = "Run a simulated board for other programs. Its serial port is printed, and its manifest written to FILE."
+_RECORD = "Record a row for each frame: time and all outputs. .csv or .parquet."
+_PUBLISH = """Publish each frame: mqtt://HOST/TOPIC or epics:PREFIX. MQTT has a JSON object for each frame at TOPIC, \
+and USER:PASSWORD@ before HOST and :PORT behind it where the broker needs them; EPICS serves a variable PREFIX + NAME \
+for each output."""
+
 
 @command(
     """\b
@@ -65,53 +77,15 @@ Examples:
   tachometry monitor sim:icebreaker --ppr 500 --selftest"""
 )
 @click.argument("port", metavar="PORT")
-@option(
-    _GROUP,
-    "--manifest FILE",
-    type=FilePath(dir_okay=False),
-    help="Manifest that `tachometry build` wrote for the board. It has the options of the core at a serial port.",
-)
-@option(
-    _GROUP,
-    "--set NAME=VALUE",
-    "words",
-    multiple=True,
-    help="Set the emulated encoder; it may be given several times. The board measures it from the time on "
-    "when its speed is set. All names are listed below.",
-)
-@option(
-    _GROUP,
-    "--every TIME",
-    default="10ms",
-    help="Time between frames of telemetry, in whole ticks. Frames that the line cannot carry are lost.",
-)
+@option(_GROUP, "--manifest FILE", type=FilePath(dir_okay=False), help=_MANIFEST)
+@option(_GROUP, "--set NAME=VALUE", "words", multiple=True, help=_SET)
+@option(_GROUP, "--every TIME", default="10ms", help=_EVERY)
 @option(_GROUP, "--duration TIME", help="End after TIME of the board. [default: at Ctrl-C]")
 @option(_GROUP, "--plain", is_flag=True, help="Print a line a second in place of the live view.")
-@option(
-    _GROUP,
-    "--selftest",
-    is_flag=True,
-    help="Test the board with its emulated encoder. It goes fast and slow, to and fro, stops, and makes "
-    "errors; every frame is compared with the golden model.",
-)
-@option(
-    _GROUP,
-    "--serve FILE",
-    type=FilePath(dir_okay=False),
-    help="Run a simulated board for other programs. Its serial port is printed, and its manifest written to FILE.",
-)
-@output(
-    "--record",
-    suffixes=(".csv", ".parquet"),
-    help="Record a row for each frame: time and all outputs. .csv or .parquet.",
-)
-@option(
-    _GROUP,
-    "--publish ADDRESS",
-    help="Publish each frame: mqtt://HOST/TOPIC or epics:PREFIX. MQTT has a JSON object for each frame at TOPIC, and "
-    "USER:PASSWORD@ before HOST and :PORT behind it where the broker needs them; EPICS serves a variable PREFIX + NAME "
-    "for each output.",
-)
+@option(_GROUP, "--selftest", is_flag=True, help=_SELFTEST)
+@option(_GROUP, "--serve FILE", type=FilePath(dir_okay=False), help=_SERVE)
+@output("--record", suffixes=(".csv", ".parquet"), help=_RECORD)
+@option(_GROUP, "--publish ADDRESS", help=_PUBLISH)
 @OPTIONAL_CORE_OPTIONS
 def monitor(
     port: str,

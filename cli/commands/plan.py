@@ -20,6 +20,10 @@ from tachometry.spec.registers.buses import bus_of, ports_on
 
 _SLOWEST = 1e-9  # counts per tick; keeps every number printable
 
+_SPEEDS = """Range of speeds, in rad/s, rev/s or rpm. A LO without unit has that of HI. The tables are in --unit, or \
+for count/tick in the unit of HI. [default: one count in the maximum time to --max-speed, or to ten counts per tick]"""
+_METHODS = "Methods to compare: all, or names with commas between. They may have options, as in m:average=10."
+
 
 @command("""\b
 Examples:
@@ -28,18 +32,8 @@ Examples:
   tachometry plan --ppr 2048 --clock 100MHz --tick 50us --max-time 20ms \\
       --speeds 1:6000rpm --plot plan.pdf --csv plan.csv""")
 @core_and_make_options(AXES)
-@option(
-    "Range",
-    "--speeds LO:HI",
-    help="Range of speeds, in rad/s, rev/s or rpm. A LO without unit has that of HI. The tables are in "
-    "--unit, or for count/tick in the unit of HI. [default: one count in the maximum time to "
-    "--max-speed, or to ten counts per tick]",
-)
-@option(
-    "Range",
-    "--methods LIST",
-    help="Methods to compare: all, or names with commas between. They may have options, as in m:average=10.",
-)
+@option("Range", "--speeds LO:HI", help=_SPEEDS)
+@option("Range", "--methods LIST", help=_METHODS)
 @BUS
 @BAUD
 @FAMILY

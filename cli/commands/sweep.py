@@ -33,6 +33,14 @@ METRICS = {
     "mismatches": ("mismatches", "mismatches", False),
 }
 
+_VARY = """Option and its values: --vary method=s,mt. An option of cores, methods, motion or encoder, or a name in \
+braces within --motion. LO..HI:N are N values, evenly spaced, LO..HI:Nlog are spaced by a factor; none leaves the \
+option out. It may be given several times: all combinations are run."""
+_METHODS = """Methods to run: auto, all, or names with commas between. auto chooses one for each point, as --method \
+does. Names may have options, as in m:average=10."""
+_FROM = "Leave out errors before TIME (s, ms, us or ns). [default: until there is a value]"
+_RESULTS = "Parquet with a row per point. Points that are in it already do not run again."
+
 
 @click.command(
     cls=VaryingCommand,
@@ -49,27 +57,9 @@ Examples:
       --scheduler tcp://host:8786""",
 )
 @click.argument("file", required=False, type=FilePath())
-@option(
-    "Sweep",
-    "--vary NAME=VALUES",
-    multiple=True,
-    help="Option and its values: --vary method=s,mt. An option of cores, methods, motion or encoder, or a "
-    "name in braces within --motion. LO..HI:N are N values, evenly spaced, LO..HI:Nlog are spaced by "
-    "a factor; none leaves the option out. It may be given several times: all combinations are run.",
-)
-@option(
-    "Sweep",
-    "--methods LIST",
-    default=AUTO,
-    help="Methods to run: auto, all, or names with commas between. auto chooses one for each point, as "
-    "--method does. Names may have options, as in m:average=10.",
-)
-@option(
-    "Sweep",
-    "--from TIME",
-    "start",
-    help="Leave out errors before TIME (s, ms, us or ns). [default: until there is a value]",
-)
+@option("Sweep", "--vary NAME=VALUES", multiple=True, help=_VARY)
+@option("Sweep", "--methods LIST", default=AUTO, help=_METHODS)
+@option("Sweep", "--from TIME", "start", help=_FROM)
 @read_delay("Sweep")
 @option(
     "Sweep",
@@ -80,11 +70,7 @@ Examples:
 )
 @JOBS
 @SCHEDULER
-@output(
-    "--results",
-    suffixes=(".parquet",),
-    help="Parquet with a row per point. Points that are in it already do not run again.",
-)
+@output("--results", suffixes=(".parquet",), help=_RESULTS)
 @output("--plot", suffixes=(".png", ".pdf", ".svg"), help="Heat map over two axes, a panel per method.")
 @option("Outputs", "--axes X,Y", help="Axes of the heat map. [default: the first two]")
 @option(

@@ -18,6 +18,12 @@ from tachometry.spec import METHODS
 
 _VERIFICATION = "Verification"
 
+_ENGINES = """Engines to verify: all, or names with commas between. pysim, cxxrtl, verilator; all are those of this \
+machine. cxxrtl-every-clock, not among all, is CXXRTL that skips no clock."""
+_CLOCKS = """Clocks to simulate on each engine. They are spread over the configurations; pysim simulates a thousandth \
+of them. Every configuration runs at least one motion."""
+_JOBS = "Number of processes. [default: one for each core of the computer]"
+
 
 @command("""\b
 Examples:
@@ -32,28 +38,10 @@ later ones find them in the cache.""")
     default="all",
     help=lambda: f"Methods to verify: all, or names with commas between. They are {', '.join(METHODS)}.",
 )
-@option(
-    _VERIFICATION,
-    "--engines LIST",
-    default="all",
-    help="Engines to verify: all, or names with commas between. pysim, cxxrtl, verilator; all are those of "
-    "this machine. cxxrtl-every-clock, not among all, is CXXRTL that skips no clock.",
-)
-@option(
-    _VERIFICATION,
-    "--clocks N",
-    type=click.IntRange(min=0),
-    default=0,
-    help="Clocks to simulate on each engine. They are spread over the configurations; pysim simulates a "
-    "thousandth of them. Every configuration runs at least one motion.",
-)
+@option(_VERIFICATION, "--engines LIST", default="all", help=_ENGINES)
+@option(_VERIFICATION, "--clocks N", type=click.IntRange(min=0), default=0, help=_CLOCKS)
 @option(_VERIFICATION, "--seed N", type=click.IntRange(min=0), default=1, help="Seed of the first motion.")
-@option(
-    _VERIFICATION,
-    "--jobs N",
-    type=click.IntRange(min=1),
-    help="Number of processes. [default: one for each core of the computer]",
-)
+@option(_VERIFICATION, "--jobs N", type=click.IntRange(min=1), help=_JOBS)
 @output_folder("build/verify", help="Folder of the captures of failing motions.")
 def verify(methods: str, engines: str, clocks: int, seed: int, jobs: int | None, directory: Path) -> int:
     """Hold all engines against the golden models, in many configurations.

@@ -9,6 +9,9 @@ from tachometry.spec.methods.axis import MAX_AXES
 
 _AXES = "Axes"
 
+_PARALLEL = "Add held outputs for each axis (with --axes). A --bus and --for rio add them as well."
+
+
 _OPTIONS = [
     option(
         _AXES,
@@ -17,12 +20,7 @@ _OPTIONS = [
         help=f"Measure N encoders, up to {MAX_AXES}, with one datapath in turn. Its method is s or track. a and b "
         "have N bits, and results come with the number of their axis.",
     ),
-    option(
-        _AXES,
-        "--parallel",
-        is_flag=True,
-        help="Add held outputs for each axis (with --axes). A --bus and --for rio add them as well.",
-    ),
+    option(_AXES, "--parallel", is_flag=True, help=_PARALLEL),
 ]
 
 

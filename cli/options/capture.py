@@ -17,6 +17,11 @@ if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
 
 _CAPTURE = "Capture"
 
+_WRAP = """Counts after which --count wraps to 0; 0: it does not. [default: 65536 or 4294967296 where it jumps by more \
+than half of that, else 0]"""
+_SAMPLERATE = "Samplerate of a capture without times, such as 24MHz. For a .sr file or a text."
+
+
 _OPTIONS = [
     *plain_options(
         _CAPTURE,
@@ -45,18 +50,8 @@ _OPTIONS = [
             "--pulse-periods COLUMN": "Read each row of a text as a pulse after this period. Needs --sensor pulses.",
         },
     ),
-    option(
-        _CAPTURE,
-        "--wrap N",
-        type=click.IntRange(0, 1 << 53),
-        help="Counts after which --count wraps to 0; 0: it does not. [default: 65536 or "
-        "4294967296 where it jumps by more than half of that, else 0]",
-    ),
-    option(
-        _CAPTURE,
-        "--samplerate FREQUENCY",
-        help="Samplerate of a capture without times, such as 24MHz. For a .sr file or a text.",
-    ),
+    option(_CAPTURE, "--wrap N", type=click.IntRange(0, 1 << 53), help=_WRAP),
+    option(_CAPTURE, "--samplerate FREQUENCY", help=_SAMPLERATE),
 ]
 
 

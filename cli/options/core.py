@@ -270,10 +270,8 @@ FAMILY = option(
 )
 """Handed over as the name of the family."""
 
-BAUD = option(
-    "Files",
-    "--baud BITS",
-    type=click.IntRange(min=1),
-    help="Bits a second of --bus uart, 1000000 without it. The clock must make them within 2 %, with at "
-    "least 8 clocks a bit.",
-)
+_BAUD = """Bits a second of --bus uart, 1000000 without it. The clock must make them within 2 %, with at least 8 \
+clocks a bit."""
+
+
+BAUD = option("Files", "--baud BITS", type=click.IntRange(min=1), help=_BAUD)

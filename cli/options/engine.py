@@ -13,6 +13,10 @@ from tachometry.spec.core.timing import time_or_clocks
 
 _SIMULATION = "Simulation"
 
+_PULSE = """Times at which an input rises, as preset:20ms,35ms. Inputs are preset (with --preset), home (with \
+--index-once) and probe_0 and so on (with --probe). It can be given for each input."""
+
+
 _OPTIONS = [
     option(
         _SIMULATION,
@@ -24,13 +28,7 @@ _OPTIONS = [
         "clocks in which only a timer counts. cxxrtl-every-clock skips none. verilator is compiled from the exported "
         "Verilog. auto is cxxrtl if there is a compiler, else pysim.",
     ),
-    option(
-        _SIMULATION,
-        "--pulse INPUT:TIME,TIME…",
-        multiple=True,
-        help="Times at which an input rises, as preset:20ms,35ms. Inputs are preset (with --preset), home "
-        "(with --index-once) and probe_0 and so on (with --probe). It can be given for each input.",
-    ),
+    option(_SIMULATION, "--pulse INPUT:TIME,TIME…", multiple=True, help=_PULSE),
     option(_SIMULATION, "--vcd-from TIME", help="Start of the waveform of --vcd, such as 20us or 960clk."),
     option(_SIMULATION, "--vcd-to TIME", help="End of the waveform of --vcd, such as 20us or 960clk."),
 ]

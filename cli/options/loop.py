@@ -10,15 +10,12 @@ from tachometry.spec.language.option import options_of
 
 _LOOP = "Loop"
 
+_LOOP_HELP = """Add a control loop: disturbance observer and controller. Commands for position and velocity are \
+inputs, the current is an output."""
+
 
 _OPTIONS = [
-    option(
-        _LOOP,
-        "--loop",
-        is_flag=True,
-        help="Add a control loop: disturbance observer and controller. Commands for position and velocity are "
-        "inputs, the current is an output.",
-    ),
+    option(_LOOP, "--loop", is_flag=True, help=_LOOP_HELP),
     *(declared(_LOOP, about) for about in options_of(LoopSpec)),
 ]
 

@@ -12,30 +12,20 @@ from tachometry.sim.signals.tables import Tally, write_counts, write_events, wri
 from tachometry.sim.studies.simulation import Simulation
 from tachometry.spec import CoreSpec
 
+_VCD = "Waveform of pins, ports and inner values. A GTKWave save file (.gtkw) beside it opens it."
+_TRACE = """CSV with a row per update. Its columns: clock, tick, interval (the manifest has its unit), forced, raw \
+velocity, velocity in rad/s, or in the unit of --unit; then all other outputs that change with an update."""
+_COUNTS = "CSV with a row per tick. Its columns: tick, pulse count, position (counts), and all other outputs of a tick."
+_SAVE_CAPTURE = "Capture of the lines, as sigrok has it. PulseView and `tachometry replay` read it."
+
+
 _OPTIONS = [
-    output(
-        "--vcd",
-        suffixes=(".vcd",),
-        help="Waveform of pins, ports and inner values. A GTKWave save file (.gtkw) beside it opens it.",
-    ),
+    output("--vcd", suffixes=(".vcd",), help=_VCD),
     output("--plot", suffixes=(".png", ".pdf", ".svg"), help="Figure of velocity, error, pulse numbers, times."),
-    output(
-        "--trace",
-        help="CSV with a row per update. Its columns: clock, tick, interval (the manifest has its unit), "
-        "forced, raw velocity, velocity in rad/s, or in the unit of --unit; then all other outputs that "
-        "change with an update.",
-    ),
-    output(
-        "--counts",
-        help="CSV with a row per tick. Its columns: tick, pulse count, position (counts), and all other "
-        "outputs of a tick.",
-    ),
+    output("--trace", help=_TRACE),
+    output("--counts", help=_COUNTS),
     output("--events", help="CSV with a row per index, illegal edge and wrong tick."),
-    output(
-        "--save-capture",
-        suffixes=(".sr",),
-        help="Capture of the lines, as sigrok has it. PulseView and `tachometry replay` read it.",
-    ),
+    output("--save-capture", suffixes=(".sr",), help=_SAVE_CAPTURE),
 ]
 
 

@@ -11,13 +11,11 @@ from tachometry.cli.options.motion import MOTION_OPTIONS
 from tachometry.cli.options.option import SHORT, GroupedCommand, all_of, option, options_named
 from tachometry.cli.options.sweep_settings import arguments, of_command_line, of_file
 
-SCHEDULER = option(
-    "Machines",
-    "--scheduler ADDRESS",
-    help="Run on a Dask scheduler, such as tcp://host:8786. Its workers need the same version of "
-    "tachometry. Everyone who can connect to it can run code there and here, see "
-    "docs/guides/sweep.md.",
-)
+_SCHEDULER = """Run on a Dask scheduler, such as tcp://host:8786. Its workers need the same version of tachometry. \
+Everyone who can connect to it can run code there and here, see docs/guides/sweep.md."""
+
+
+SCHEDULER = option("Machines", "--scheduler ADDRESS", help=_SCHEDULER)
 JOBS = option(
     "Machines", "--jobs N", type=int, help="Number of processes on this machine. [default: one for each core]"
 )
