@@ -206,10 +206,8 @@ def respond(options: Texts, motion: Texts) -> Answer:
         edges = moved.max_travel * core.encoder.counts_per_rev / math.tau
         ticks = moved.duration / float(core.timing.tick_seconds)
         if max(edges, ticks) > _MOST:
-            raise ParameterError(
-                "motion",
-                f"must be of at most {_MOST} counts and ticks, not {max(edges, ticks):.3g}: take tachometry compare",
-            )
+            rest = f"must be of at most {_MOST} counts and ticks, not {max(edges, ticks):.3g}: take tachometry compare"
+            raise ParameterError("motion", rest)
         truth = record(core)
         return _response(options, core, Source("--motion", truth.recording, truth.true_speed, truth.true_angle))
 

@@ -69,10 +69,8 @@ def _pulses(spec: TachometerSpec, texts: tuple[str, ...]) -> dict[str, Ints]:
             raise ParameterError("pulse", f"must be given once for {name}: type --pulse {name}:{whole}")
         clocks = np.sort([_clock("pulse", time, spec) for time in times.split(",")])
         if len(near := np.flatnonzero(np.diff(clocks) < apart)):
-            raise ParameterError(
-                "pulse",
-                f"must have times at least {apart} clocks apart, not {clocks[near[0]]} and {clocks[near[0] + 1]}",
-            )
+            rest = f"must have times at least {apart} clocks apart, not {clocks[near[0]]} and {clocks[near[0] + 1]}"
+            raise ParameterError("pulse", rest)
         found[name] = clocks
     return found
 

@@ -125,10 +125,8 @@ class Loop(Law):
                 )
         bits = factor_bits(list(self.ratios.values()))
         if bits > MAX_FACTOR_BITS:
-            raise ParameterError(
-                "kv" if not self.position_gain else "kp",
-                f"must fit the other gains: coefficients would have {bits} bits, and {MAX_FACTOR_BITS} are the most",
-            )
+            rest = f"must fit the other gains: coefficients would have {bits} bits, and {MAX_FACTOR_BITS} are the most"
+            raise ParameterError("kv" if not self.position_gain else "kp", rest)
         width = max(self.form.word_width, self.form.total_width)
         if width > MAX_WORD_WIDTH:
             raise ParameterError(

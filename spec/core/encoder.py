@@ -211,10 +211,8 @@ class Encoder:
                 f"must be from 1 to {_MOST // self.decoding} with x{self.decoding} decoding, not {self.pulses_per_rev}",
             )
         if self.ratio is not None and not 1 <= self.counts_per_rev <= _MOST:
-            raise ParameterError(
-                "ratio",
-                f"must make from 1 to {_MOST} counts in a turn of the shaft, not {float(self.counts_per_rev):.6g}",
-            )
+            rest = f"must make from 1 to {_MOST} counts in a turn of the shaft, not {float(self.counts_per_rev):.6g}"
+            raise ParameterError("ratio", rest)
         if wrong := sorted(self.inverted - {*self.kind.lines, "z"}):
             lines = ", ".join((*self.kind.lines, "z"))
             raise ParameterError("invert", f"must be of {lines} for {self.sensor}, not {wrong[0]}")

@@ -108,10 +108,8 @@ class MTTachometer(TimedTachometer):
                 "min_time", f"must be from 1 to {longest} clocks, the maximum time, not {self.min_time}"
             )
         if self.form.min_clocks % self.form.timer_cycles:
-            raise ParameterError(
-                "min_time",
-                f"must be a multiple of {self.form.timer_cycles} clocks with times in ticks, not {self.min_time}",
-            )
+            rest = f"must be a multiple of {self.form.timer_cycles} clocks with times in ticks, not {self.min_time}"
+            raise ParameterError("min_time", rest)
         if self.whole_cycles and self.encoder.sensor == "hall":
             raise ParameterError("whole_cycles", "must not be given with --sensor hall: a period of halls has 6 counts")
         if self.whole_cycles and self.form.on_lattice:

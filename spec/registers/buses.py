@@ -47,10 +47,8 @@ class Bus:
         """
         words = 1 << self.address_bits
         if self.address_bits and len(registers.registers) >= words:
-            raise ParameterError(
-                "bus",
-                f"must not be {self.name} for {len(registers.registers)} registers: it reaches {words - 1} of them",
-            )
+            rest = f"must not be {self.name} for {len(registers.registers)} registers: it reaches {words - 1} of them"
+            raise ParameterError("bus", rest)
         width = registers.address_width - (WORD // 8 - 1).bit_length() * self.words
         return tuple(
             Port(port.name, port.direction, port.width or width, help=port.help) for port in (CAPTURE, *self.lines)

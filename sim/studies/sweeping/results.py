@@ -207,10 +207,8 @@ def _read_journal(path: Path) -> list[Row]:
 def _check_code(path: Path, made_by: str, engines: Sequence[str | None]) -> None:
     parts = 2 if any(engines) else 1
     if made_by.split()[:parts] != _made_by().split()[:parts]:
-        raise ParameterError(
-            "results",
-            f"must be of this version of tachometry, and {path} is of another: remove it, or take another file",
-        )
+        rest = f"must be of this version of tachometry, and {path} is of another: remove it, or take another file"
+        raise ParameterError("results", rest)
 
 
 def _joined(tables: list[pa.Table]) -> pa.Table:
