@@ -32,6 +32,7 @@ measured window, for an ideal disc and ideal lines, or within --edge-error, whil
 _EDGE_ERROR = "Widen --bounds for edges that are off by up to E counts. 0 to 1, rounded up to eighths."
 _LOWPASS = """Low-pass filter of the velocity, in rad/s, Hz or kHz. It is for measurements of different length, eq. \
 (22); the length is the time since the last update."""
+_LSB = "LSB of the velocity: 2^-4 or 0.0625 (instead of --frac-bits). It must be a power of two of the unit."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,15 +49,7 @@ class Asked:
         metavar="N",
         parse=parse_whole,
         tests=("most - 20", "most - 0", "16"),
-        also=(
-            Option(
-                "LSB of the velocity: 2^-4 or 0.0625 (instead of --frac-bits). It must be a power of two of the unit.",
-                name="lsb",
-                metavar="2^-N",
-                parse=parse_lsb,
-                tests=(),
-            ),
-        ),
+        also=(Option(_LSB, name="lsb", metavar="2^-N", parse=parse_lsb, tests=()),),
     )
     velocity_width: int | None = option(
         None,

@@ -103,6 +103,9 @@ def _polynomial(what: str, text: str) -> str:
 # Of options of an encoder that is read.
 _READ: dict[str, Any] = {"fits": lambda spec: bool(spec.facts.takes_reads), "tests": (), "tacit": True}
 
+_CPR = "Counts per revolution, after decoding (instead of --ppr). 2500 lines have 10000."
+_POLE_PAIRS = """Pole pairs of the motor. With --sensor hall instead of --ppr: the halls have as many periods in a \
+turn. Together with --lines, --ppr or --cpr it is --electrical."""
 _DECODING = """Counts per pulse. 4 (or x4) counts every edge, 2 both edges of A, 1 the edges of A while B is low. With \
 --sensor pulses or step-dir 2 counts every edge of A, 1 the rises: the default is 2 of pulses, 1 of steps. Up/down \
 always has 1, a period of halls 6."""
@@ -140,19 +143,8 @@ class Encoder:
         parse=parse_whole,
         also=(
             Option("Lines of the disc: pulses per revolution (instead of --ppr).", name="lines", **_OF_TURN),
-            Option(
-                "Counts per revolution, after decoding (instead of --ppr). 2500 lines have 10000.",
-                name="cpr",
-                parse_at=_of_counts,
-                **_OF_TURN,
-            ),
-            Option(
-                "Pole pairs of the motor. With --sensor hall instead of --ppr: the halls have as many periods in a "
-                "turn. Together with --lines, --ppr or --cpr it is --electrical.",
-                name="pole-pairs",
-                parse_at=_pole_pairs,
-                **_OF_TURN,
-            ),
+            Option(_CPR, name="cpr", parse_at=_of_counts, **_OF_TURN),
+            Option(_POLE_PAIRS, name="pole-pairs", parse_at=_pole_pairs, **_OF_TURN),
         ),
     )
     decoding: int = option(None, _DECODING, parse=_factor, shown="4", metavar="[4|2|1]", tests=("", "2", "1"))

@@ -81,6 +81,8 @@ def _usual_ticks(what: str, text: str, timing: Mapping[str, Any]) -> int:
 
 
 _CLOCK_HZ = "Clock of the core, in Hz, kHz, MHz or GHz."
+_PWM = "Frequency of the PWM, whose period is the tick. It stands in place of --tick."
+_DT = "Sampling period of method rairan (instead of --tick)."
 
 
 @dataclass(frozen=True)
@@ -104,19 +106,8 @@ class Timing:
         tests=("1", "3", "960", "2"),
         few=3,
         also=(
-            Option(
-                "Frequency of the PWM, whose period is the tick. It stands in place of --tick.",
-                name="pwm",
-                metavar="FREQUENCY",
-                parse_at=_of_frequency,
-            ),
-            Option(
-                "Sampling period of method rairan (instead of --tick).",
-                name="dt",
-                metavar="TIME",
-                parse_at=_tick,
-                fits=lambda spec: spec.facts.own_ticks,
-            ),
+            Option(_PWM, name="pwm", metavar="FREQUENCY", parse_at=_of_frequency),
+            Option(_DT, name="dt", metavar="TIME", parse_at=_tick, fits=lambda spec: spec.facts.own_ticks),
         ),
     )
     max_ticks: int = option(
