@@ -184,8 +184,9 @@ def cached(key: str, suffix: str, make: Callable[[Path], Path]) -> Path:
     folder = cache_folder()
     if (found := _intact(folder, key)) is not None:
         return found
+    work = "computing" if suffix == ".json" else "compiling"
     try:
-        with scratch(folder) as building, at_work("compiling, once for this core and this computer"):
+        with scratch(folder) as building, at_work(f"{work}, once for this core and this computer"):
             made = make(building)
             if not made.is_file():
                 raise OSError(f"there is no {made.name}, although what makes it reports no error")

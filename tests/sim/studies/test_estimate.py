@@ -1,6 +1,7 @@
 """Estimates of cells and greatest clock: of small netlists by hand, and of cores beside those that nextpnr made."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -129,6 +130,17 @@ def test_a_clock_out_of_reach_has_the_first_remedy_that_reaches_it(monkeypatch: 
     found = Estimate.of(of_texts("track", {**CORE, "clock": "125MHz"}), None, "ecp5")
     assert found.is_too_slow
     assert found.remedy == ("--method s", 130e6)
+
+
+def test_a_core_is_synthesised_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TACHOMETRY_CACHE", str(tmp_path))
+    found = [Estimate.of(of_texts("s", CORE), None, family) for family in ("ecp5", "ice40hx")]
+    monkeypatch.setenv("TACHOMETRY_CACHE", "/proc/none")  # does without
+    assert Estimate.of(of_texts("s", CORE), None, "ecp5") == found[0]
+    monkeypatch.setenv("TACHOMETRY_CACHE", str(tmp_path))
+    monkeypatch.setattr(estimate, "mapped", None)
+    assert [Estimate.of(of_texts("s", CORE), None, one.family) for one in found] == found
+    assert found[0].cells != found[1].cells
 
 
 def test_a_bus_and_axes_take_cells() -> None:
