@@ -235,6 +235,8 @@ def _counted(extra: ElectricalAngle, view: View, counts: Table) -> Table:
 def _paid(debt: int, clocks: int, spread: int) -> int:
     """Return a debt after some clocks; one of 2^spread·q falls by q a clock until it is below that."""
     size = abs(debt)
+    while clocks > 0 and size >> 2 * spread:  # q falls in each clock
+        size, clocks = size - (size >> spread), clocks - 1
     while clocks > 0 and (pay := size >> spread):
         some = min((size - (pay << spread)) // pay + 1, clocks)
         size, clocks = size - some * pay, clocks - some
