@@ -21,8 +21,9 @@ gc.disable()  # while tests are collected, which all stay
 
 
 def pytest_collection_finish() -> None:
-    """Let Python look for garbage among what tests make, and no more in what was collected."""
+    """Let Python look for garbage among what tests make, seldom, and no more in what was collected."""
     gc.freeze()
+    gc.set_threshold(20_000, 20, 20)
     gc.enable()
 
 

@@ -20,13 +20,19 @@ def block(language: str) -> str:
     return str(found[-1]).replace("\\\n", "")
 
 
-@pytest.mark.parametrize(("lead", "least", "most"), only_rows([("1.5tick", 0, 2)], [("1.5tick", 0, 2), ("0clk", 3, 5)]))
+SOON = ("1.5tick", "12_000", 0, 2)  # while it begins to turn
+
+
+@pytest.mark.parametrize(
+    ("lead", "clocks", "least", "most"),
+    only_rows([SOON], [SOON, ("1.5tick", "80_000", 0, 2), ("0clk", "80_000", 3, 5)]),
+)
 def test_the_vector_stays_aligned(
-    lead: str, least: float, most: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    lead: str, clocks: str, least: float, most: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert run(*shlex.split(block("sh").replace("1.5tick", lead))[1:]) == 0
-    Path("aligned.v").write_text(block("verilog"))
+    Path("aligned.v").write_text(block("verilog").replace("80_000", clocks))
     subprocess.run(["iverilog", "-g2012", "-s", "aligned", "aligned.v", "rtl/foc.v"], check=True)
     shown = subprocess.run(["vvp", "a.out"], check=True, capture_output=True, text=True).stdout
     away = re.search(r"within ([\d.]+) degrees", shown)

@@ -31,7 +31,7 @@ LINES = {
 
 @pytest.mark.parametrize("bus", LINES)
 def test_each_line_is_that_of_the_core(bus: str) -> None:
-    """Random levels on all inputs of both, 600 clocks; an access of `csr` is a read or a write."""
+    """Random levels on all inputs of both, 300 clocks; an access of `csr` is a read or a write."""
     inner = BusTachometer(RegisterMap(SPEC, irq=True), BUSES["native" if bus == "csr" else bus])
     outer = peripheral(SPEC, bus, irq=True)
     pairs = [(getattr(outer.bus, a), getattr(inner, b)) for a, b in (one.split("=") for one in LINES[bus].split())]
@@ -44,7 +44,7 @@ def test_each_line_is_that_of_the_core(bus: str) -> None:
     seen: set[str] = set()
 
     async def compared(ctx: Any) -> None:
-        for _ in range(600):
+        for _ in range(300):
             for mine, theirs in pairs:
                 if theirs.name in inputs:
                     level = chance.getrandbits(len(mine))

@@ -82,7 +82,7 @@ def both(spec: TachometerSpec, reads: list[tuple[int, int, int, int]], n_clocks:
 def test_gates_and_golden_model_agree_on_every_read(case: str) -> None:
     spec = core(case)
     few = case.startswith("track")
-    found = lockstep(spec, stress_reads(spec, 1, 30).completed(spec), Cxxrtl() if few else PySim())
+    found = lockstep(spec, stress_reads(spec, 1, 20).completed(spec), Cxxrtl() if few else PySim())
     assert found.n_mismatches == 0, found.first
     run = found.actual
     assert len(run.errors) > 1

@@ -32,7 +32,7 @@ CASES = {
 @pytest.mark.parametrize("sensor", CASES)
 def test_every_step_and_every_error(sensor: str) -> None:
     spec = of_texts("s", {"sensor": sensor} | BASE | CASES[sensor])
-    found = lockstep(spec, stress(spec, 1, 16), PySim())
+    found = lockstep(spec, stress(spec, 1, 9), PySim())
     assert found.n_mismatches == 0, found.first
     assert bool(len(found.actual.errors)) == (sensor != "pulses" and not (spec.filter_clocks and sensor != "hall"))
     assert len(found.actual.updates) > 10

@@ -64,7 +64,7 @@ def test_random_levels_against_the_definition(clocks: int, starts: int | None) -
 @pytest.mark.parametrize("case", only(["quadrature", "step-dir both"], CASES))
 def test_every_bit_of_stress(case: str) -> None:
     spec = of_texts("s", BASE | CASES[case] | {"blanking": "90"})
-    trace = stress(spec, 1, 40)
+    trace = stress(spec, 1, 20)
     found = lockstep(spec, trace, PySim())
     assert found.n_mismatches == 0, found.first
     free = golden.run(of_texts("s", BASE | CASES[case]), trace)

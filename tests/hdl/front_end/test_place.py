@@ -65,7 +65,7 @@ def test_no_count_is_lost_by_a_load_and_a_modulus_is_right_both_ways() -> None:
 @pytest.mark.parametrize("texts", CASES)
 def test_hardware_does_as_the_golden_model(texts: dict[str, str]) -> None:
     spec = spec_of(texts)
-    found = lockstep(spec, stress(spec, 1, 15), PySim())
+    found = lockstep(spec, stress(spec, 1, 8), PySim())
     assert found.n_mismatches == 0, found.first
 
 

@@ -24,7 +24,7 @@ from tachometry.spec.registers.map import RegisterMap
 CASES = [("rairan", 6), ("m", 21), ("s", 1), ("rairan", 9), ("m", 1), ("s", 5), ("t", 5)]
 WIDE = ("m", 1)  # its velocity takes two registers, and its index is anywhere
 BACKWARD = ("s", 5)  # its positions take two registers, and a turn is wrong by less than 0
-CLOCKS, ROUND = 2000, 160
+ROUND = 160
 ONES = (1 << 32) - 1
 
 
@@ -38,7 +38,7 @@ def case(method: str, seed: int) -> tuple[RegisterMap, PinTrace, list[dict[str, 
         trace = replace(trace, z=(np.cumsum(toggles) & 1).astype(np.uint8))
     if (method, seed) == BACKWARD:
         spec = replace(spec, position_width=40, encoder=replace(spec.encoder, reverse=not spec.encoder.reverse))
-    n_clocks = min(trace.n_clocks, CLOCKS)
+    n_clocks = min(trace.n_clocks, 1650)
     rows: list[dict[str, int]] = [{"bus.read": 0, "bus.write": 0} for _ in range(n_clocks)]
     for clock, *levels in zip(trace.clock.tolist(), *(trace.lines[pin.name] for pin in spec.ports.pins), strict=True):
         if clock < n_clocks:
