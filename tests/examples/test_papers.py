@@ -46,7 +46,7 @@ QUICK = [name for name in FIGURES if name not in LOOPS[:-1]]
 
 @functools.cache
 def computed(name: str) -> Result:
-    """Return a figure without its hardware, which tests/test_lockstep.py holds against the golden models."""
+    """Return a figure without its hardware, which tests/test_matrix.py holds against the golden models."""
     return FIGURES[name](Lab(hdl=False, whole=False))
 
 

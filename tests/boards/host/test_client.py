@@ -5,7 +5,7 @@ from functools import cache
 from typing import Any
 
 import pytest
-from support.lockstep import random_case
+from support.random_case import random_case
 
 from tachometry.boards.host import client
 from tachometry.boards.host.snapshot import Snapshot

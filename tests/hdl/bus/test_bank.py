@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from amaranth.lib import wiring
 from support import compiled
-from support.lockstep import random_case
 from support.nightly import only
+from support.random_case import random_case
 from support.simulate import clock_by_clock
 
 from tachometry.hdl.bus import counter

@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 from support import bus_bench
 from support.compiled import lint
-from support.lockstep import random_ticks
 from support.nightly import only, only_rows
+from support.random_case import random_ticks
 
 from tachometry.hdl.export import export
 from tachometry.sim.encoder.imperfections import Bounce

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import docs
-from support.lockstep import random_case
+from support.random_case import random_case
 from support.script import load
 
 from tachometry.boards.host.client import Client

@@ -7,8 +7,8 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from support.lockstep import random_case
 from support.options import had_by
+from support.random_case import random_case
 from support.rdl import read_rdl
 
 from tachometry.boards.host.client import Client

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from support.lockstep import random_case
+from support.random_case import random_case
 from support.rdl import read_rdl
 from support.simulate import clock_by_clock
 from systemrdl.node import RegNode

@@ -17,9 +17,9 @@ from support import docs
 from support.axes import small
 from support.command import run as command_line
 from support.compiled import lint
-from support.lockstep import random_case
 from support.nightly import only
 from support.options import had_by
+from support.random_case import random_case
 from support.rio import component, hal_type, loaded
 
 from tachometry.hdl.export import export

@@ -1,6 +1,5 @@
-"""Random motions through hardware and golden model, side by side."""
+"""Random cores, each with a motion."""
 
-from collections import Counter
 from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
@@ -8,14 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from support.events import covered
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import Encoding, VirtualEncoder
-from tachometry.sim.engines.engine import Engine
-from tachometry.sim.golden.front_end import changes, decode, filter_line
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.sim.signals.run import Run
-from tachometry.sim.studies.lockstep import lockstep as side_by_side
 from tachometry.spec import (
     METHODS,
     Encoder,
@@ -37,11 +31,6 @@ CLOCK_HZ = 1_000_000
 MIN_TICKS, MIN_UPDATES = 2000, 200
 
 
-def fewest_ticks(method: str) -> int:
-    """Return ticks that a random case has at least; long ones are fewer."""
-    return MIN_TICKS // 5 if method == "track" else MIN_TICKS
-
-
 def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding, PinTrace]:
     """Return a configuration and a motion for it: some speed in the band of a few unit velocities, moved about."""
     rng = np.random.default_rng(seed)
@@ -56,7 +45,8 @@ def random_case(seed: int, method: str = "s") -> tuple[TachometerSpec, Encoding,
     elif tick_cycles > 4 and method != "rairan":  # for time
         max_ticks = min(max_ticks, 5)
     decoding = int(rng.choice([1, 2, 4, 4]))
-    n_ticks = max(MIN_TICKS + 20, (MIN_UPDATES + 5) * max_ticks) if method == "s" else fewest_ticks(method) + 20
+    least = MIN_TICKS // 5 if method == "track" else MIN_TICKS
+    n_ticks = max(MIN_TICKS + 20, (MIN_UPDATES + 5) * max_ticks) if method == "s" else least + 20
     external = tick_cycles > 1 and bool(rng.random() < 0.3) and not METHODS[method].facts.own_ticks
     if external:
         n_ticks += n_ticks // 4  # fewer may come
@@ -208,44 +198,3 @@ def random_ticks(trace: PinTrace, tick_cycles: int, rng: np.random.Generator, ea
     if earliest:
         gaps[rng.random(n) < 0.05] = earliest
     return trace.with_tick_in(np.cumsum(np.maximum(gaps, 2)) + int(rng.integers(0, 3)))
-
-
-def lockstep(seed: int, method: str, engine: Engine) -> tuple[list[str], Counter[str]]:
-    """Run one random case; what went wrong, and what it covered."""
-    spec, encoding, trace = random_case(seed, method)
-    found = side_by_side(spec, trace, engine)
-    actual = found.actual
-    problems = [f"{method}, seed {seed}: {mismatch}" for mismatch in found.first]
-    timed = isinstance(spec, TimedTachometer)
-    # The filter may take one of several.
-    fewest = MIN_UPDATES if spec.lowpass is None else MIN_UPDATES // 4
-    # Ticks of an adaptive dt are longer.
-    ticks, updates = fewest_ticks(method) // (4 if spec.parameters.get("adaptive") else 1), 5 if timed else fewest
-    if len(actual.ticks.clock) < ticks or len(actual.updates.clock) < updates:
-        problems.append(f"{method}, seed {seed}: {len(actual.ticks.clock)} ticks, {len(actual.updates.clock)} updates")
-    problems += [f"{method}, seed {seed}: {problem}" for problem in _lost_counts(spec, encoding, trace, actual)]
-    return problems, covered(spec, trace, actual)
-
-
-def _before_known(spec: TachometerSpec, trace: PinTrace) -> int:
-    """Return counts until both lines have held a level for as long as the filter wants, which are not counted."""
-    if not spec.filter_clocks:
-        return 0
-    known = max(filter_line(*changes(trace, line), spec.filter_clocks)[0][0] for line in ("a", "b"))
-    step, _ = decode(trace.a, trace.b, spec.encoder.decoding)
-    return int(step[trace.clock[1:] <= known].sum())
-
-
-def _lost_counts(spec: TachometerSpec, encoding: Encoding, trace: PinTrace, run: Run) -> list[str]:
-    """Hold the position against the shaft's angle, tick by tick, unless an illegal transition was reported.
-
-    Jitter makes an edge come early or late, but never twice or not at all.
-    """
-    if len(run.errors) or run.ticks.get("filtered_edges")[-1] or spec.front_end.index_resets:
-        return []
-    sampled = (run.ticks.clock - spec.latency.tick - spec.latency.pin_to_count) / CLOCK_HZ
-    turned = encoding.true_position(sampled, spec.encoder.decoding) - _before_known(spec, trace)
-    half = 1 << (spec.position_width - 1)
-    difference = (run.ticks.position - turned + half) % (2 * half) - half
-    wrong = np.flatnonzero(np.abs(difference) > (encoding.encoder.jitter > 0))
-    return [f"position of tick {k}: {run.ticks.position[k]}, not {turned[k]}" for k in wrong[:1]]
