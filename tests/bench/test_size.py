@@ -202,12 +202,6 @@ def test_without_seeds_there_is_no_fmax(monkeypatch: pytest.MonkeyPatch) -> None
     assert row[3:12] == ["325", "215", "1", "0", "", "", "", "", str(SPEC.latency.tick_to_velocity)]
 
 
-@pytest.mark.parametrize(("changed", "missed"), [({}, ""), ({"LC": 341}, "LC"), ({"Fmax": 129.9}, "Fmax")])
-def test_bars(changed: dict[str, float], missed: str) -> None:
-    rows = size.rows(results(**changed))[1:]
-    assert [row[-1] for row in rows if row[-1]] == ([missed] if missed else [])
-
-
 def test_what_is_not_measured_again_stays_on_the_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     tools = {"yosys": "0.70"}
     found = results() | {("t", "ECP5"): size.Measurement({"COMB": 266, "latency": 20}, "")}

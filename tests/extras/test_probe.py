@@ -5,7 +5,7 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
-from extras.harness import Case, agreeing, in_icarus, on_a_bus, refused
+from extras.harness import Case, agreeing, in_icarus, on_a_bus
 
 from tachometry.sim import golden
 from tachometry.sim.captures.sigrok import write_sr
@@ -50,12 +50,6 @@ def rule(case: Case) -> None:
 test_cores = agreeing(CASES, rule)
 test_bus = on_a_bus(BUS)
 test_verilog = in_icarus(CASES[0])
-test_refusals = refused(
-    {
-        "probe=9": "probe must be a number of probes from 1 to 8",
-        "probe=up": "probe must be a number of probes from 1 to 8, or the edges of each",
-    }
-)
 
 
 def test_fine_position_and_velocity_say_where_an_even_shaft_was() -> None:

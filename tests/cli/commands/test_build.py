@@ -152,11 +152,6 @@ def test_hold_times_that_are_violated(fake: FakeTools, tmp_path: Path, capsys: p
     assert said.startswith("timing is not met: data are 0.07 ns too early at t.core.tachometer.datapath.")
 
 
-def test_a_loop_with_fixed_gains(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    said = refused(capsys, tmp_path, "build", "icebreaker", *CORE, "--loop")
-    assert said == "--gains must be inputs with a bus, which makes them registers, not fixed"
-
-
 @pytest.mark.parametrize(
     ("tool", "output", "said"),
     [

@@ -83,12 +83,6 @@ def test_what_the_reader_says_is_printed(tmp_path: Path, capsys: pytest.CaptureF
     assert "captured" not in capsys.readouterr().out
 
 
-def test_a_capture_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "c.csv").write_text("time,a,b\n0,0,0\n0.1,1,0\n")
-    assert run("compare", *CORE, "--replay", tmp_path / "c.csv", "--csv", tmp_path / "c.csv") == 2
-    assert "--csv must be another file than the input" in capsys.readouterr().err
-
-
 def test_an_external_tick_is_nominal(capsys: pytest.CaptureFixture[str]) -> None:
     tables = []
     for options in ([], ["--external-tick"]):

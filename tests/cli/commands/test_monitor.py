@@ -246,23 +246,6 @@ def test_a_silent_port(manifest: Path, capsys: pytest.CaptureFixture[str], monke
     assert error(capsys, "cable", "--manifest", manifest, "--selftest") == "nothing answers at cable"
 
 
-MANIFESTS = {
-    "": "must be a file NAME.json that tachometry build writes, which",
-    "[]": "must be a file NAME.json that tachometry build writes, which",
-    "[" * 100_000: "must be a file NAME.json that tachometry build writes, which",
-    '{"module": "a", "options": {}, "registers": {}, "bus": "uart"}': "must be a file NAME.json",
-}
-
-
-@pytest.mark.parametrize(("text", "message"), MANIFESTS.items(), ids=range(len(MANIFESTS)))
-def test_files_that_are_no_manifests(
-    text: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "wrong.json"
-    path.write_text(text)
-    assert error(capsys, "/dev/null", "--manifest", path).startswith(f"--manifest {message}")
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [

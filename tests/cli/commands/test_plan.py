@@ -151,12 +151,6 @@ def test_a_clock_out_of_reach_is_warned_of() -> None:
     assert "warning" not in dict(size_rows(replace(found, wanted_hz=94_000_000)))
 
 
-@pytest.mark.usefixtures("mapped")
-def test_a_bus_that_cannot_be_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("plan", "--ppr", "500", "--bus", "uart", "--baud", "40000000") == 2
-    assert "--baud must be within 2 % of" in capsys.readouterr().err
-
-
 def test_a_multiple_of_the_unit_velocity_is_forced(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("plan", *OPTIONS, "--speeds", "0.5:1500rpm") == 0
     _, heads, rows = tables(capsys.readouterr().out)

@@ -182,12 +182,6 @@ def test_a_real_shaft_loses_no_count(
     assert (tmp_path / "build" / "wheel.png").stat().st_size > 0
 
 
-def test_the_capture_is_an_argument(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("replay", *CORE) == 2
-    message = "Missing argument 'CAPTURE'. (see tachometry replay --help)"
-    assert capsys.readouterr().err == f"tachometry: error: {message}\n"
-
-
 # Edges that come faster than the clock, or the capture, can tell; and times and speeds that a core cannot have.
 SLOW = "--ppr 500 --clock 20kHz --tick 1ms --engine pysim".split()
 

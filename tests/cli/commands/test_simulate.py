@@ -218,14 +218,6 @@ def test_a_mismatch_fails_but_leaves_the_outputs(
     assert len(contents(tmp_path)) == 6
 
 
-def test_the_motion_file_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    table = tmp_path / "m.csv"
-    table.write_text("time,angle_rad\n0,0\n0.01,0.1\n")
-    assert run("simulate", *CORE, "--motion", f"csv:{table}", "--trace", table) == 2
-    assert "--trace must be another file than the input" in capsys.readouterr().err
-    assert run("simulate", *CORE, "--motion", f"csv:{table}", "--trace", tmp_path / "t.csv") == 0
-
-
 def test_ctrl_c_in_the_simulation(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

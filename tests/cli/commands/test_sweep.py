@@ -181,16 +181,6 @@ def test_an_interrupt_before_there_is_a_row(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_that_is_not_there_or_no_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(tmp_path / "no.toml") == 2
-    assert capsys.readouterr().err == f"tachometry: error: {tmp_path / 'no.toml'}: No such file or directory\n"
-    (tmp_path / "s.toml").write_text("turns = 3")
-    assert run(tmp_path / "s.toml") == 2
-    assert capsys.readouterr().err.startswith(
-        f"tachometry: error: {tmp_path / 's.toml'}: 'turns' is no key of a sweep: "
-    )
-
-
 def test_what_fails_on_the_way_is_told_and_the_rest_is_kept(
     scheduler: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

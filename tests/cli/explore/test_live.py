@@ -133,8 +133,3 @@ def test_a_board_that_is_none(attached: tuple[Live, str], told: ToldBoard) -> No
 def test_what_cannot_be_watched(options: dict[str, str], port: str, said: str) -> None:
     with pytest.raises(Refused, match=said):
         Live(None, None).start(options, port)
-
-
-def test_a_manifest_without_a_port(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="--manifest must be given together with the PORT"):
-        Live(None, tmp_path / "x.json")

@@ -191,38 +191,3 @@ def test_a_motion_counts_what_the_log_says(
     assert "--motion must be counts:FILE:TIME:COUNT alone, not 'counts:log.csv'" in capsys.readouterr().err
     assert run("simulate", "--motion", "counts:log.csv:time:n", *core, "--trace", "log.csv") == 2
     assert "must be another file than the input" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ("--count n --a n", "--a must not be given together with --count"),
-        ("--count n --index", "--index must not be given together with --count"),
-        ("--count n --sensor pulses", "--sensor must not be given together with --count"),
-        ("--count m", "--count of log.csv must be one of the columns time_s (0), n (1), not 'm'"),
-        ("--count n --wrap 5", "--wrap must be more than the counts of log.csv differ, 9, not 5"),
-        ("--wrap 5", "--wrap must not be given without --count or --angle"),
-    ],
-)
-def test_options_of_counts(
-    options: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "log.csv").write_text("time_s,n\n0,0\n1,9\n")
-    monkeypatch.chdir(tmp_path)
-    assert (
-        run(
-            "replay",
-            "log.csv",
-            "--ppr",
-            "9",
-            "--clock",
-            "1kHz",
-            "--tick",
-            "100ms",
-            "--max-time",
-            "1s",
-            *options.split(),
-        )
-        == 2
-    )
-    assert message in capsys.readouterr().err

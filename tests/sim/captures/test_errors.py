@@ -21,13 +21,6 @@ from tachometry.sim.captures.text import read_csv
 REFUSED = json.loads(Path(__file__).with_name("refused.json").read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("name", ["x.doc", "x", "x.sr.gz"])
-def test_suffix(tmp_path: Path, name: str) -> None:
-    assert_error(
-        tmp_path / name, "a capture must be a .sr, .vcd, .fst, .csv, .txt, .tsv or .teeth file, or .csv.gz, not PATH"
-    )
-
-
 @pytest.mark.parametrize("name", ["x.sr", "x.csv", "X.SR"])
 def test_missing_or_unreadable_file(tmp_path: Path, name: str) -> None:
     assert_error(tmp_path / name, "PATH does not exist")
@@ -44,20 +37,6 @@ def test_cut_compressed_text(tmp_path: Path) -> None:
     assert_error(
         tmp_path / "x.csv.gz", "cannot read PATH: Compressed file ended before the end-of-stream marker was reached"
     )
-
-
-def test_text_that_is_not_compressed(tmp_path: Path) -> None:
-    (tmp_path / "x.csv.gz").write_text("time,a,b\n0,0,0\n")
-    assert_error(tmp_path / "x.csv.gz", "cannot read PATH: Not a gzipped file (b'ti')")
-
-
-@pytest.mark.parametrize("keep", [0, 1, 100, -1, -22])
-def test_cut_session(tmp_path: Path, keep: int) -> None:
-    make_sr(tmp_path / "x.sr", [bytes(1000)])
-    data = (tmp_path / "x.sr").read_bytes()
-    (tmp_path / "x.sr").write_bytes(data[:keep])
-    wanted = "PATH must be a whole sigrok session (a zip file), but is cut or damaged: File is not a zip file"
-    assert_error(tmp_path / "x.sr", wanted)
 
 
 def test_damaged_samples(tmp_path: Path) -> None:
@@ -89,12 +68,6 @@ def test_any_damage_is_a_capture_error(tmp_path: Path) -> None:
             messages.append(str(error))
     assert not any("\n" in message for message in messages)
     assert len(messages) > len(data) // 2  # the rest is what does not matter: dates, attributes, the like
-
-
-def test_zip_without_metadata(tmp_path: Path) -> None:
-    with zipfile.ZipFile(tmp_path / "x.sr", "w") as archive:
-        archive.writestr("version", "2")
-    assert_error(tmp_path / "x.sr", "PATH must be a sigrok session, but has no member 'metadata'")
 
 
 @pytest.mark.parametrize("text", [b"\xff[device 1]\n", b"capturefile=x\n", b"[device 1]\nno value\n"])
@@ -150,25 +123,6 @@ def test_samplerate_option(tmp_path: Path) -> None:
     make_csv(tmp_path / "x.csv", "time,a,b\n0,0,0\n")
     wanted = "samplerate must not be given for PATH: its rows have their times"
     assert_error(tmp_path / "x.csv", wanted, samplerate_hz=1e6)
-
-
-@pytest.mark.parametrize("name", ["x.sr", "x.csv"])
-def test_wrong_channels(tmp_path: Path, name: str) -> None:
-    make_sr(tmp_path / "x.sr", [bytes(4)], {1: "A", 2: "B", 3: "Z"})
-    make_csv(tmp_path / "x.csv", "time,A,B,Z\n0,0,0,0\n")
-    path = tmp_path / name
-    assert_error(path, "channel a of PATH must be one of A (0), B (1), Z (2), not 'C'", a="C")
-    assert_error(path, "channel b of PATH must be one of A (0), B (1), Z (2), not '3'", b="3")
-    assert_error(path, "channel b of PATH must be one of A (0), B (1), Z (2), not -1", b=-1)
-    assert_error(path, "channel a of PATH must be one of A (0), B (1), Z (2), not 'time'", a="time")
-    assert_error(path, "channels a and b of PATH must be two of A (0), B (1), Z (2), not both Z", a="z", b="2")
-    assert_error(path, "channels a and b of PATH must be two of A (0), B (1), Z (2), not both B", a="B")
-
-
-@pytest.mark.parametrize("name", ["x.sr", "x.vcd"])
-def test_time_is_of_csv_only(tmp_path: Path, name: str) -> None:
-    make_sr(tmp_path / name, [bytes(4)])
-    assert_error(tmp_path / name, "time must not be given for PATH: it has its times", time="A")
 
 
 def test_csv_header_of_a_binary_file(tmp_path: Path) -> None:

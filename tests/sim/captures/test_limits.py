@@ -2,7 +2,6 @@
 
 import os
 import threading
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -37,14 +36,6 @@ def test_too_many_changes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert len(read_capture(path).time) == 2 * n
     monkeypatch.setattr(file, "MAX_EDGES", 2 * n - 1)
     assert_error(path, f"PATH must have at most {2 * n - 1} changes of the lines, and has more")
-
-
-def test_metadata_that_unpack_to_much(tmp_path: Path) -> None:
-    path = make_sr(tmp_path / "x.sr", [bytes(4)], comment="x" * (2 << 20))
-    assert path.stat().st_size < 10_000
-    with zipfile.ZipFile(path) as archive:
-        size = archive.getinfo("metadata").file_size
-    assert_error(path, f"metadata of PATH must have at most {1 << 20} bytes, not {size}")
 
 
 def test_samples_that_unpack_to_too_much(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -37,7 +37,6 @@ $var wire 2 ! enc [1:0] $end
 $upscope $end
 $enddefinitions $end
 """
-LONG = '$timescale 1 us $end $var wire 1 ! a $end $var wire 1 " b $end $var wire 1 !a c $end $enddefinitions $end\n'
 
 
 def write(path: Path, text: str) -> Path:
@@ -85,12 +84,8 @@ def test_the_waveform_of_a_simulation_replays_as_the_same_pins(tmp_path: Path, c
         (HEAD + BODY, ("top.c", "top.b"), "channel a of {path} must be one of top.a (0), top.b (1), top.deep.a (2), "),
         (HEAD + BODY, ("top.a", "top.a"), "channels a and b of {path} must be two of "),
         (HEAD + BODY, ("top.bus", "top.a"), "channel a of {path} must be one of "),
-        (HEAD.replace("$timescale 10 ns $end", ""), ("0", "1"), "{path} must have a $timescale"),
         (HEAD[:60], ("0", "1"), "{path} must be a complete VCD file: "),
-        ("", ("0", "1"), "{path} must be a complete VCD file: its declarations do not end"),
-        (HEAD + "#0\n1!\n", ("0", "1"), "{path} must contain the levels of all lines, 0 or 1, at least once"),
         ("no waveform", ("0", "1"), "{path} must be a complete VCD file: 'no' must be a declaration, such as $var"),
-        (HEAD + BODY + "#40\n1", ("0", "1"), "{path} must be a complete VCD file: '1' at time 40 must be a change "),
         (HEAD + BODY + "#40\nb10", ("0", "1"), "{path} must be a complete VCD file: 'b10' at time 40 must be a "),
         (HEAD + BODY + "#40\nb10 ", ("0", "1"), "{path} must be a complete VCD file: 'b10' at time 40 must be a "),
         (HEAD + BODY + "#40\n1?\n", ("0", "1"), "{path} must be a complete VCD file: '1?' at time 40 must be a "),
@@ -98,20 +93,14 @@ def test_the_waveform_of_a_simulation_replays_as_the_same_pins(tmp_path: Path, c
         (HEAD + BODY + "#", ("0", "1"), "{path} must be a complete VCD file: '#' must be # and a time"),
         (HEAD + BODY + "#4O\n", ("0", "1"), "{path} must be a complete VCD file: '#4O' must be # and a time"),
         (HEAD + BODY + "$dump", ("0", "1"), "{path} must be a complete VCD file: '$dump' does not end"),
-        (LONG + '#0\n0!\n0"\n#9\n1!', ("a", "b"), "the last line of {path} must end, else its last change may be "),
         (HEAD + BODY + "#40\nb !\n", ("0", "1"), "top.a of {path} must be 1 bit of 0, 1, x or z, not '' at time 40"),
-        (HEAD + BODY + "#40\nb10 !\n", ("0", "1"), "top.a of {path} must be 1 bit of 0, 1, x or z, not '10' at time"),
         (HEAD + BODY + "#40\nr0.5 !\n", ("0", "1"), "top.a of {path} must be 1 bit of 0, 1, x or z, not '0.5' at "),
-        (HEAD + BODY + f"#{'9' * 5000}\n", ("0", "1"), "{path} must be a complete VCD file: "),
-        (HEAD + BODY + "1" * 70_000, ("0", "1"), "words of {path} must have at most 65536 bytes"),
-        (HEAD + BODY + "#1\n", ("0", "1"), "times of {path} must not decrease, as from 30 to 1"),
         (HEAD + BODY, ("top.bus[8]", "top.a"), "bits of top.bus of {path} must be from 7 to 0, not 8"),
         (HEAD + BODY, ("bus[1]", "bus[1]"), "channels a and b of {path} must be two of top.a (0), top.b (1), "),
         (VECTOR, ("enc", "enc"), "{path} must have at least two logic channels, not tb.enc[bit]; lines in one number "),
         (HEAD.replace("10 ns", "20 ns"), ("0", "1"), "$timescale of {path} must be 1, 10 or 100 s, ms, us, ns, ps or "),
         (HEAD.replace("8 # bus", "8 # bus [3:0]"), ("0", "1"), "bus[3:0] of {path} must have as many bits as its "),
         (HEAD.replace("wire 8 # bus", "wire 8"), ("0", "1"), "{path} must be a complete VCD file: $var must have a "),
-        (HEAD.replace("top", "t" * 5000), ("0", "1"), "names of {path} with their scopes must have at most 4096 "),
     ],
 )
 def test_what_is_wrong_is_said_in_a_line(tmp_path: Path, text: str, channels: tuple[str, str], message: str) -> None:

@@ -192,14 +192,6 @@ def test_files_of_others_are_refused(metadata: dict[str, str] | None, tmp_path: 
     assert [file.name for file in tmp_path.iterdir()] == ["r.parquet"]
 
 
-def test_what_is_no_parquet_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "r.parquet"
-    path.write_text("not that")
-    with pytest.raises(ValueError, match=r"^results must be a Parquet file of a sweep, which"):
-        Results(path, []).__enter__()
-    assert path.read_text() == "not that"
-
-
 def test_a_journal_of_another_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "r.parquet"
     killed(path, row("a"))
