@@ -254,13 +254,12 @@ class Gates(wiring.Component):
 def counted_on(m: Module, angles: Angles, step: Value, angle: Value, left: Value) -> tuple[Value, Value]:
     """Return an angle, and what is left of it in 1/counts, after a step."""
     counts, (quotient, remainder), back = angles.counts, angles.count, step[1]
-    up = Signal(range(2 * counts))
-    down = Signal(signed(counts.bit_length() + 1))
-    m.d.comb += [up.eq(left + remainder), down.eq(left - remainder)]
-    carry, move = Mux(back, ~(down < 0), up >= counts), Const(quotient, angles.bits)
-    rest = Mux(back, Mux(down < 0, down + counts, down), Mux(up >= counts, up - counts, up))
-    moved = angle + Mux(step[0], move ^ back.replicate(len(move)), 0) + (step[0] & carry)
-    return moved, Mux(step[0], rest, left)
+    on = Signal(signed(counts.bit_length() + 2))
+    over = Signal.like(on)
+    m.d.comb += [on.eq(left + Mux(back, -remainder, remainder)), over.eq(on + Mux(back, counts, -counts))]
+    wraps, move = Mux(back, on[-1], ~over[-1]), Const(quotient, angles.bits)
+    moved = angle + Mux(step[0], move ^ back.replicate(len(move)), 0) + (step[0] & (wraps ^ back))
+    return moved, Mux(step[0], Mux(wraps, over, on)[: len(left)], left)
 
 
 def phase_products(
