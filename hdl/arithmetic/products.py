@@ -6,23 +6,28 @@ from amaranth import Array, C, Cat, Module, Mux, Signal, Value, signed
 
 from tachometry.spec.formats.angles import clocks_of_product
 
-Product = tuple[Value, Value | int, Value, Signal]  # a term, a factor, a base, and what takes the result
+# A term, a factor, a base, and what takes the result, or None.
+Product = tuple[Value, Value | int, Value, Signal | None]
 
 
 def take_products(
     m: Module, begin: Value, products: Sequence[Product], bits: int, result_bits: int, *, block: bool = False
-) -> tuple[Value, Value]:
-    """Take products from `begin` on, in so many clocks each; return when the last one is there, and that.
+) -> tuple[Value, Value, Value]:
+    """Take products from `begin` on, in so many clocks each; return when the one that nothing takes is there, when the
+    last one is, and the former.
 
-    A product is term·factor / 2^bits, rounded, and its base added; the last one is term·factor + base. A factor has so
-    many bits, with its sign. Term and factor are read in the first clock. With `block` it is a multiplier of the FPGA.
+    A product is term·factor / 2^bits, rounded, and its base added; the one that nothing takes is term·factor + base. A
+    factor has so many bits, with its sign. Term and factor are read in the first clock. With `block` it is a multiplier
+    of the FPGA.
     """
     number = Signal(range(len(products)))
     clock = Signal(range(bits + 4))
     done = Signal()
     ends = Signal()
+    whole = Signal()
     last = clocks_of_product(bits, block=block)
     m.d.comb += [done.eq(clock == last), ends.eq(number == len(products) - 1)]
+    m.d.comb += whole.eq(number == [target is None for *_, target in products].index(True))
     m.d.sync += clock.eq(Mux(begin | (done & ~ends), 1, Mux(clock.any() & ~done, clock + 1, 0)))
     with m.If(begin | done):
         m.d.sync += number.eq(Mux(begin, 0, number + 1))
@@ -30,14 +35,15 @@ def take_products(
     width = max(len(term) for term, *_ in products)
     base_bits = max(len(base) for *_, base, _ in products)
     if block:
-        found = result = _multiply(m, (term, factor, base), ends, (width, bits, max(result_bits, base_bits)))
+        found = result = _multiply(m, (term, factor, base), whole, (width, bits, max(result_bits, base_bits)))
     else:
-        sum_ = _add_bits(m, clock, (term, factor, base), ends, (max(result_bits + 1, width, base_bits), bits))
+        sum_ = _add_bits(m, clock, (term, factor, base), whole, (max(result_bits + 1, width, base_bits), bits))
         found, result = sum_ >> bits, sum_
-    for place, (*_, target) in enumerate(products[:-1]):
-        with m.If(done & (number == place)):
-            m.d.sync += target.eq(found)
-    return done & ends, result[:result_bits]
+    for place, (*_, target) in enumerate(products):
+        if target is not None:
+            with m.If(done & (number == place)):
+                m.d.sync += target.eq(found)
+    return done & whole, done & ends, result[:result_bits]
 
 
 def _multiply(m: Module, product: tuple[Value, Value, Value], ends: Value, widths: tuple[int, int, int]) -> Value:

@@ -173,9 +173,9 @@ class Gates(wiring.Component):
         led = Signal()
         update = between, self.native_velocity, self.native_acceleration
         *first, mean, last = phase_products(angles, update, at, (s, (s >> 1) - angles.late))
-        more = self._lead(m, s, angles.led, led) if angles.led else ()
-        products = (*first, (mean[0], s + (half - angles.late), mean[2], now), mean, *more, last)
-        done, start = take_products(m, self.native_valid, products, factor_bits, bits, block=angles.block)
+        more = self._lead(m, s + (angles.all_clocks - angles.clocks), angles.led, led) if angles.led else ()
+        products = (*first, (mean[0], s + (half - angles.late), mean[2], now), mean, last, *more)
+        done, ends, start = take_products(m, self.native_valid, products, factor_bits, bits, block=angles.block)
         phase = Signal(bits)
         run = Signal(bits)
         grows = Signal(signed(bits))
@@ -188,7 +188,7 @@ class Gates(wiring.Component):
         with m.If(done):
             m.d.sync += grows.eq(now)
         if angles.led:
-            m.d.sync += led.eq(done)
+            m.d.sync += led.eq(ends)
         if angles.is_read:
             with m.If(done | ~self.position_valid):
                 m.d.sync += self.angle_valid.eq(self.position_valid)
@@ -227,8 +227,8 @@ class Gates(wiring.Component):
         velocity, *_ = angles.factors
         s = Signal(angles.factor_bits)
         slope = Signal(signed(bits))
-        products = ((_term(velocity, self.native_velocity), velocity.number, C(0), slope), (slope, s, C(0), slope))
-        done, far = take_products(m, self.native_valid, products, angles.factor_bits, bits)
+        products = ((_term(velocity, self.native_velocity), velocity.number, C(0), slope), (slope, s, C(0), None))
+        done, _, far = take_products(m, self.native_valid, products, angles.factor_bits, bits)
         most, _ = saturate(m, slope, half)
         grows = Signal.like(most)
         place = Signal.like(most)
@@ -278,7 +278,7 @@ def phase_products(
         (bend, slopes.number, C(0), curve),
         (_term(velocity, speed), velocity.number, C(0), slope),
         (curve << angles.factor_bits - SLOPE_BITS, times[1], slope, slope),
-        (slope, times[0], target, target),
+        (slope, times[0], target, None),
     )
 
 

@@ -61,7 +61,7 @@ class Gates(wiring.Component):
         bits = angles.factor_bits
         times = (Array(C(one, signed(bits)) for one in each)[self.axis] for each in (ends, middles))
         products = phase_products(angles, update, at, tuple(times))
-        done, start = take_products(m, self.tick, products, bits, angles.bits, block=angles.block)
+        done, _, start = take_products(m, self.tick, products, bits, angles.bits, block=angles.block)
         m.d.sync += self.shows.eq(done)
         with m.If(done):
             m.d.sync += [self.angle.eq(start[-SHOWN_BITS:] + extra.offset), self.angle_valid.eq(known)]

@@ -93,7 +93,12 @@ class Angles:
     @property
     def clocks(self) -> int:
         """Clocks from an update to the first one of its phase."""
-        return ((12 if self.led else 6 - self.once) if self.tracks else 2) * self.product + 1
+        return (6 - self.once if self.tracks else 2) * self.product + 1
+
+    @property
+    def all_clocks(self) -> int:
+        """Clocks from an update until all products are there, also those of a lead."""
+        return self.clocks + (6 * self.product if self.led else 0)
 
     @property
     def product(self) -> int:

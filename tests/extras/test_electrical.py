@@ -79,7 +79,7 @@ test_refusals = refused(
 )
 
 
-@pytest.mark.parametrize(("multiplier", "clocks"), [("serial", 127), ("block", 25)])
+@pytest.mark.parametrize(("multiplier", "clocks"), [("serial", 127), ("block", 25), ("serial lead=0clk", 127)])
 def test_the_phase_is_there_so_many_clocks_after_an_update(multiplier: str, clocks: int) -> None:
     spec = Case("track", f"electrical=7 multiplier={multiplier} {TRACK}").spec
     assert ElectricalAngle.of(spec.extras).angles(spec).clocks == clocks  # type: ignore[union-attr]

@@ -195,10 +195,11 @@ def slopes_at(angles: Angles, velocity: int, acceleration: int, times: Sequence[
 
 
 def _led(extra: ElectricalAngle, view: View) -> Table:
-    """Return velocity and position of the instant at which each phase of method track begins, and the lead after it."""
+    """Return velocity and position of the instant in which they are shown, and the lead after it."""
     updates, spec, angles = view.tables["measured"], view.spec, extra.angles(view.spec)
     bits, (of_curve, of_way, of_shown) = angles.factor_bits, angles.lead_factors
-    ends = (view.trace.line_at("angle_lead", updates.clock, extra.ahead) + angles.span).tolist()
+    span = angles.span + angles.all_clocks - angles.clocks
+    ends = (view.trace.line_at("angle_lead", updates.clock, extra.ahead) + span).tolist()
     limit = angles.led.limit if angles.led else 0
     names, found = ("velocity", "acceleration", "position_fine"), list[tuple[int, int]]()
     for s, velocity, acceleration, fine in zip(ends, *(updates[name].tolist() for name in names), strict=True):
@@ -208,7 +209,7 @@ def _led(extra: ElectricalAngle, view: View) -> Table:
         width = spec.position_width + angles.position_fine_bits
         found.append((max(-limit, min(limit, of_shown.times(end))), wrapped(fine + way, width)))
     columns = np.array(found, np.int64).reshape(-1, 2).T
-    return Table(updates.clock + angles.clocks + 1, dict(zip(LEADS, columns, strict=True)))
+    return Table(updates.clock + angles.all_clocks + 1, dict(zip(LEADS, columns, strict=True)))
 
 
 def _counted(extra: ElectricalAngle, view: View, counts: Table) -> Table:

@@ -136,7 +136,7 @@ class ElectricalAngle(Extra):
             raise ParameterError(self.name, f"must be at most {most} with so few counts per revolution")
         angles = self.angles(spec)
         # All products are there before the next update, the first one before a tick.
-        clocks = max(angles.clocks, angles.tracks + angles.product + 1)
+        clocks = max(angles.all_clocks, angles.tracks + angles.product + 1)
         if (spec.times.shortest_tick if angles.tracks else angles.tick) < clocks:
             needs = f"needs a tick of {clocks} clocks"
             raise ParameterError(self.name, f"{needs}: take a longer --tick", needs)
@@ -182,7 +182,7 @@ class ElectricalAngle(Extra):
 
     def latency(self, spec: Numbers) -> Mapping[str, int]:
         angles = self.angles(spec)
-        return {"tick_to_lead": angles.tracks + angles.clocks + 1} if angles.led else {}
+        return {"tick_to_lead": angles.tracks + angles.all_clocks + 1} if angles.led else {}
 
     def row(self, spec: Numbers, run: Any) -> tuple[str, str]:
         return "angle", f"{[0, *run.ticks.angle][-1] * 360 / 2**SHOWN_BITS:.1f}° electrical at the end"
