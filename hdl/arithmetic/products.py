@@ -37,8 +37,9 @@ def take_products(
     if block:
         found = result = _multiply(m, (term, factor, base), whole, (width, bits, max(result_bits, base_bits)))
     else:
+        base = Mux(whole, base << 1, base)
         sum_ = _add_bits(m, clock, (term, factor, base), whole, (max(result_bits + 1, width, base_bits), bits))
-        found, result = sum_ >> bits, sum_
+        found, result = sum_ >> bits, sum_[1:]
     for place, (*_, target) in enumerate(products):
         if target is not None:
             with m.If(done & (number == place)):
@@ -46,38 +47,41 @@ def take_products(
     return done & whole, done & ends, result[:result_bits]
 
 
-def _multiply(m: Module, product: tuple[Value, Value, Value], ends: Value, widths: tuple[int, int, int]) -> Value:
+def _multiply(m: Module, product: tuple[Value, Value, Value], unshifted: Value, widths: tuple[int, int, int]) -> Value:
     """Return a product with its base, after three clocks."""
     (term, factor, base), (width, bits, result_bits) = product, widths
     held = Signal(signed(width))
     left = Signal(signed(bits))
     whole = Signal(signed(width + bits))
+    later = Signal.like(base)
     sum_ = Signal(signed(max(width, result_bits)))
-    rounds = ~ends & whole[bits - 1]
-    m.d.sync += [held.eq(term), left.eq(factor), whole.eq(held * left)]
-    m.d.sync += sum_.eq(Mux(ends, whole, whole >> bits) + base + rounds)
+    rounds = ~unshifted & whole[bits - 1]
+    m.d.sync += [held.eq(term), left.eq(factor), whole.eq(held * left), later.eq(base)]
+    m.d.sync += sum_.eq(Mux(unshifted, whole, whole >> bits) + later + rounds)
     return sum_
 
 
 def _add_bits(
-    m: Module, clock: Value, product: tuple[Value, Value, Value], ends: Value, widths: tuple[int, int]
+    m: Module, clock: Value, product: tuple[Value, Value, Value], unshifted: Value, widths: tuple[int, int]
 ) -> Value:
-    """Return a product: a sum moves down as the factor does, whose last bit is its sign. Then the base is added."""
+    """Return a product, behind so many bits or one: a sum moves down as the factor does, whose last bit is its sign.
+
+    The base is added as a bit more: one behind the factor, or one before it, where ones are left of the last factor.
+    """
     (term, factor, base), (width, bits) = product, widths
     held = Signal(signed(width))
-    left = Signal(signed(bits))
+    left = Signal(bits, init=-1)
     signs = Signal()
-    adds = Signal()
-    sum_ = Signal(signed(width + bits))
+    sum_ = Signal(signed(width + bits + 1))
     high = Signal(signed(width + 1))
-    addend = Mux(adds, Mux(ends, 0, base), Mux(left[0], held ^ signs.replicate(width), 0))
-    m.d.comb += [
-        signs.eq(clock == bits + 1),
-        adds.eq(clock == bits + 2),
-        high.eq(sum_[bits:].as_signed() + addend + (left[0] & signs)),
+    addend = Mux(left[0], held ^ signs.replicate(width), 0)
+    begins = clock == 1 + unshifted
+    m.d.comb += high.eq(sum_[bits + 1 :].as_signed() + addend + (left[0] & signs))
+    m.d.sync += [
+        signs.eq(clock == bits + unshifted),
+        left.eq(Mux(begins, factor, Cat(left[1:], C(1, 1)))),
+        sum_.eq(Mux(clock == 1, Mux(unshifted, 0, 1 << 2 * bits), Cat(sum_[1 : bits + 1], high))),
     ]
-    m.d.sync += [sum_.eq(Mux(adds, Cat(sum_[:bits], high), Cat(sum_[1:bits], high))), left.eq(left >> 1)]
-    with m.If(clock == 1):
-        begun = Mux(ends, base, 1 << bits - 1)
-        m.d.sync += [held.eq(term), left.eq(factor), sum_.eq(Cat(C(0, bits), begun))]
+    with m.If(begins | (clock == Mux(unshifted, 1, bits + 1))):
+        m.d.sync += held.eq(Mux(begins, term, base))
     return sum_
