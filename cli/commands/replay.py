@@ -14,6 +14,7 @@ from tachometry.cli.options.core import core_options
 from tachometry.cli.options.engine import ENGINE_OPTIONS
 from tachometry.cli.options.option import FilePath, command
 from tachometry.cli.options.outputs import OUTPUT_OPTIONS, outputs_of
+from tachometry.sim.signals.flow import Flow
 from tachometry.sim.signals.recording import Recording
 from tachometry.sim.studies.simulation import Running
 from tachometry.spec import CoreSpec
@@ -33,7 +34,11 @@ a --clock that is a few times the edge rate then. Edges closer than a clock are 
 @OUTPUT_OPTIONS
 @ENGINE_OPTIONS
 def replay(
-    spec: CoreSpec, capture: Path, read: Callable[..., Recording], targets: dict[str, Path], running: Running
+    spec: CoreSpec,
+    capture: Path,
+    read: Callable[..., Recording | Flow],
+    targets: dict[str, Path],
+    running: Running,
 ) -> int:
     """Run a core on captured encoder signals, against the golden model.
 
@@ -47,5 +52,5 @@ def replay(
     equal files. Exit status 1 if hardware and golden model differ.
     """
     outputs = outputs_of(spec, targets, [capture])
-    recordings = [read(capture, spec, axis) for axis in range(spec.axes or 1)]
+    recordings = [read(capture, spec, axis, parts=True) for axis in range(spec.axes or 1)]
     return run_core(outputs, running, spec, str(capture), recordings)

@@ -13,6 +13,7 @@ from tachometry.spec.core.sensors import READ
 from tachometry.spec.language.units import parse_frequency
 
 if TYPE_CHECKING:  # numpy is slow to import, and --help does not need it
+    from tachometry.sim.signals.flow import Flow
     from tachometry.sim.signals.recording import Recording
 
 _CAPTURE = "Capture"
@@ -64,13 +65,13 @@ def _read(
     lines: dict[str, str | None] = {name: others.pop(name) for name in _LINES}
     a, b, c, z, tick_in, threshold, samplerate, pulse_times, pulse_periods = lines.values()
 
-    def read(capture: Path, spec: CoreSpec, axis: int = 0) -> Recording:
+    def read(capture: Path, spec: CoreSpec, axis: int = 0, *, parts: bool = False) -> Recording | Flow:
         from tachometry.sim.captures.cell_parsers import parse_threshold
         from tachometry.sim.captures.count_log import read_angle_log, read_count_log
-        from tachometry.sim.captures.file import SAME, CaptureError, OptionError, is_stream
+        from tachometry.sim.captures.file import SAME, CaptureError, Channels, OptionError, is_stream
         from tachometry.sim.captures.header import TextOptions
         from tachometry.sim.captures.other_sensors import fitted
-        from tachometry.sim.captures.read import read_capture, with_last_tick
+        from tachometry.sim.captures.read import read_parts, with_last_tick
         from tachometry.sim.captures.time_unit import parse_time_unit
         from tachometry.sim.studies.captured_reads import of_frames
 
@@ -106,10 +107,13 @@ def _read(
         second = SAME if sensor == "pulses" else line_b
         third = (c or "c") if sensor == "hall" else None
         named = {"c": third, "z": index, "tick_in": tick} | {f"{n}_n": f"{n}_n" for n in alone.front_end.complemented}
-        recording = read_capture(capture, line_a, line_b if sensor in READ else second, rate, text=text, **named)
+        others = {name: channel for name, channel in named.items() if channel is not None}
+        flow = read_parts(capture, Channels(line_a, line_b if sensor in READ else second, others), rate, text)
         if sensor in READ:
-            return of_frames(recording, alone)
-        return with_last_tick(fitted(recording, alone.encoder), spec)
+            return of_frames(flow.whole(), alone)
+        if parts and sensor in ("quadrature", "hall"):
+            return with_last_tick(flow, spec)
+        return with_last_tick(fitted(flow.whole(), alone.encoder), spec)
 
     if others.get("capture", ...) is None:
         refuse_without("--replay", _OPTIONS)
@@ -117,7 +121,7 @@ def _read(
 
 
 CAPTURE_OPTIONS = Group(_OPTIONS, _read)
-"""Handed over as `read`, which reads a capture for a spec, or for an axis of so many."""
+"""Handed over as `read`, which reads a capture for a spec, or for an axis of so many; in `parts` if it may."""
 
 
 def _refuse_lines(log: str, given: dict[str, Any]) -> None:

@@ -40,7 +40,8 @@ def print_simulation(simulation: Simulation, kept: Sequence[Path] = ()) -> int:
     if not simulation.interrupted:
         return 0
     where = f", kept in {', '.join(map(str, kept))}" if kept else ""
-    how_far = f"interrupted after {run.n_clocks} of {simulation.wanted} clocks{where}"
+    of = f" of {simulation.wanted}" if simulation.wanted else ""
+    how_far = f"interrupted after {run.n_clocks}{of} clocks{where}"
     print(f"tachometry: {printable(how_far)}", file=sys.stderr)
     return INTERRUPTED
 

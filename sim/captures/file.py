@@ -8,14 +8,15 @@ import re
 import stat
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 from io import BufferedReader
 from pathlib import Path
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 from tachometry.sim.signals.files import replacing
-from tachometry.sim.signals.recording import MAX_EDGES, Recording
+from tachometry.sim.signals.flow import Flow, Parts
+from tachometry.sim.signals.recording import MAX_EDGES
 from tachometry.sim.signals.source import Source
 from tachometry.spec.language.option import ParameterError
 
@@ -39,6 +40,11 @@ class Channels:
     a: Channel | None = None
     b: Channel | None = None
     others: Mapping[str, Channel] = field(default_factory=dict)  # by the names of further lines
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """Names of the lines."""
+        return "a", "b", *self.others
 
 
 ANY = Channels()
@@ -169,19 +175,25 @@ def _named(channels: Mapping[int, str], wanted: str) -> int | None:
     return (exact or alike or last)[0] if exact or alike or len(last) == 1 else None
 
 
-def named(
-    recording: Recording, channels: Mapping[int, str], lines: Sequence[Line], notes: Sequence[str] = ()
-) -> Recording:
-    """Return a recording that says which channels its lines are, in their order, and which of them never change."""
-    still = tuple(name for name, line in recording.lines.items() if (line == line[0]).all())
+def flow_of(path: Path, wanted: Channels, parts: Parts) -> Flow:
+    """Return the recording of a file that comes in parts."""
+    flow = Flow(wanted.lines, parts, functools.partial(check_edges, path))
+    with suppress(OSError, ValueError):
+        flow.size = path.stat().st_size
+    return flow
+
+
+def position(file: Any) -> int:
+    """Return how many bytes of a file have been read, before they are unpacked; 0 of a pipe."""
+    file = getattr(file, "fileobj", file)
+    return int(file.tell()) if file.seekable() else 0
+
+
+def source_of(
+    wanted: Channels, channels: Mapping[int, str], lines: Sequence[Line], notes: Sequence[str] = ()
+) -> Source:
+    """Return which channels the lines are that were wanted; a `Flow` adds what is counted."""
     names = [channels[number] + ("" if bit is None else f"[{bit}]") for number, bit in lines]
     numbers = {line.number for line in lines}
-    source = Source(
-        lines=dict(zip(recording.lines, names, strict=True)),
-        duration=recording.duration,
-        n_changes=len(recording.time) - 1,
-        still=still,
-        unused={number: name for number, name in channels.items() if number not in numbers},
-        notes=tuple(notes),
-    )
-    return replace(recording, source=source)
+    unused = {number: name for number, name in channels.items() if number not in numbers}
+    return Source(dict(zip(wanted.lines, names, strict=True)), 0.0, -1, unused=unused, notes=tuple(notes))

@@ -11,9 +11,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from tachometry.sim.captures.file import ANY, CaptureError, Channels, OptionError, check_regular, reading
+from tachometry.sim.captures.file import ANY, CaptureError, Channels, OptionError, check_regular, flow_of, reading
 from tachometry.sim.captures.waveform import Changes, Names, Variable
-from tachometry.sim.signals.recording import Recording
+from tachometry.sim.signals.flow import Flow, Parts
 from tachometry.sim.signals.temporary import run_tool
 
 _HEADER = struct.Struct(">BQQQ")  # type of the first block, its length, time of the beginning and of the end
@@ -41,7 +41,7 @@ def _head(path: Path, samplerate_hz: float | None) -> bytes:
     return head
 
 
-def read_fst(path: str | os.PathLike[str], wanted: Channels = ANY, samplerate_hz: float | None = None) -> Recording:
+def read_fst(path: str | os.PathLike[str], wanted: Channels = ANY, samplerate_hz: float | None = None) -> Flow:
     """Read two to four lines of an FST file: variables of one bit, or bits of vectors, as of `read_vcd`.
 
     Bit 0 of a vector is its last one, as pywellen does not tell how it was declared. It raises CaptureError if pywellen
@@ -49,7 +49,10 @@ def read_fst(path: str | os.PathLike[str], wanted: Channels = ANY, samplerate_hz
     never is 0 or 1.
     """
     path = Path(path)
-    head = _head(path, samplerate_hz)
+    return flow_of(path, wanted, _parts(path, wanted, _head(path, samplerate_hz)))
+
+
+def _parts(path: Path, wanted: Channels, head: bytes) -> Parts:
     known: dict[str, Any] = json.loads(_printed(path))
     if not known["unit"]:
         raise CaptureError(f"{path} must have a unit of its times")
@@ -57,19 +60,19 @@ def read_fst(path: str | os.PathLike[str], wanted: Channels = ANY, samplerate_hz
     for name, _ in known["variables"]:
         names.add(name)
     variables = [Variable(name, size, code, size - 1, 0) for code, (name, size) in enumerate(known["variables"])]
-    changes = Changes(path, variables, wanted)
+    factor, power = known["unit"]
+    changes = Changes(path, variables, wanted, factor * Fraction(10) ** power)
     codes = sorted(map(int, changes.codes))
     *_, end = _HEADER.unpack(head)
     time = -1
     for row in re.finditer(r"(\d+) (\d+) (.*)\n", _printed(path, *codes)):
         time = int(row[1])
-        changes.at(time)
+        yield from changes.at(time)
         changes.change(int(row[2]), row[3])
     if head[0] == _PLAIN and end > time:
-        changes.at(end)
-    factor, power = known["unit"]
+        yield from changes.at(end)
     notes = [f"bit 0 of {variables[code].name} is its last one" for code in codes if variables[code].size > 1]
-    return changes.recording(factor * Fraction(10) ** power, notes)
+    return (yield from changes.end(notes))
 
 
 def _printed(path: Path, *codes: int) -> str:

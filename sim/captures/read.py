@@ -5,7 +5,7 @@ import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from tachometry.sim.captures.file import SAME, CaptureError, Channel, Channels, OptionError, is_stream, kind_of
 from tachometry.sim.captures.fst import read_fst
@@ -13,14 +13,18 @@ from tachometry.sim.captures.header import PLAIN, TextOptions
 from tachometry.sim.captures.sigrok import read_sr
 from tachometry.sim.captures.text import read_csv
 from tachometry.sim.captures.vcd import read_vcd
+from tachometry.sim.signals.flow import Flow
 from tachometry.sim.signals.recording import Recording
+from tachometry.sim.signals.source import Source
 from tachometry.spec import CoreSpec
+
+Held = TypeVar("Held", Recording, Flow)
 
 
 class Reader(Protocol):
     """Describes a function that reads one kind of capture."""
 
-    def __call__(self, path: Path, wanted: Channels, samplerate_hz: float | None, /) -> Recording: ...
+    def __call__(self, path: Path, wanted: Channels, samplerate_hz: float | None, /) -> Recording | Flow: ...
 
 
 TEXTS = (".csv", ".txt", ".tsv", ".teeth", ".msl")
@@ -36,7 +40,7 @@ _EXPORTS = {
 }
 
 
-def _reader(path: Path, text: TextOptions) -> Callable[..., Recording]:
+def _reader(path: Path, text: TextOptions) -> Callable[..., Recording | Flow]:
     """Return the reader of a file; it raises CaptureError if there is none, OptionError if it takes no such option."""
     kind = kind_of(path)
     reader = READERS.get(kind) if path.suffix.lower() != ".gz" or kind in PACKED else None
@@ -77,39 +81,51 @@ def read_capture(
 
     It raises CaptureError if the suffix is another one, or what the reader of that kind raises.
     """
-    path = Path(path)
-    reader = _reader(path, text)
     given = {name: channel for name, channel in others.items() if channel is not None}
-    recording = reader(path, Channels(a, b, given), samplerate_hz)
-    if is_stream(path):
-        return recording
-    return _with_moving(recording, lambda number: reader(path, Channels(number, SAME), samplerate_hz))
+    return read_parts(Path(path), Channels(a, b, given), samplerate_hz, text).whole()
 
 
-def _with_moving(recording: Recording, read: Callable[[int], Recording]) -> Recording:
-    """Return a recording that says which channels change that it has not taken, if one that it has taken does not."""
-    source = recording.source
-    if source is None or not source.still:
-        return recording
+def read_parts(path: Path, wanted: Channels, samplerate_hz: float | None, text: TextOptions) -> Flow:
+    """Return a capture in parts, see `read_capture`."""
+    reader = _reader(path, text)
+    flow = _flow(reader(path, wanted, samplerate_hz))
+    if not is_stream(path):
+        flow.told = lambda source: _with_moving(source, lambda n: reader(path, Channels(n, SAME), samplerate_hz))
+    return flow
+
+
+def _flow(found: Recording | Flow) -> Flow:
+    return found if isinstance(found, Flow) else Flow.of(found)
+
+
+def _with_moving(source: Source, read: Callable[[int], Recording | Flow]) -> Source:
+    """Return a source that says which channels change that were not taken, if a line that was taken does not."""
+    if not source.still:
+        return source
 
     def moves(number: int) -> bool:
         try:
-            return len(read(number).time) > 1
+            return _flow(read(number)).moves()
         except CaptureError:  # it is no line of levels
             return False
 
     moving = tuple(name for number, name in list(source.unused.items())[:_LOOKED_AT] if moves(number))
-    return replace(recording, source=replace(source, moving=moving))
+    return replace(source, moving=moving)
 
 
-def with_last_tick(recording: Recording, spec: CoreSpec) -> Recording:
+def with_last_tick(recording: Held, spec: CoreSpec) -> Held:
     """Return a list of edges with the tick of its last edge: the levels after it hold until the core has shown this
     tick.
 
     What ends later than with an edge ends where it says, and external ticks end with the capture.
     """
-    if spec.tachometer.external_tick or recording.duration > recording.time[-1]:
+    if spec.tachometer.external_tick:
         return recording
     clocks = spec.latency.pin_to_count + spec.tick.longest + spec.latency.tick + spec.latency.tick_to_velocity
     # One clock more for the edge, which is seen at the next one, and one for rounding.
-    return replace(recording, duration=recording.duration + (clocks + 2) / spec.timing.clock_hz)
+    tail_s = (clocks + 2) / spec.timing.clock_hz
+    if isinstance(recording, Flow):
+        recording.tail_s = tail_s
+    elif recording.duration <= recording.time[-1]:
+        return replace(recording, duration=recording.duration + tail_s)
+    return recording

@@ -13,7 +13,7 @@ import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -27,11 +27,12 @@ from tachometry.sim.captures.file import (
     check_edges,
     check_regular,
     choose_channels,
-    named,
     reading,
+    source_of,
     writing,
 )
 from tachometry.sim.signals.axes import AxesTrace, Trace
+from tachometry.sim.signals.flow import Flow
 from tachometry.sim.signals.recording import Recording
 
 CHUNK = 4 << 20  # bytes, as sigrok cuts its own
@@ -71,8 +72,8 @@ def read_sr(
     if n_samples == 0:
         raise CaptureError(f"{path} must have at least one sample, not 0")
     duration = float(divide(np.array([n_samples]), rate, up=True)[0])
-    recording = Recording.of_level(divide(sample, rate, up=False), level, duration, ("a", "b", *wanted.others))
-    return named(recording, session.channels, lines)
+    recording = Recording.of_level(divide(sample, rate, up=False), level, duration, wanted.lines)
+    return Flow.of(replace(recording, source=source_of(wanted, session.channels, lines))).whole()
 
 
 def write_sr(path: str | os.PathLike[str], trace: Trace, clock_hz: int, *, _chunk: int = CHUNK) -> None:

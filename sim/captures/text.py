@@ -20,8 +20,10 @@ from tachometry.sim.captures.file import (
     OptionError,
     check_edges,
     choose_channels,
-    named,
+    flow_of,
+    position,
     reading,
+    source_of,
     writing,
 )
 from tachometry.sim.captures.header import PLAIN, Header, TextOptions, check_seconds, read_header
@@ -29,6 +31,7 @@ from tachometry.sim.captures.rows import BLOCK, Lines, Times, blocks, check_rows
 from tachometry.sim.captures.series import ANGLES, unit_in
 from tachometry.sim.captures.text_layout import split
 from tachometry.sim.signals import files
+from tachometry.sim.signals.flow import Flow, Part, Parts
 from tachometry.sim.signals.recording import Recording, packed
 from tachometry.sim.signals.source import Source
 from tachometry.spec.language.units import plural
@@ -42,8 +45,8 @@ def read_csv(
     samplerate_hz: float | None = None,
     options: TextOptions = PLAIN,
     *,
-    _block: int = BLOCK,
-) -> Recording:
+    _block: int | None = None,
+) -> Flow:
     """Read two to four channels of a text with a line of names, such as `time,a,b`, and levels, see
     docs/guides/captures.md.
 
@@ -55,6 +58,10 @@ def read_csv(
     in a column. Other arguments are as of `read_sr`. It raises CaptureError for a file or a row that is none of this.
     """
     path = Path(path)
+    return flow_of(path, wanted, _parts(path, wanted, samplerate_hz, options, _block or BLOCK))
+
+
+def _parts(path: Path, wanted: Channels, samplerate_hz: float | None, options: TextOptions, block: int) -> Parts:
     if (own := options.pulse_periods if options.pulse_times is None else options.pulse_times) is not None:
         options = replace(options, time=own)
     with reading(path), opened(path) as file:
@@ -63,18 +70,22 @@ def read_csv(
             raise CaptureError(f"{path} has outputs of a core, from {option}: replay what --save-capture wrote")
         header = read_header(path, source.head, options, samplerate_hz)
         if own is not None or not header.channels:
-            return _pulses(path, source, header, options, one_line=wanted.b == SAME)
+            pulses = _pulses(path, source, header, options, one_line=wanted.b == SAME)
+            return (yield from Flow.of(pulses).parts)
         if len(header.channels) == 1 and wanted.a is None and wanted.b is None:
             _refuse_numbers(path, source, header)
         lines = choose_channels(path, header.channels, wanted, header.channels)
-        times, pins, changes = Times(path, header), _Pins(path, header, options, lines), _Changes(path)
-        for number, columns in blocks(path, source, header, _block):
-            changes.add(times.of(number, columns), pins.of(number, columns))
+        times, pins, changes = Times(path, header), _Pins(path, header, options, lines), _Changes(header)
+        apart = np.empty(0)
+        for number, columns in blocks(path, source, header, block):
+            if (part := changes.part(times.of(number, columns), pins.of(number, columns))) is not None:
+                if not apart.size:
+                    apart = np.diff(part.time[1:][np.diff(part.level & 3) != 0])
+                    check_seconds(path, header, options.slowest_s, apart, "edges", whole=times.whole)
+                yield part._replace(read=position(file.buffer))
         pins.check_end(source.ended)
-    recording = changes.recording(header, ("a", "b", *wanted.others))
-    apart = np.diff(recording.time[1:][(np.diff(recording.a) != 0) | (np.diff(recording.b) != 0)])
-    check_seconds(path, header, options.slowest_s, apart, "edges", whole=times.whole)
-    return named(recording, header.channels, lines, (*times.notes, *pins.notes, *changes.notes))
+        yield changes.end(path)
+    return source_of(wanted, header.channels, lines, (*times.notes, *pins.notes, *changes.notes))
 
 
 def _pulses(path: Path, source: Lines, header: Header, options: TextOptions, *, one_line: bool) -> Recording:
@@ -174,39 +185,33 @@ def _option_for(name: str, unit: str, texts: Sequence[str]) -> Callable[[str], s
 
 
 class _Changes:
-    """Keeps the rows that change a line, from that on in which all levels are known."""
+    """Gives the rows that change a line, from that on in which all levels are known."""
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._times: list[NDArray[np.float64]] = []
-        self._levels: list[NDArray[np.uint8]] = []
+    def __init__(self, header: Header) -> None:
+        self._header = header
         self._start = self._end = 0.0
-        self._n, self._last, self._unknown = 0, -1, 0
+        self._last, self._unknown = -1, 0
 
-    def add(self, time: NDArray[np.float64], levels: NDArray[np.int8]) -> None:
-        """Add a block of rows."""
+    def part(self, time: NDArray[np.float64], levels: NDArray[np.int8]) -> Part | None:
+        """Return those of a block of rows; None if no levels are known."""
         known = (levels != cell_parsers.HELD).all(axis=0)
         self._unknown += int(np.count_nonzero(~known))
         if not known.any():
-            return
+            return None
         time, level = time[known], packed([line[known].astype(np.uint8) for line in levels])
         if self._last < 0:
             self._start = float(time[0])
         changed = np.diff(level.astype(np.int16), prepend=np.int16(self._last)) != 0
-        self._times.append(time[changed] - self._start)
-        self._levels.append(level[changed])
-        self._n += len(self._levels[-1])
-        check_edges(self._path, self._n)
-        self._last, self._end = int(level[-1]), float(time[-1])
+        self._last, self._end = int(level[-1]), float(time[-1]) - self._start
+        *seconds, until = self._header.seconds(np.append(time[changed] - self._start, self._end))
+        return Part(np.array(seconds), level[changed], float(until))
 
-    def recording(self, header: Header, lines: Sequence[str]) -> Recording:
-        """Return what was kept."""
-        if not self._levels:
+    def end(self, path: Path) -> Part:
+        """Return no further row, up to the end."""
+        if self._last < 0:
             what = "in which all levels are known" if self._unknown else "after its header"
-            raise CaptureError(f"{self._path} must have at least one row {what}, not 0")
-        duration = header.duration(self._end - self._start)
-        time = header.seconds(np.concatenate(self._times))
-        return Recording.of_level(time, np.concatenate(self._levels), duration, lines)
+            raise CaptureError(f"{path} must have at least one row {what}, not 0")
+        return Part(np.empty(0), np.empty(0, dtype=np.uint8), self._header.duration(self._end))
 
     @property
     def notes(self) -> list[str]:

@@ -2,14 +2,24 @@
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
-from tachometry.sim.captures.file import ANY, CaptureError, Channels, OptionError, opened_bytes, reading
+from tachometry.sim.captures.file import (
+    ANY,
+    CaptureError,
+    Channels,
+    OptionError,
+    flow_of,
+    opened_bytes,
+    position,
+    reading,
+)
 from tachometry.sim.captures.waveform import Changes, Names, Variable
-from tachometry.sim.signals.recording import Recording
+from tachometry.sim.signals.flow import Flow, Part, Parts
 
 _PIECE = 1 << 20  # bytes read at once
 _LONGEST = 1 << 16  # bytes of a word
@@ -22,7 +32,7 @@ _SCALARS, _WITH_BLANK = b"01xXzZuUwWlLhH-", b"bBrRsS"  # how changes begin, of o
 _SECTIONS = (b"$dumpvars", b"$dumpall", b"$dumpon", b"$dumpoff", b"$end")
 
 
-def read_vcd(path: str | os.PathLike[str], wanted: Channels = ANY, samplerate_hz: float | None = None) -> Recording:
+def read_vcd(path: str | os.PathLike[str], wanted: Channels = ANY, samplerate_hz: float | None = None) -> Flow:
     """Read two to four lines of a Value Change Dump: variables of one bit, or bits of vectors.
 
     The recording begins when all of them have first been 0 or 1, and ends with the last time in the file. Where a line
@@ -38,12 +48,17 @@ def read_vcd(path: str | os.PathLike[str], wanted: Channels = ANY, samplerate_hz
     path = Path(path)
     if samplerate_hz is not None:
         raise OptionError("samplerate", f"must not be given for {path}: a waveform has its times")
+    return flow_of(path, wanted, _parts(path, wanted))
+
+
+def _parts(path: Path, wanted: Channels) -> Parts:
     with reading(path), opened_bytes(path) as file:
         words = _Words(path, file)
         variables, codes, unit = _declarations(path, words)
-        changes = Changes(path, variables, wanted)
-        last = _read_changes(path, words, codes, changes)
-        return changes.recording(unit, words.end_notes(last, codes))
+        changes = Changes(path, variables, wanted, unit)
+        changes.position = partial(position, file)
+        last = yield from _read_changes(path, words, codes, changes)
+        return (yield from changes.end(words.end_notes(last, codes)))
 
 
 class _Words:
@@ -161,7 +176,7 @@ def _check_length(path: Path, name: str) -> None:
         raise CaptureError(f"names of {path} with their scopes must have at most {_LONGEST_NAME} characters")
 
 
-def _read_changes(path: Path, words: _Words, codes: set[bytes], changes: Changes) -> bytes:
+def _read_changes(path: Path, words: _Words, codes: set[bytes], changes: Changes) -> Generator[Part, None, bytes]:
     """Read all changes; return the code in the last one, or nothing if a time or a section came later."""
     wanted, now, code = changes.codes, b"0", b""
     for word in words.rest:
@@ -170,7 +185,7 @@ def _read_changes(path: Path, words: _Words, codes: set[bytes], changes: Changes
             now, code = code, b""
             if len(now) > _LATEST or not re.fullmatch(rb"[0-9]+(\.[0-9]+)?", now):
                 raise _incomplete(path, f"{_shown(word)} must be # and a time of at most {_LATEST} digits")
-            changes.at(int(now) if now.isdigit() else Fraction(now.decode()))
+            yield from changes.at(int(now) if now.isdigit() else Fraction(now.decode()))
             continue
         if head == b"$":
             code = b""

@@ -1,7 +1,6 @@
 """Variables of a waveform, whatever file it is in, become the lines of a recording."""
 
-from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -9,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tachometry.sim.captures.file import CaptureError, Channels, check_edges, choose_channels, named
-from tachometry.sim.signals.recording import Recording
+from tachometry.sim.captures.file import CaptureError, Channels, choose_channels, source_of
+from tachometry.sim.signals.flow import ROWS, Part, Parts
 from tachometry.spec.language.units import plural
 
 Code = bytes | int  # what a file calls a variable
@@ -56,15 +55,16 @@ class Names:
 
 
 class Changes:
-    """Recording in the making, from changes of variables.
+    """Parts of a recording in the making, from changes of variables; `unit` is how many seconds one of their times is.
 
     It begins when all lines have first been 0 or 1. What is neither, later on, is as before. Lines are given as to
     `choose_channels`; numbers count the variables of one bit, and what is
     declared twice is one of them.
     """
 
-    def __init__(self, path: Path, variables: Sequence[Variable], wanted: Channels) -> None:
-        self._path, self._lines = path, ("a", "b", *wanted.others)
+    def __init__(self, path: Path, variables: Sequence[Variable], wanted: Channels, unit: Fraction) -> None:
+        self._path, self._wanted, self._unit = path, wanted, unit
+        self.position: Callable[[], int] = int  # gives the bytes of the file that have been read
         ordered = sorted(dict.fromkeys(variables), key=lambda variable: variable.size > 1)
         self._names = {number: variable.name for number, variable in enumerate(ordered)}
         scalars = {number: self._names[number] for number, variable in enumerate(ordered) if variable.size == 1}
@@ -75,9 +75,10 @@ class Changes:
         self._value = {variable.code: "x" for variable, _ in of}
         self._last: list[int | None] = [None] * len(of)
         self._gap, self._gaps = [False] * len(of), 0
-        # Of 9 bytes a change; a time that 64 bits do not hold makes them a list.
-        self._times: array[int] | list[int | Fraction] = array("q")
+        self._times = list[int | Fraction]()
         self._rows = bytearray()
+        self._row: int | None = None  # the last one
+        self._first: int | Fraction = 0
         self._begin: int | Fraction | None = None
         self._now: int | Fraction = 0
         self._changed = False
@@ -87,14 +88,16 @@ class Changes:
         """Those of the variables that lines are taken from."""
         return frozenset(self._value)
 
-    def at(self, time: int | Fraction) -> None:
-        """Go on to a time; CaptureError if it is before the last one."""
+    def at(self, time: int | Fraction) -> Iterator[Part]:
+        """Go on to a time, and give the rows before, if they are many; CaptureError if it is before the last one."""
         self._settle()
         if self._begin is None:
             self._begin = time
         elif time < self._now:
             raise CaptureError(f"times of {self._path} must not decrease, as from {self._now} to {time}")
         self._now = time
+        if len(self._rows) >= ROWS:
+            yield self._part()
 
     def change(self, code: Code, value: str) -> None:
         """Give a variable another value, its first bit first."""
@@ -114,13 +117,11 @@ class Changes:
         self._gap = gap
         self._last = [last if level is None else level for level, last in zip(levels, self._last, strict=True)]
         row = sum(level << line for line, level in enumerate(self._last) if level is not None)
-        if None not in self._last and (not self._rows or row != self._rows[-1]):
-            try:
-                self._times.append(self._now)  # type: ignore[arg-type]
-            except (OverflowError, TypeError):
-                self._times = [*self._times, self._now]
+        if None not in self._last and row != self._row:
+            self._first = self._now if self._row is None else self._first
+            self._row = row
+            self._times.append(self._now)
             self._rows.append(row)
-            check_edges(self._path, len(self._rows))
 
     def _level(self, variable: Variable, position: int) -> int | None:
         """Return the level of a line; None if there is none."""
@@ -136,22 +137,28 @@ class Changes:
         first = "0" if value[0] in _LEVELS else value[0]
         return _LEVELS.get(value[-1 - position] if position < len(value) else first)
 
-    def recording(self, unit: Fraction, notes: Sequence[str] = ()) -> Recording:
-        """Return the recording up to the last time, in a unit of so many seconds."""
+    def end(self, notes: Sequence[str] = ()) -> Parts:
+        """Give the last rows, up to the last time."""
         self._settle()
-        if not self._times:
+        if self._row is None:
             raise CaptureError(f"{self._path} must contain the levels of all lines, 0 or 1, at least once")
-        first, told = self._times[0], list(notes)
-        if first > (self._begin or 0):
-            at = float(first * unit.numerator / unit.denominator)
+        yield self._part()
+        told = list(notes)
+        if self._first > (self._begin or 0):
+            at = float(self._first * self._unit.numerator / self._unit.denominator)
             told.append(f"begins at {at:.9g} s of the waveform, where all lines have been 0 or 1")
         if self._gaps:
             told.append(f"{plural(self._gaps, 'change')} to x or z: the level before holds there")
-        exact = (float((time - first) * unit.numerator / unit.denominator) for time in self._times)
-        seconds = np.fromiter(exact, np.float64, len(self._times))
-        duration = float((self._now - first) * unit.numerator / unit.denominator)
-        recording = Recording.of_level(seconds, np.frombuffer(self._rows, dtype=np.uint8), duration, self._lines)
-        return named(recording, self._names, self._chosen, told)
+        return source_of(self._wanted, self._names, self._chosen, told)
+
+    def _part(self) -> Part:
+        first, unit = self._first, self._unit
+        *seconds, until = (
+            float((time - first) * unit.numerator / unit.denominator) for time in (*self._times, self._now)
+        )
+        part = Part(np.array(seconds), np.frombuffer(self._rows, dtype=np.uint8), until, self.position())
+        self._times, self._rows = [], bytearray()
+        return part
 
 
 def _default(names: Mapping[int, str], wanted: Channels) -> Channels:

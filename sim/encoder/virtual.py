@@ -4,6 +4,7 @@ The truth is computed from the shaft's angle, never from the lines, so that it c
 """
 
 import math
+from collections.abc import Generator
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, cached_property
@@ -18,7 +19,7 @@ from tachometry.sim.encoder.crossings import Disc, IntArray, find_crossings, pas
 from tachometry.sim.encoder.imperfections import BOUNCE, ILLEGAL, JITTER, LOST, NONUNIFORMITY
 from tachometry.sim.encoder.motion import FloatArray, Motion, Vibration, sin2pi
 from tachometry.sim.encoder.options import EncoderOptions
-from tachometry.sim.signals.flow import Flow, Part, Parts
+from tachometry.sim.signals.flow import Flow, Part
 from tachometry.sim.signals.memory import EDGE, check_memory
 from tachometry.sim.signals.recording import MAX_EDGES, Recording, packed, quadrature
 from tachometry.spec import Encoder, TachometerSpec
@@ -211,7 +212,7 @@ class VirtualEncoder(EncoderOptions):
         flow = Flow((*rest.wires,), self._parts(motion, rest, start), lambda _: self._check(motion), motion.duration)
         return flow, Encoding(self, motion, rest, 0, 0)
 
-    def _parts(self, motion: Motion, rest: Recording, quarter: IntArray) -> Parts:
+    def _parts(self, motion: Motion, rest: Recording, quarter: IntArray) -> Generator[Part, None, None]:
         """Yield the recording of a motion that begins with a row and in a quarter, see `flow`."""
         yield Part(rest.time, rest.level, 0.0)
         before, random, end = 0.0, self._stream(JITTER), np.full(1, motion.duration)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
@@ -96,7 +97,7 @@ class Simulation:
 
     spec: CoreSpec
     engine: str  # what has run the hardware
-    wanted: int  # clocks that it was to run; after Ctrl-C it has run fewer
+    wanted: int | None  # clocks that it was to run, if it is known; after Ctrl-C it has run fewer
     lockstep: Lockstep  # of a run in pieces, the last rows, and pins of the first ones
     tally: Tally  # numbers of all rows of the core
     axes: tuple[Axis, ...]
@@ -104,7 +105,7 @@ class Simulation:
     @property
     def interrupted(self) -> bool:
         """Whether it ended early."""
-        return self.lockstep.actual.n_clocks < self.wanted
+        return self.wanted is None or self.lockstep.actual.n_clocks < self.wanted
 
 
 def _pulsed(spec: CoreSpec, source: str, trace: PinTrace, pulses: Pulses) -> PinTrace:
@@ -135,22 +136,36 @@ def _placed(spec: CoreSpec, source: str, held: Sequence[Recording | Flow], pulse
     if isinstance(held[0], Flow):
         pulses(spec.tachometer)
         yield from held[0].pieces(spec.tachometer, PIECE * spec.timing.tick_cycles)
+        _lasts(spec, source, held)
     elif spec.axes is not None:
         yield AxesTrace.placed(wholes, spec)
     else:
         yield _pulsed(spec, source, PinTrace.of(wholes[0], spec), pulses)
 
 
-def _lasts(spec: CoreSpec, source: str, held: Recording | Flow, first: Trace) -> int:
-    """Return how many clocks are to be run; ValueError if there is nothing to report then."""
-    duration = held.duration if isinstance(held, Flow) else None
-    n_clocks = first.n_clocks if duration is None else max(int(duration * spec.timing.clock_hz), 1)
+def _lasts(spec: CoreSpec, source: str, held: Sequence[Recording | Flow]) -> int | None:
+    """Return how many clocks are to be run, if it is known; ValueError if there is nothing to report then."""
+    durations = [one.duration for one in held if one.duration is not None]
+    if not durations:
+        return None
+    n_clocks = max(int(max(durations) * spec.timing.clock_hz), 1)
     if n_clocks < (fewest := _fewest(spec)):
         raise ValueError(
             f"{source} must last at least {fewest} clocks of --clock ({format_time(spec.tick.seconds(fewest))}), "
             f"a tick and its latency, not {n_clocks}"
         )
     return n_clocks
+
+
+@contextmanager
+def _bar(bar: Bar, held: Recording | Flow, n_clocks: int | None) -> Iterator[Callable[[float], None]]:
+    """Show how many clocks have been run, or how much of a file, if they are not known."""
+    if isinstance(held, Flow) and n_clocks is None and held.size:
+        with bar("simulating", held.size, "bytes", rate=True) as progress:
+            yield lambda _: progress(held.read)
+    else:
+        with bar("simulating", n_clocks or 0, "clocks", rate=True) as progress:
+            yield progress
 
 
 def simulate(
@@ -171,7 +186,7 @@ def simulate(
     held = [_held(recording, whole=whole) for recording in recordings]
     tally, speed = Tally(spec.tachometer), truths[0].true_speed if truths else None
     trace = next(pins := _placed(spec, source, held, running.pulses))
-    n_clocks = _lasts(spec, source, held[0], trace)
+    n_clocks = _lasts(spec, source, held)
     shown, vcd = running.window(spec, trace.n_clocks), running.vcd
 
     def take(run: Run) -> None:
@@ -180,19 +195,19 @@ def simulate(
             tally.hold(run, speed)
         running.sink(run, tally)
 
-    with running.bar("simulating", n_clocks, "clocks", rate=True) as progress:
+    with _bar(running.bar, held[0], n_clocks) as progress:
         watch = Watch(vcd, shown, progress)
         if whole:
             take((found := lockstep(spec, trace, chosen, watch=watch, fewest=_fewest(spec))).actual)
         else:
-            engine = partial(engine, n_clocks=n_clocks, watch=watch)
+            engine = partial(engine, n_clocks=n_clocks or 1 << 62, watch=watch)
             found = _in_pieces(spec.tachometer, chain([trace], pins), engine, take)
     missing = " (there is no C++ compiler)" if (running.engine, chosen.name) == ("auto", "pysim") else ""
     known: Sequence[Encoding | None] = truths or [None] * len(held)
     axes = tuple(_axis(spec, found.actual, tally, n, *of) for n, of in enumerate(zip(held, known, strict=True)))
     if vcd is not None:
         add_curves(vcd, spec.timing.clock_hz, (shown[0], min(shown[1], found.actual.n_clocks)), _curves(axes))
-    return Simulation(spec, chosen.name + missing, n_clocks, found, tally, axes)
+    return Simulation(spec, chosen.name + missing, _lasts(spec, source, held), found, tally, axes)
 
 
 def _in_pieces(

@@ -149,4 +149,4 @@ def test_wrong_row(tmp_path: Path, row: str, message: str, block: int) -> None:
     path = make_csv(tmp_path / "x.csv", f"time,a,b\n0,0,1\n0.5,1,1\n{row}\n3,1,1\n")
     assert_error(path, message)
     with pytest.raises(CaptureError, match=f"^{re.escape(message.replace('PATH', str(path)))}$"):
-        read_csv(path, _block=block)
+        read_csv(path, _block=block).whole()

@@ -1,7 +1,6 @@
 """Waveforms as captures."""
 
 import re
-import tracemalloc
 from fractions import Fraction
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import numpy as np
 import pytest
 from support.captures import assert_same
 
-from tachometry.sim.captures import vcd
+from tachometry.sim.captures import vcd, waveform
 from tachometry.sim.captures.file import CaptureError, Channels
 from tachometry.sim.captures.read import read_capture
 from tachometry.sim.captures.waveform import Changes, Variable
@@ -17,6 +16,7 @@ from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines.engine import Watch
 from tachometry.sim.engines.pysim import PySim
+from tachometry.sim.signals.flow import Part
 from tachometry.spec import Encoder, STachometer, Timing
 
 HEAD = """$timescale 10 ns $end
@@ -168,19 +168,20 @@ def test_of_many_variables_those_are_shown_that_are_near(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("late", [10**4, 10**19, Fraction(3, 2)], ids=str)
-def test_a_change_takes_some_bytes(late: Fraction | int) -> None:
-    """Its time is exact, also beyond 64 bits and with a fraction."""
-    n, step = 20_000, 10_000
-    changes = Changes(Path("c.vcd"), [Variable(name, 1, name.encode(), 0, 0) for name in "ab"], Channels())
-    tracemalloc.start()
+def test_changes_come_in_parts(late: Fraction | int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their times are exact, also beyond 64 bits and with a fraction."""
+    n, step, unit = 20, 10_000, Fraction(1, 10**9)
+    monkeypatch.setattr(waveform, "ROWS", 6)
+    variables = [Variable(name, 1, name.encode(), 0, 0) for name in "ab"]
+    changes, parts = Changes(Path("c.vcd"), variables, Channels(), unit), list[Part]()
     for k in range(n):
-        changes.at(step * k)
+        parts += changes.at(step * k)
         changes.change(b"a", "01"[k % 2])
         changes.change(b"b", "0")
-    used = tracemalloc.get_traced_memory()[0]
-    tracemalloc.stop()
-    assert 9 * (n - 1) < used < 14 * n
-    changes.at(step * n + late)
+    parts += changes.at(step * n + late)
     changes.change(b"b", "1")
-    time = changes.recording(Fraction(1, 10**9)).time
-    assert time.tolist() == [*(step * k / 1e9 for k in range(n)), float((step * n + late) / Fraction(10**9))]
+    parts += changes.end()
+    assert [len(part.time) for part in parts] == [6, 6, 6, 3]
+    times = [*(step * k / 1e9 for k in range(n)), float((step * n + late) / Fraction(10**9))]
+    assert np.concatenate([part.time for part in parts]).tolist() == times
+    assert [part.until for part in parts] == [times[6], times[12], times[18], times[-1]]

@@ -23,6 +23,7 @@ CASES = [
     f"mt {FAST} --whole-cycles --filter 4us --blanking 9us",
     f"track {SLOW} --smooth --sensor step-dir",
     f"m {BASE} --tick 40us --sensor hall",
+    f"m {BASE} --tick 40us --decoding 2 --blanking 30us",
 ]
 
 

@@ -1,12 +1,18 @@
 """A recording in parts is the whole, in what the pins see and in what it says of itself."""
 
 from functools import reduce
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from support.captures import assert_same
 
+from tachometry.sim.captures import text, waveform
+from tachometry.sim.captures.file import Channels
+from tachometry.sim.captures.header import PLAIN
+from tachometry.sim.captures.read import read_parts, with_last_tick
+from tachometry.sim.captures.sigrok import write_sr
 from tachometry.sim.encoder import crossings
 from tachometry.sim.encoder.imperfections import Bounce
 from tachometry.sim.encoder.motion import Vibration, parse_motion
@@ -64,3 +70,34 @@ def test_pieces_are_what_the_pins_see(clock_hz: int, monkeypatch: pytest.MonkeyP
     assert (parts.n_changes, parts.n_together) == (recording.n_changes, recording.n_together)
     assert merged[-1] > 0
     assert parts.n_together > 0
+
+
+@pytest.mark.parametrize("suffix", [".vcd", ".csv", ".sr"])
+@pytest.mark.parametrize("end", ["", "#60000\n"])
+def test_files_in_parts(suffix: str, end: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file that ends with an edge is held for a tick more; Z never changes, but X does."""
+    spec = of_texts("m", {"ppr": "25", "clock": "1MHz", "tick": "1ms"}).tachometer
+    path, motion = tmp_path / f"x{suffix}", parse_motion("constant:90rad/s:50ms")
+    recording = VirtualEncoder(25).record(motion).recording
+    if suffix == ".sr":
+        write_sr(path, recording.place(20_000), 20_000)
+    else:
+        rows = zip(np.rint(recording.time * 1e6).astype(int).tolist(), recording.a, recording.b, strict=True)
+        form = "#{0}\n{1}!\n{2}$\n0z\n{2}x\n" if suffix == ".vcd" else "{0},{1},{2},0,{2}\n"
+        names = "".join(f"$var wire 1 {code} {name} $end\n" for code, name in zip("!$zx", "abzx", strict=True))
+        head = f"$timescale 1 us $end {names} $enddefinitions $end\n" if suffix == ".vcd" else "time_us,a,b,z,x\n"
+        last = end if suffix == ".vcd" or not end else "60000,0,0,0,0\n"
+        path.write_text(head + "".join(form.format(*row) for row in rows) + last)
+    wanted = Channels(others={} if suffix == ".sr" else {"z": "z"})
+    capture = with_last_tick(read_parts(path, wanted, None, PLAIN).whole(), spec)
+    monkeypatch.setattr(waveform, "ROWS", 5)
+    monkeypatch.setattr(flow, "ROWS", 5)
+    monkeypatch.setattr(text, "BLOCK", 5)
+    parts = with_last_tick(read_parts(path, wanted, None, PLAIN), spec)
+    assert_same(reduce(PinTrace.then, parts.pieces(spec, 1500)), PinTrace.of(capture, spec))
+    assert parts.source == capture.source
+    assert parts.source is not None
+    assert parts.source.n_changes > 50
+    if suffix != ".sr":
+        assert parts.read == parts.size == path.stat().st_size
+        assert (parts.source.still, parts.source.moving) == (("z",), ("x",))

@@ -6,6 +6,9 @@ import pytest
 from support.nightly import only
 
 from tachometry.cli.main import main
+from tachometry.sim.captures import text as captured
+from tachometry.sim.captures.read import read_capture
+from tachometry.sim.captures.text import write_csv
 from tachometry.sim.encoder import crossings
 from tachometry.sim.studies import simulation
 
@@ -33,13 +36,14 @@ def outputs(words: str, folder: Path, capsys: pytest.CaptureFixture[str], *more:
 def test_pieces_are_the_whole(
     method: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    core, capture = f"--method {method} {METHODS[method]} --engine cxxrtl", tmp_path / "x.sr"
-    for words in (f"simulate {core} {MOTION}", f"simulate {core} {MOTION} --illegal 0.01", f"replay {capture} {core}"):
-        saved = tmp_path / "y.sr" if words.startswith("replay") else capture
+    core, saved, text = f"--method {method} {METHODS[method]} --engine cxxrtl", tmp_path / "x.sr", tmp_path / "x.csv"
+    for words in (f"simulate {core} {MOTION} --illegal 0.01", f"simulate {core} {MOTION}", f"replay {text} {core}"):
         whole = outputs(words, tmp_path / "whole", capsys, f"--save-capture={saved}")
+        write_csv(text, read_capture(saved))
         with monkeypatch.context() as patch:
             patch.setattr(simulation, "PIECE", 7)
             patch.setattr(crossings, "_CHUNK", 100)
+            patch.setattr(captured, "BLOCK", 5)
             assert outputs(words, tmp_path / "pieces", capsys) == whole
     assert b"PASS" in whole["out"]
     assert len(whole["trace.csv"]) > 1000
