@@ -65,6 +65,7 @@ class CoreOptions(TypedDict, total=False):
     paper_exact: bool | None
     parallel: bool | None
     period: Value | None
+    period_offsets: bool | None
     pole_pairs: Value | None
     position_compare: Value | None
     position_fine_bits: Value | None

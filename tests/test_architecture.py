@@ -349,15 +349,20 @@ OTHER_MEANINGS = {
 
 def names_of_extras() -> set[str]:
     """Return the options and ports of cores with every extra."""
-    texts = dict[str, str]()
+    texts, of_reads = dict[str, str](), {"period-offsets": "yes"}
     ports = list[Port]()
     for test in (0, -1):
         for about in (about for extra in EXTRAS for about in options_of(extra)):
+            if about.name in of_reads:
+                continue
             if values := ["yes"] if about.flag else [*filter(None, about.tests or ())]:
                 texts[about.name] = values[test]
-        spec = of_texts("track", {"ppr": "25", "index": "yes", "max-speed": "100rad/s", **texts})
-        ports += [port for extra in spec.extras for port in extra.ports(spec)]
-        ports += [pin.port for pin in spec.front_end.pins if not pin.of]  # wiring has complements, too
+        made = [of_texts("track", {"ppr": "25", "index": "yes", "max-speed": "100rad/s", **texts})]
+        made.append(of_texts("track", {"sensor": "sampled", "bits": "9", "period": "64", **of_reads}))
+        for spec in made:
+            ports += [port for extra in spec.extras for port in extra.ports(spec)]
+            ports += [pin.port for pin in spec.front_end.pins if not pin.of]  # wiring has complements, too
+    texts |= of_reads
     return {*texts, *(name.replace("-", "_") for name in texts), *(port.name for port in ports)}
 
 

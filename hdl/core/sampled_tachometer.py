@@ -69,6 +69,8 @@ class SampledTachometer(Tachometer):
         updates = self.datapath.updates
         shown = {f"native_{name}": updates.p[name] for name in update_layout(self._spec).members}
         taps = {"read_fault": self.read_fault, "phase": self.reader.phase, "native_valid": updates.valid}
+        if "offset_read" in self.datapath.signature.members:
+            taps |= by_name(self.datapath, ("offset_read",))
         return taps | shown
 
 

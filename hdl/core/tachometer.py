@@ -30,6 +30,7 @@ from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import Box, follow, members
 from tachometry.spec import TachometerSpec
 from tachometry.spec.formats.displacement import DISPLACED, MAPPED
+from tachometry.spec.formats.tracking_sampled import EXCHANGED
 from tachometry.spec.language.port import MISSED, TICK, UPDATE, WIDE
 
 
@@ -284,12 +285,8 @@ class Tachometer(Box):
         check_inputs(self._spec, self.extras, {*self.signature.members, *taps})
         place(m, self, self.extras, taps)
         for box in self.extras.values():
-            follow(
-                m,
-                self.datapath,
-                box,
-                box.signature.members.keys() & self.datapath.signature.members.keys() & {*DISPLACED, MAPPED},
-            )
+            given = box.signature.members.keys() & self.datapath.signature.members.keys()
+            follow(m, self.datapath, box, given & {*DISPLACED, MAPPED, *EXCHANGED})
 
     def _taps(self, m: Module) -> dict[str, Value]:
         """Lead inputs of extras through the conditioner, and return what else they may be given, by name.

@@ -10,12 +10,12 @@ from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.methods.datapath import datapath_members
 from tachometry.hdl.methods.settling import SettlingPlace
 from tachometry.hdl.methods.tick_counts import TickCounts
-from tachometry.hdl.methods.track_machine import TrackMachine
+from tachometry.hdl.methods.track_machine import EXCHANGE, TrackMachine
 from tachometry.hdl.wires.ports import Box, drive, follow, only_if
 from tachometry.spec import TrackTachometer
 from tachometry.spec.formats.displacement import DISPLACED
 from tachometry.spec.formats.tracking_code import SMOOTH_DELAY_BITS
-from tachometry.spec.formats.tracking_sampled import SampledTracking
+from tachometry.spec.formats.tracking_sampled import EXCHANGED, SampledTracking
 
 
 def delay_of(shown: Value, time_bits: int) -> Value:
@@ -52,6 +52,7 @@ class TrackMethod(Box):
                 length=In(range(spec.tick.longest + 1)),
             ),  # see `SampledPosition`
             position=In(signed(spec.position_width)),  # valid with `tick`
+            **only_if(spec.form.exchanges, **EXCHANGE),
             **({} if (off := spec.displacement) is None else dict.fromkeys(DISPLACED, In(signed(off.width)))),
         )
 
@@ -119,7 +120,8 @@ class TrackMethod(Box):
     def _take_counts(self, m: Module) -> Value:
         """Give the machine the counts of a tick, or its read; return the ticks since the one before."""
         if (counts := self.tick_counts) is None:
-            follow(m, self.machine, self, ("times", "length"))
+            follow(m, self.machine, self, ("times", "length", *EXCHANGED * self._spec.form.exchanges))
+            follow(m, self, self.machine, ("offset_read",) * self._spec.form.exchanges)
             last = Mux(self.forgets, self._spec.timing.max_ticks, self.silent)
             number = self.number & ~self.forgets
             drive(m, self.machine, {"moved": self.pulse_count, "last": last, "number": number})

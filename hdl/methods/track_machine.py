@@ -14,13 +14,18 @@ from tachometry.hdl.methods.block_unit import BlockUnit
 from tachometry.hdl.methods.serial_unit import SerialUnit
 from tachometry.hdl.methods.track_instruction import encoded, layout_of
 from tachometry.hdl.wires.commented_memory import CommentedMemory
-from tachometry.hdl.wires.ports import by_name
+from tachometry.hdl.wires.ports import by_name, only_if
 from tachometry.spec.formats.tracking import PLACE_BITS, WIDTH
 from tachometry.spec.formats.tracking_code import ADDRESS_BITS, FIRST_INPUT, INPUTS, OUTPUTS, Program
-from tachometry.spec.formats.tracking_instruction import CHOSEN, EARLY, Jump
+from tachometry.spec.formats.tracking_instruction import CHOSEN, EARLY, OFFSETS, Jump
+from tachometry.spec.formats.tracking_sampled import EXCHANGED, OFFSET_BITS
 from tachometry.spec.formats.tracking_units import BLOCK, STAGES, Start
 
 _PLACES_BITS = PLACE_BITS - 1 - 6  # twice the places, over 64
+EXCHANGE = {
+    **dict(zip(EXCHANGED, (In(1), In(2), In(signed(OFFSET_BITS))), strict=True)),
+    "offset_read": Out(signed(OFFSET_BITS)),
+}
 
 
 class TrackMachine(wiring.Component):
@@ -57,6 +62,7 @@ class TrackMachine(wiring.Component):
                 "kind": In(2),  # of the last count's edge
                 "end": In(2),  # kind of the position at the end
                 "down": In(1),  # the last count went backward
+                **only_if(form.exchanges, **EXCHANGE),
                 **dict.fromkeys(program.outputs, Out(signed(WIDTH))),
                 "standstill": Out(1),  # of a tick without a count
             }
@@ -150,6 +156,8 @@ class TrackMachine(wiring.Component):
         self._show(m)
         self._begin(m)
         self._jump(m)
+        if self._program.form.exchanges:
+            self._exchange(m)
         return m
 
     def _state(self, label: str) -> int:
@@ -294,6 +302,18 @@ class TrackMachine(wiring.Component):
             unit.how.eq(now.how),
             unit.sum.eq(self.made),
         ]
+
+    def _exchange(self, m: Module) -> None:
+        """Write an offset as the program begins, which cannot do so yet; then show one, until the next begin."""
+        first = self._program.addresses[OFFSETS[0]] >> 2
+        given = by_name(self, EXCHANGE)
+        entry = self._words.read_port()
+        begun = Signal()
+        m.d.sync += begun.eq(self.begin)
+        at = Cat(given["offset_at"], C(first, ADDRESS_BITS - 2))
+        m.d.comb += [entry.addr.eq(at), entry.en.eq(begun), given["offset_read"].eq(entry.data)]
+        with m.If(given["offset_written"]):
+            m.d.comb += [self._write.en.eq(1), self._write.addr.eq(at), self._write.data.eq(given["offset_value"])]
 
     def _jump(self, m: Module) -> None:
         """Jump if the condition is met."""

@@ -66,7 +66,7 @@ _BROKEN = "A broken wire, such as b:200ms: high from then on. Line a, b, z, c of
 _STUCK = "A shorted wire, such as a:200ms: constant from then on. Line a, b, z, c of halls, or a complement as a_n."
 _INDEX_SKEW_S = """Delay of the index after A and B, such as 3us or -3us. In s, ms, us or ns; the index is then not \
 gated."""
-_INTERPOLATION = "Interpolation error of sampled positions, such as 0.15:1024. A sine of LSB with PERIODS a turn."
+_INTERPOLATION = "Interpolation error of reads, such as 0.15:1024. A sine of LSB with PERIODS a turn."
 _JITTER = """Gaussian jitter of the edges in time, such as 0.05 or 5%. Its standard deviation over the gap to the \
 nearer neighbour, below 0.5."""
 _NONUNIFORMITY = "Uneven disc: edges are off by up to FRACTION of a pitch. Below 0.5, the same in every turn."

@@ -258,7 +258,7 @@ class GoldenBank:
             for port, each in changes.items()
         }
         pins = PinTrace.of_lines(clock, self._trace.n_clocks, lines)
-        if spec.displacement is not None:
+        if spec.displacement is not None or any(extra.exchanges for extra in spec.extras):
             kept = {name: one for name, one in self._tables[TICK].columns.items() if name == "position_modulo"}
             self._tables = golden.tables(spec, pins, self._steps)
             self._tables[TICK] = self._tables[TICK].having(**kept)

@@ -1,5 +1,6 @@
 """The golden front end of positions that are read: what each tick takes of the reads in it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +29,15 @@ class Reads:
     fault_clock: NDArray[np.int64]
     fault: NDArray[np.int64]
     zero: NDArray[np.int64]  # shape (1,) or that of ticks: what is subtracted from the position
+    # Of the clocks of ticks: the number of the offset of a period that is read, and what is written into one.
+    exchange: Callable[[NDArray[np.int64]], tuple[NDArray[np.int64], NDArray[np.int64]]] = lambda clock: (
+        0 * clock,
+        0 * clock,
+    )
+
+    def exchanged(self, tick: NDArray[np.int64]) -> dict[str, NDArray[np.int64]]:
+        """Return columns of ticks in these clocks."""
+        return dict(zip(("asked", "told"), self.exchange(tick), strict=True))
 
     @classmethod
     def of(cls, spec: TachometerSpec, trace: PinTrace) -> "Reads":
@@ -127,6 +137,7 @@ def ticks_of(spec: TachometerSpec, reads: Reads, last: NDArray[np.int64]) -> Tab
         "silent": silent,
         "elapsed": np.minimum(before + 1, most),
         "length": np.diff(last, prepend=-1),
+        **reads.exchanged(last + spec.latency.tick),
     }
     if spec.front_end.modulus is not None:
         columns["position_modulo"] = position % int(spec.front_end.modulus)

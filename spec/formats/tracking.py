@@ -74,6 +74,7 @@ class Tracking:
 
     sampled: ClassVar[bool] = False  # whether positions are read in place of counted edges
     period_bits: int = 0  # bits of a period whose error is learned, in LSB of the read; 0: none is
+    exchanges: bool = False  # whether a program reads and writes the offsets of the period
     waits: bool = False  # whether a read that is far waits for the next one, as nothing checks its frame
 
     @cached_property

@@ -11,6 +11,9 @@ from typing import Any, ClassVar
 
 from tachometry.spec.formats.tracking import GAIN_STEPS, GAINS, PLACE_BITS, Tracking, fixed_log
 
+# What a program writes into an offset of the period.
+EXCHANGED = ("offset_written", "offset_at", "offset_value")
+OFFSET_BITS = 32
 _CARRIED = 8  # ticks without a read for which the acceleration is still taken into account
 
 

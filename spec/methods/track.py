@@ -175,6 +175,7 @@ class TrackTachometer(TachometerSpec):
             **common,
             period_bits=(self.period or 1).bit_length() - 1,
             waits=self.encoder.unchecked,
+            exchanges=any(extra.exchanges for extra in self.extras),
             shift=self._shift,
             most_moved=most,
             most_age=sampled.most_age(self.tick.longest),

@@ -7,7 +7,7 @@ other outputs in these clocks, where `found` has these tables, and a program has
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from types import ModuleType
 from typing import Any
@@ -38,11 +38,11 @@ def _model(extra: Extra) -> ModuleType:
 
 
 def displaced(view: View) -> Steps:
-    """Return the steps with the displacements that an extra gives to their edges."""
+    """Return the steps with what extras give to the method: displacements of their edges, or offsets."""
     steps = view.steps
     for extra in view.spec.extras:
-        if extra.displacement(view.spec) is not None:
-            steps = _model(extra).displaced(extra, view)
+        if extra.displacement(view.spec) is not None or extra.exchanges:
+            steps = _model(extra).displaced(extra, replace(view, steps=steps))
     return steps
 
 

@@ -90,11 +90,13 @@ class Windows:
 
     @classmethod
     def of_reads(cls, ticks: Table, form: SampledTracking) -> "Windows":
-        """Return the reads of ticks: `kind` and `places` are their phase, `end` has the ticks since one."""
+        """Return the reads of ticks: `kind` and `places` are their phase, `end` has the ticks since one; `last` is the
+        number of the offset that a program reads, `down` what it writes.
+        """
         none, number = np.zeros(len(ticks), dtype=np.int64), ticks.number.astype(np.int64)
         kind, fine = form.phase(ticks.phase) if form.period_bits else (none, none)
         end = np.where(ticks.forgets, form.max_ticks, ticks.silent)
-        return cls(number, ticks.times, fine, none, ticks.pulse_count, kind, none, end, ticks.length)
+        return cls(number, ticks.times, fine, ticks.asked, ticks.pulse_count, kind, ticks.told, end, ticks.length)
 
     def rows(self) -> Iterator[tuple[int, ...]]:
         """Yield what `Recursion.tick` takes, tick by tick."""
@@ -112,7 +114,13 @@ def rows(form: Tracking, lead: int) -> Rows:
     """Return the Python model after a reset."""
     state = Recursion(form, lead, smooth=True)
     if isinstance(form, SampledTracking):
-        state = SampledRecursion(form, lead, smooth=True)
+        reads = SampledRecursion(form, lead, smooth=True)
+
+        def of_reads(windows: Windows) -> NDArray[np.int64]:
+            made = [(reads.exchanged(row[3], row[6]), *reads.tick(*row)) for row in windows.rows()]
+            return np.array(made, dtype=np.int64).reshape(-1, COLUMNS + 1)
+
+        return of_reads
     return lambda windows: np.array([state.tick(*row) for row in windows.rows()], dtype=np.int64).reshape(-1, COLUMNS)
 
 
@@ -179,6 +187,7 @@ class Model:
         n, most = len(ticks), spec.timing.max_ticks
         names = ["velocity", "interval", "forced", "acceleration", "velocity_std", "position_fine", "standstill"]
         names += SMOOTH if spec.smooth else ()
+        names += ["offset"] * (spec.encoder.sampled is not None)
         flags = ("forced", "standstill")
         columns = {name: np.empty(n, dtype=bool if name in flags else np.int64) for name in names}
         for first in range(0, n, _PIECE):
@@ -190,7 +199,7 @@ class Model:
                 assert isinstance(spec.form, SampledTracking)
                 windows = Windows.of_reads(ticks.rows(piece), spec.form)
             self._end, self._reached = int(last[-1]), self._reached + int(windows.moved.sum())
-            velocity, place, velocity_std, acceleration, standstill, smooth, delay = self._shown(windows).T
+            *offset, velocity, place, velocity_std, acceleration, standstill, smooth, delay = self._shown(windows).T
             place, counted = (place + (1 << shift - 1)) >> shift, windows.number > 0
             if self._settled is not None:
                 place = np.array(
@@ -205,7 +214,8 @@ class Model:
                 interval, standstill = ticks.elapsed[piece], standstill * ~ticks.forgets[piece]
             delay = np.minimum(delay >> spec.form.time_bits, (1 << SMOOTH_DELAY_BITS) - 1)
             fine = fine << unused >> unused
-            values = (velocity, interval, ~counted, acceleration, velocity_std, fine, standstill, smooth, delay)
+            values = [velocity, interval, ~counted, acceleration, velocity_std, fine, standstill]
+            values += [*(smooth, delay) * spec.smooth, *offset]
             for name, value in zip(names, values, strict=False):
                 columns[name][piece] = value
         return Table(ticks.clock + spec.latency.datapath, {"cause": ticks.clock, **columns})

@@ -19,6 +19,12 @@ class SampledRecursion(Recursion):
         self.far = _NEVER  # error from which a read waits for the next one
         self.more = self._log_dt = 0  # what the lag adds to the place; the logarithm of the time since the last read
 
+    def exchanged(self, number: int, told: int) -> int:
+        """Return the lower bits of an offset after a write; `told` has 8 times it, twice its number, and 1, or is 0."""
+        if told:
+            self.offsets[told >> 1 & 3] = told >> 3
+        return (self.offsets[number] + (1 << 31) & (1 << 32) - 1) - (1 << 31)
+
     def _event(self, n: int, times: int, places: int, kind: int, down: int) -> Row:
         """Take a read, whose place is that of the end of the tick; the shaft was there `times` before."""
         self._count_event()

@@ -10,10 +10,13 @@ from tachometry.spec.core.extras.electrical import ElectricalAngle
 from tachometry.spec.core.extras.extra import Extra
 from tachometry.spec.core.extras.health import Health
 from tachometry.spec.core.extras.over_speed import OverSpeed
+from tachometry.spec.core.extras.period_offsets import PeriodOffsets
 from tachometry.spec.core.extras.position_compare import PositionCompare
 from tachometry.spec.core.extras.probe import Probe
 from tachometry.spec.core.extras.stream import Stream
 
-EXTRAS: tuple[type[Extra], ...] = (Health, OverSpeed, Probe, Stream, PositionCompare, ElectricalAngle, DiscMap)
+EXTRAS: tuple[type[Extra], ...] = (
+    Health, OverSpeed, Probe, Stream, PositionCompare, ElectricalAngle, DiscMap, PeriodOffsets,
+)  # fmt: skip
 
 __all__ = ["EXTRAS", "Extra"]

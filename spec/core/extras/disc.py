@@ -4,7 +4,7 @@ import hashlib
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby, pairwise
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,6 @@ from tachometry.spec.core.front_end import FrontEnd, Pin
 from tachometry.spec.core.numbers import Numbers
 from tachometry.spec.formats.displacement import ENTRY_BITS, FINEST, Displacement
 from tachometry.spec.formats.sectors import SLOPE_BITS, Sectors, sectors_of
-from tachometry.spec.language.field import Draft, Field
 from tachometry.spec.language.option import ParameterError, option
 from tachometry.spec.language.port import TICK, Port, held, pin, strobe
 from tachometry.spec.language.units import format_time
@@ -184,9 +183,7 @@ class DiscMap(Extra):
             if refused:
                 raise ParameterError(self.name if disc else "disc_table", why)
 
-    def _inputs(self, spec: Numbers) -> Iterable[tuple[str, str, Pin]]:
-        """Yield the inputs, each with the register and the field that take its place on a bus."""
-
+    def inputs(self, spec: Numbers) -> Iterable[tuple[str, str, Pin]]:
         def row(register: str, field: str, name: str, text: str, bits: int = 1) -> tuple[str, str, Pin]:
             port = pin(f"disc_{name}", f"{text} Synchronous to clk.", bits)
             return f"DISC_{register}", field, Pin(port, act=field in ("forget", "now", "write"))
@@ -205,9 +202,6 @@ class DiscMap(Extra):
             yield row("DATA", "value", "data", "Entry that is written, signed.", entry)
             yield row("DATA", "write", "write", "Writes disc_data of the next clock, and forgets the place.")
 
-    def pins(self, spec: Numbers) -> Iterable[Pin]:
-        return (each for _, _, each in self._inputs(spec))
-
     def ports(self, spec: Numbers) -> Iterable[Port]:
         yield held(TICK, "disc_used", help="The map of the disc is used. It also changes between ticks.")
         yield held(TICK, "disc_sure", help="The latest index was where the map expects it.")
@@ -218,15 +212,6 @@ class DiscMap(Extra):
         if self.writable:
             text = "Entry of the table at disc_address. It also changes between ticks."
             yield held(TICK, "disc_entry", self.entry_bits(spec), signed=True, help=text)
-
-    def registers(self, spec: Numbers) -> Iterable[Draft]:
-        for name, rows in groupby(self._inputs(spec), lambda row: row[0]):
-            fields, low = list[Field](), 0
-            for _, field, one in rows:
-                port, width, text = one.port.name, one.port.width, one.port.help
-                fields.append(Field(field, width, low, text, writable=True, single=one.act, port=port))
-                low = 1 if low + width == 1 else max(width, ENTRY_BITS)
-            yield name, fields[0].help, tuple(fields), {}
 
     def events(self, spec: Numbers) -> Mapping[str, Event]:
         event = Event("An index was not where the map of the disc expects it.", ("disc_slip",))

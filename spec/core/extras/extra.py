@@ -2,12 +2,13 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any, ClassVar, Self
 
 from tachometry.spec.core.front_end import Pin
 from tachometry.spec.core.numbers import Numbers
 from tachometry.spec.formats.displacement import Displacement
-from tachometry.spec.language.field import Draft
+from tachometry.spec.language.field import Draft, Field
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import Port
 
@@ -31,6 +32,7 @@ class Extra:
     name: ClassVar[str]  # of the files, and of the box in the gates
     place: ClassVar[int] = 0  # its ports are behind (1) or before (-1) those of others, as drivers know them
     compared: ClassVar[bool] = False  # whether comparisons of methods show it
+    exchanges: ClassVar[bool] = False  # whether a program reads and writes the offsets of a period
     settles: ClassVar[bool] = False  # whether a place that waits for a count goes to the middle of it
     texts: ClassVar[Mapping[str, Mapping[Any, str]]] = {}  # what values of its ports mean, by the names of the ports
 
@@ -51,9 +53,13 @@ class Extra:
     def check(self, spec: Numbers) -> None:
         """Raise ParameterError if a core cannot have it."""
 
+    def inputs(self, spec: Numbers) -> Iterable[tuple[str, str, Pin]]:
+        """Yield inputs, each with the register and the field that take its place on a bus."""
+        return ()
+
     def pins(self, spec: Numbers) -> Iterable[Pin]:
         """Return its inputs."""
-        return ()
+        return (each for _, _, each in self.inputs(spec))
 
     def in_turn(self, slots: int) -> Self:
         """Return what an axis of many has of it, whose clock is a round of so many clocks."""
@@ -77,7 +83,13 @@ class Extra:
 
     def registers(self, spec: Numbers) -> Iterable[Draft]:
         """Return registers that a program writes; a field sets the input of its gates that has the name of its port."""
-        return ()
+        for name, rows in groupby(self.inputs(spec), lambda row: row[0]):
+            fields, low = list[Field](), 0
+            for _, field, one in rows:
+                port, width, text = one.port.name, one.port.width, one.port.help
+                fields.append(Field(field, width, low, text, writable=True, single=one.act, port=port))
+                low = 1 if low + width == 1 else max(width, 8)
+            yield name, fields[0].help, tuple(fields), {}
 
     def events(self, spec: Numbers) -> Mapping[str, Event]:
         """Return events that raise the interrupt, by their names."""

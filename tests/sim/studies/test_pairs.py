@@ -98,6 +98,7 @@ def test_every_option_is_a_factor(method: str) -> None:
         "crc",
         "gray",
         "repeat",
+        "period-offsets",
     }  # tests/hdl/core has reads
     lines |= {"disc"} if method in ("t", "mt", "s", "track") else {"disc", "disc-table"}  # tests/extras has maps
     assert without == {"ppr", "lines", "cpr", "clock", "dt", "pwm", "lsb"} | lines | never.get(method, set())
