@@ -1,6 +1,8 @@
 """Masters of absolute encoders, at encoder models, against the golden models of their frames."""
 
 from dataclasses import replace
+from functools import reduce
+from operator import xor
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from tachometry.hdl.core.sampled_tachometer import master_of
 from tachometry.sim.encoder.absolute import Answers, answer, frames
 from tachometry.sim.golden.encoder_read import Line, Records, records
 from tachometry.spec.core.chips import SpiReads
-from tachometry.spec.core.reads import BISS_CRC, ERROR_BIT, NO_ANSWER, WRONG_CHECK, Reads
+from tachometry.spec.core.reads import BISS_CRC, ERROR_BIT, NO_ANSWER, WRONG_CHECK, Reads, remainders
 from tachometry.spec.core.tformat import TformatReads
 
 _SLOW, _FAST, _CLOCK = 10**6, 10**7, 10**8
@@ -23,6 +25,7 @@ CASES = {
     "biss": Reads(26, _CLOCK, _FAST, biss=True, crc=BISS_CRC, start_wait=600),
     "biss of 12 bits": Reads(12, 4 * _FAST, _FAST, biss=True, crc=BISS_CRC, start_wait=600),
     "biss with Gray": Reads(32, _CLOCK, _FAST, biss=True, crc=0x190D9, gray=True, start_wait=600),
+    "biss with a long CRC": Reads(26, _CLOCK, _FAST, biss=True, crc=0x104C11DB7, start_wait=600),
     "biss without CRC": Reads(18, _CLOCK, _FAST, biss=True, start_wait=600),
     "as5047p": SpiReads(14, _CLOCK, 5 * _SLOW, delay=3, chip="as5047p").within(1500, 1500),
     "amt22": SpiReads(12, _CLOCK, 2 * _SLOW, chip="amt22"),
@@ -109,6 +112,16 @@ def test_frames_are_those_of_the_data_sheet() -> None:
     sent = frames(Reads(18, _CLOCK, _FAST, biss=True, crc=BISS_CRC), Answers(values, error=errors))
     assert {tuple(row) for row in sent[:, :3].tolist()} == {(0, 1, 0)}
     assert [int("".join(map(str, row)), 2) for row in sent[:, -7:-1].tolist()] == [0x3A, 0x02, 0x3E, 0x38]
+
+
+@pytest.mark.parametrize(
+    ("polynomial", "check"), [(0b1011, 0x4 ^ 0x7), (0x107, 0xF4), (0x11021, 0x31C3), (0x104C11DB7, ~0x765E7680 % 2**32)]
+)
+def test_other_polynomials_have_the_check_values_of_the_catalogue(polynomial: int, check: int) -> None:
+    """CRC-3/GSM, CRC-8/SMBUS, CRC-16/XMODEM and CRC-32/CKSUM begin with 0; the first and the last are inverted."""
+    message = int.from_bytes(b"123456789", "big")
+    table = remainders(polynomial, 72)
+    assert reduce(xor, (table[bit] for bit in range(72) if message >> bit & 1)) == check
 
 
 # Where a line that stands is not seen as one: a frame is then wrong, or has its error bit. Of as5047p a low one is 0.
