@@ -14,6 +14,7 @@ from urllib.parse import SplitResult, urlsplit
 
 from tachometry.boards.monitor.columns import Column
 from tachometry.boards.monitor.session import Frame
+from tachometry.spec.language.tools import imported
 
 _FORMS = "--publish must be mqtt://HOST/TOPIC, mqtt://USER:PASSWORD@HOST:PORT/TOPIC or epics:PREFIX"
 _NEEDS = "--publish needs {}: pip install 'tachometry[publish]'"
@@ -37,14 +38,10 @@ class Mqtt:
     """
 
     def __init__(self, address: SplitResult, columns: Sequence[Column]) -> None:
-        try:
-            from paho.mqtt.client import Client
-            from paho.mqtt.enums import CallbackAPIVersion
-        except ImportError as error:
-            raise OSError(_NEEDS.format("paho-mqtt")) from error
+        version = imported("paho.mqtt.enums", _NEEDS.format("paho-mqtt")).CallbackAPIVersion.VERSION2
         self._place, self._topic = (address.hostname or "", address.port or 1883), address.path.strip("/")
         self._columns, self._status = columns, "waiting: no frame yet"
-        self._client = Client(CallbackAPIVersion.VERSION2)
+        self._client = imported("paho.mqtt.client", _NEEDS.format("paho-mqtt")).Client(version)
         if address.username:
             self._client.username_pw_set(address.username, address.password)
         self._client.will_set(f"{self._topic}/status", "offline", retain=True)
@@ -88,10 +85,7 @@ class Epics:
     """
 
     def __init__(self, prefix: str, columns: Sequence[Column]) -> None:
-        try:
-            import caproto
-        except ImportError as error:
-            raise OSError(_NEEDS.format("caproto")) from error
+        caproto = imported("caproto", _NEEDS.format("caproto"))
         self._prefix, self._columns, self._why = prefix, columns, ""
         severity, status = caproto.AlarmSeverity, caproto.AlarmStatus
         self._fine, self._undefined, self._silent = (

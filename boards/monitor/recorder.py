@@ -8,6 +8,7 @@ from typing import Any, Self
 
 from tachometry.boards.monitor.columns import Column, Value
 from tachometry.boards.monitor.session import Frame
+from tachometry.spec.language.tools import imported
 
 TIME = "time [s]"
 
@@ -87,8 +88,4 @@ class Recorder:
 
 
 def _pyarrow() -> Any:
-    try:
-        import pyarrow
-    except ImportError as error:
-        raise OSError("recordings in Parquet need pyarrow: pip install 'tachometry[host]'") from error
-    return pyarrow
+    return imported("pyarrow", "recordings in Parquet need pyarrow: pip install 'tachometry[host]'")

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Self
 
+from tachometry.spec.language.tools import imported
+
 _WAIT = 0.02  # seconds for the first byte
 # What the system says of a port that is not there, for now.
 _ABSENT = frozenset((errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO))
@@ -22,11 +24,7 @@ class Unplugged(OSError):
 
 def pyserial() -> Any:
     """Return the module that opens serial ports; OSError if it is not installed."""
-    try:
-        import serial
-    except ImportError as error:
-        raise OSError("serial ports need pyserial: pip install 'tachometry[host]'") from error
-    return serial
+    return imported("serial", "serial ports need pyserial: pip install 'tachometry[host]'")
 
 
 class SerialPort:

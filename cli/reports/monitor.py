@@ -17,6 +17,7 @@ from tachometry.boards.monitor.watch import HISTORY, Display, State
 from tachometry.cli.reports.standard_streams import printable
 from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.language.port import MISSED, WIDE
+from tachometry.spec.language.tools import imported
 from tachometry.spec.language.units import plural
 
 _LINE = 1.0  # seconds of board from a plain line to the next
@@ -154,11 +155,7 @@ def plot(state: State, width: int, height: int) -> Text:
 
 def plotext() -> Any:
     """Return the module that draws in text; OSError if it is not installed."""
-    try:
-        import plotext as module
-    except ImportError as error:
-        raise OSError("the live view needs plotext: pip install 'tachometry[host]', or take --plain") from error
-    return module
+    return imported("plotext", "the live view needs plotext: pip install 'tachometry[host]', or take --plain")
 
 
 def measured_rows(state: State) -> list[tuple[str, str]]:

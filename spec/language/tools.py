@@ -1,9 +1,19 @@
-"""The tools that this project calls fail with many lines, of which one says why."""
+"""The tools that this project calls fail with many lines, of which one says why, and packages may be missing."""
 
 import re
+from importlib import import_module
+from typing import Any
 
 _LONGEST = 300  # characters
 _NO_MEMORY = "Cannot allocate memory"
+
+
+def imported(module: str, why: str) -> Any:
+    """Return a module of a package that need not be installed; OSError with this line if it is not."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise OSError(why) from error
 
 
 def complaint(said: str) -> str:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from tachometry.sim.signals.temporary import scratch
 from tachometry.spec.language.option import ParameterError
+from tachometry.spec.language.tools import imported
 from tachometry.spec.language.units import plural
 
 if TYPE_CHECKING:
@@ -44,12 +45,7 @@ class LostScheduler(OSError):
 def require() -> None:
     """Check that the extra is there: distributed, pyarrow and cryptography."""
     for name in ("distributed", "pyarrow", "cryptography"):
-        try:
-            __import__(name)
-        except ImportError:
-            raise OSError(
-                f"a sweep needs the extra `sweep`: {name} is not installed: pip install 'tachometry[sweep]'"
-            ) from None
+        imported(name, f"a sweep needs the extra `sweep`: {name} is not installed: pip install 'tachometry[sweep]'")
 
 
 @contextmanager
