@@ -267,14 +267,14 @@ def run_point(point: Point) -> Row:
         "from_s": point.earliest,
         "read_delay_s": point.read_delay,
     }
-    encoder = {name: value(point.encoder) for name, (_, _, value) in _ENCODER.items()}
-    return dict.fromkeys(COLUMNS) | figures | _core(spec) | encoder | point.values
+    return dict.fromkeys(COLUMNS) | figures | _configured(spec, point.encoder) | point.values
 
 
-def _core(spec: TachometerSpec) -> Row:
-    """Return columns of the configuration."""
+def _configured(spec: TachometerSpec, encoder: VirtualEncoder) -> Row:
+    """Return columns of the configuration, and of the encoder and what is wrong with it."""
     own = {_column(about): _of(spec, about.field, about.unit) for about in own_options(spec.method)}
-    return {name: value(spec) for name, (_, _, value) in _CORE.items()} | own
+    of_encoder = {name: value(encoder) for name, (_, _, value) in _ENCODER.items()}
+    return {name: value(spec) for name, (_, _, value) in _CORE.items()} | own | of_encoder
 
 
 def _of(spec: TachometerSpec, field: str, unit: str) -> Any:
