@@ -113,8 +113,8 @@ class Gates(wiring.Component):
         It is a sum for each count, and a remainder whose carry is one more. An index behind the first is refused if the
         angle is off by more than 1/16 of a turn, and is not that of the index before.
         """
-        counts, zero = self._angles.counts, self._angles.of(0)
-        sum_ = Signal(self._angles.bits, init=zero)
+        angles, counts = self._angles, self._angles.counts
+        sum_ = Signal(angles.bits, init=angles.of(0))
         rest = Signal(range(counts))
         marks = Signal()
         zeroes = Signal()
@@ -130,8 +130,11 @@ class Gates(wiring.Component):
             m.d.sync += before.eq(Mux(marks, place, before))
             with m.If(marks & ~zeroes & ~self.angle_refused.all()):
                 m.d.sync += self.angle_refused.eq(self.angle_refused + 1)
-        angle, left = counted_on(m, self._angles, step, Mux(zeroes, zero, sum_), Mux(zeroes, 0, rest))
-        m.d.sync += [sum_.eq(angle), rest.eq(left)]
+        angle, left = counted_on(m, angles, step, sum_, rest)
+        # A zero is added to no sum, as it is known late.
+        first = Mux(step[0], Mux(step[1], angles.of(-1), angles.of(1)), angles.of(0))
+        begun = Mux(step[0], Mux(step[1], -angles.count[1] % counts, angles.count[1]), 0)
+        m.d.sync += [sum_.eq(Mux(zeroes, first, angle)), rest.eq(Mux(zeroes, begun, left))]
         return sum_, zeroes
 
     def _read(self, m: Module, known: Signal) -> tuple[Signal, Signal]:

@@ -42,7 +42,7 @@ def test_an_angle_is_right_again_at_the_second_index() -> None:
     campaign = angle.upsets(150)
     assert campaign.fine
     assert (campaign.clocks > 0).sum() > 10
-    with mutant(electrical.Gates, "Mux(zeroes, zero, sum_)", "sum_"):
+    with mutant(electrical.Gates, "Mux(zeroes, first, angle)", "angle"):
         assert not angle.upsets(10, only="sum__").fine
 
 
