@@ -14,6 +14,7 @@ from tachometry.spec.language.units import plural
 
 Code = bytes | int  # what a file calls a variable
 _MOST_NAMED = 1 << 25  # characters of the names of all variables
+_MOST_KNOWN = 1 << 12  # values whose rows are kept
 _EACH = 64  # more, for each: what else is kept of it
 _LEVELS = {"0": 0, "1": 1, "l": 0, "h": 1}
 _ALLOWED = "".join(_LEVELS) + "xzuw-"  # what VHDL and Verilog have beside levels: the one before holds
@@ -73,6 +74,8 @@ class Changes:
         of = [(ordered[line.number], line.bit) for line in self._chosen]
         self._sources = [(variable, variable.position(path, bit)) for variable, bit in of]
         self._value = {variable.code: "x" for variable, _ in of}
+        # the row that follows from values that have been, if all lines are known then, and `_last` and `_gap` with it
+        self._known = dict[tuple[str, ...], tuple[int, list[int | None], list[bool]]]()
         self._last: list[int | None] = [None] * len(of)
         self._gap, self._gaps = [False] * len(of), 0
         self._times = list[int | Fraction]()
@@ -109,19 +112,28 @@ class Changes:
         if not self._changed:
             return
         self._changed = False
-        levels = [self._level(variable, position) for variable, position in self._sources]
+        values = tuple(self._value.values())
+        if values in self._known:
+            row, self._last, self._gap = self._known[values]
+        else:
+            row = self._row_of([self._level(variable, position) for variable, position in self._sources])
+            if True not in self._gap and len(self._known) < _MOST_KNOWN:
+                self._known[values] = row, self._last, self._gap
+        if None not in self._last and row != self._row:
+            self._first = self._now if self._row is None else self._first
+            self._row = row
+            self._times.append(self._now)
+            self._rows.append(row)
+
+    def _row_of(self, levels: Sequence[int | None]) -> int:
+        """Return levels with a bit for each line, and note those that are not known."""
         gap = [level is None for level in levels]
         self._gaps += sum(
             now and not was and last is not None for now, was, last in zip(gap, self._gap, self._last, strict=True)
         )
         self._gap = gap
         self._last = [last if level is None else level for level, last in zip(levels, self._last, strict=True)]
-        row = sum(level << line for line, level in enumerate(self._last) if level is not None)
-        if None not in self._last and row != self._row:
-            self._first = self._now if self._row is None else self._first
-            self._row = row
-            self._times.append(self._now)
-            self._rows.append(row)
+        return sum(level << line for line, level in enumerate(self._last) if level is not None)
 
     def _level(self, variable: Variable, position: int) -> int | None:
         """Return the level of a line; None if there is none."""
