@@ -14,6 +14,7 @@ from tachometry.cli.options.core import core_options
 from tachometry.cli.options.engine import ENGINE_OPTIONS
 from tachometry.cli.options.option import FilePath, command
 from tachometry.cli.options.outputs import OUTPUT_OPTIONS, outputs_of
+from tachometry.sim.captures.file import STDIN
 from tachometry.sim.signals.flow import Flow
 from tachometry.sim.signals.recording import Recording
 from tachometry.sim.studies.simulation import Running
@@ -44,13 +45,14 @@ def replay(
 
     CAPTURE is a sigrok session (.sr), a text (.csv, .txt, .tsv or .teeth, also with .gz) of an analyser, oscilloscope,
     logger or spreadsheet, with a line of names such as time,a,b, or a waveform (.vcd, .vcd.gz or .fst), whose variables
-    are named with their scopes: --a top.a, or --a top.enc[0] for a bit of a vector.
+    are named with their scopes: --a top.a, or --a top.enc[0] for a bit of a vector. - is a text or a .vcd in a pipe.
     Its edges are placed on the core's clock. What the shaft truly did is unknown; all else is as with simulate.
 
     Ctrl-C ends the simulation. What was simulated so far is reported, and written beside the outputs, as t.part.csv.
     Equal options and captures give
     equal files. Exit status 1 if hardware and golden model differ.
     """
+    capture = STDIN if str(capture) == "-" else capture
     outputs = outputs_of(spec, targets, [capture])
     recordings = [read(capture, spec, axis, parts=True) for axis in range(spec.axes or 1)]
     return run_core(outputs, running, spec, str(capture), recordings)

@@ -34,15 +34,15 @@ _GAP = 2  # columns between two of a table
 
 @contextmanager
 def progress_bar(verb: str, total: float, unit: str = "", *, rate: bool = False) -> Iterator[Callable[[float], None]]:
-    """Yield a function to be called with how much of `total` is done, in some unit.
+    """Yield a function to be called with how much of `total` is done, in some unit; a total of 0 is not known.
 
     It shows a bar on stderr as soon as the work is seen to take more than two seconds, if stderr is a terminal; else
     there is a line every ten seconds.
     """
     if not sys.stderr.isatty():
         share = [0.0]
-        with _lines(lambda: f"{verb}, {share[0]:.0%}"):
-            yield lambda done: share.__setitem__(0, done / max(total, 1))
+        with _lines(lambda: f"{verb}, {share[0]:.0%}" if total else f"{verb}, {share[0]:.0f} {unit}"):
+            yield lambda done: share.__setitem__(0, done / (total or 1))
         return
     columns = [MofNCompleteColumn(), TextColumn(unit)] if unit else []
     begun = time.monotonic()
@@ -56,10 +56,10 @@ def progress_bar(verb: str, total: float, unit: str = "", *, rate: bool = False)
             console=Console(stderr=True),
             transient=True,
         )
-        task = bar.add_task(verb, total=total)
+        task = bar.add_task(verb, total=total or None)
 
         def update(done: float) -> None:
-            if not bar.live.is_started and (time.monotonic() - begun) * total > _PATIENCE * done:
+            if not bar.live.is_started and (time.monotonic() - begun) * (total or done) > _PATIENCE * done:
                 stack.enter_context(bar)
             bar.update(task, completed=done)
 

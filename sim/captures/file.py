@@ -6,6 +6,7 @@ import gzip
 import itertools
 import re
 import stat
+import sys
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -23,6 +24,7 @@ from tachometry.spec.language.option import ParameterError
 Channel = str | int
 SAME = -(1 << 16)  # as the channel of B: that of A
 _LISTED = 40  # channels in a message
+STDIN = Path("/dev/stdin")
 NO_VECTORS: Mapping[int, str] = {}
 
 
@@ -70,13 +72,19 @@ def reading(path: Path) -> Iterator[None]:
 
 
 def kind_of(path: Path) -> str:
-    """Return the suffix that names the kind of a file, in lower case: the one before `.gz`; `.csv` for a bare pipe."""
+    """Return the suffix that names the kind of a file, in lower case: the one before `.gz`; `.csv` for a bare pipe, but
+    `.vcd` if what comes to the standard input begins as one.
+    """
+    if path == STDIN and opened_bytes(path).peek(1)[:1] == b"$":
+        return ".vcd"
     named = (path.with_suffix("") if path.suffix.lower() == ".gz" else path).suffix.lower()
     return ".csv" if not named and is_stream(path) else named
 
 
 def is_stream(path: Path) -> bool:
     """Return whether a path is a pipe or a device: it is read once, from its beginning to its end."""
+    if path == STDIN:
+        return True
     try:
         mode = path.stat().st_mode
     except (OSError, ValueError):  # its reader refuses it
@@ -93,6 +101,8 @@ def check_regular(path: Path) -> None:
 
 def opened_bytes(path: Path) -> BufferedReader:
     """Open a file; what ends in `.gz` is unpacked."""
+    if path == STDIN:
+        return cast(BufferedReader, sys.stdin.buffer)
     return cast(BufferedReader, gzip.open(path)) if path.suffix.lower() == ".gz" else path.open("rb")
 
 

@@ -45,6 +45,17 @@ def test_a_saved_capture_gives_the_same_trace(tmp_path: Path, capsys: pytest.Cap
         assert lines[0] == lines[-1]
 
 
+def test_a_pipe_is_as_its_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_csv(tmp_path / "c.csv", recorded())
+    with (tmp_path / "c.csv").open(encoding="utf-8") as stdin:
+        monkeypatch.setattr("sys.stdin", stdin)
+        said = [(run("replay", capture, *CORE), capsys.readouterr().out) for capture in ("-", tmp_path / "c.csv")]
+    assert said[0] == said[1]
+    assert said[0][0] == 0
+
+
 def test_what_is_unknown_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_csv(tmp_path / "c.csv", recorded())
     assert run("replay", tmp_path / "c.csv", *CORE, "--plot", tmp_path / "p.pdf") == 0

@@ -153,7 +153,11 @@ def test_a_pipe_gets_nothing_of_what_is_short_and_a_line_every_ten_seconds(monke
     with terminal.progress_bar("verifying", 8, "configurations") as report:
         report(2)
         _Clock.made[-1].pass_ten_seconds()
-    assert pipe.getvalue().splitlines() == ["routing: 10 s", "routing: 20 s", "verifying, 25%: 10 s"]
+    with terminal.progress_bar("simulating", 0, "clocks") as report:
+        report(7)
+        _Clock.made[-1].pass_ten_seconds()
+    said = ["routing: 10 s", "routing: 20 s", "verifying, 25%: 10 s", "simulating, 7 clocks: 10 s"]
+    assert pipe.getvalue().splitlines() == said
 
 
 def test_a_first_compilation_is_shown_and_a_second_one_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -69,6 +69,14 @@ def test_a_pipe_is_read_once(name: str, tmp_path: Path) -> None:
     assert_same(read_capture(tmp_path / name), read_capture(plain))
 
 
+@pytest.mark.parametrize("suffix", [".csv", ".vcd"])
+def test_the_standard_input_is_a_pipe(suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (path := tmp_path / f"x{suffix}").write_text(HEAD + "#9\n1!\n" if suffix == ".vcd" else "time,a,b\n0,0,0\n1,1,0\n")
+    with path.open(encoding="utf-8") as stdin:
+        monkeypatch.setattr("sys.stdin", stdin)
+        assert_same(read_capture(file.STDIN), read_capture(path))
+
+
 def test_a_head_of_too_many_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (path := tmp_path / "x.vcd").write_text(HEAD)
     monkeypatch.setattr(waveform, "_MOST_NAMED", 2 * (64 + 2))
