@@ -4,17 +4,7 @@ from amaranth import Cat, Const, Module, Mux, Signal, Value
 
 from tachometry.hdl.front_end.encoder_master import EncoderMaster, Frame
 from tachometry.spec.core.reads import ERROR_BIT, WRONG_CHECK
-from tachometry.spec.core.tformat import (
-    CHARACTER,
-    ERRORS,
-    N_CHARACTERS,
-    PLACE,
-    REQUEST,
-    STATUS,
-    TURNS,
-    WARNINGS,
-    TformatReads,
-)
+from tachometry.spec.core.tformat import CHARACTER, ERRORS, PLACE, REQUEST, STATUS, TURNS, WARNINGS, TformatReads
 
 _STOP = CHARACTER - 1  # place of the stop bit; that of the start bit is 0
 _SENT = 0b11 << _STOP | REQUEST << 1  # the request with its start and stop bit, and the level after it
@@ -28,7 +18,7 @@ class _Frame(Frame):
         self.beat = self.at == 0
         self.ends = Signal()  # with the stop bit
         self.place = Signal(range(CHARACTER))  # the bit within its character
-        self.number = Signal(range(8 * N_CHARACTERS + 1))  # of the bit of data
+        self.number = Signal(range(8 * reads.characters + 1))  # of the bit of data
         self.check = Signal(8)
         self.wrong = Signal()  # the answer is not one to the request, or a start or stop bit is wrong
         self.error = Signal()
@@ -65,7 +55,7 @@ class TformatEncoder(EncoderMaster):
                 self._take_bit(m, frame, word)
                 with m.If(frame.ends):
                     m.next = "WAIT"
-                    with m.If(frame.number == 8 * N_CHARACTERS):
+                    with m.If(frame.number == 8 * reads.characters):
                         m.next = "DONE"
             with m.State("DONE"):
                 m.d.comb += frame.done.eq(1)

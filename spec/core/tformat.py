@@ -21,6 +21,7 @@ class TformatReads(Reads):
     """The reads of an encoder with T-format: a character is a request, which 11 characters answer."""
 
     turn_bits: int = 0
+    characters: int = N_CHARACTERS  # of an answer
 
     ports: ClassVar = (
         pin("rs485_rx", "Data of the encoder, asynchronous; it is high between characters."),
@@ -55,7 +56,7 @@ class TformatReads(Reads):
     @property
     def last_start(self) -> int:
         """Clocks from the request in which the last start bit must come; `start_wait` is all that is waited."""
-        return self.start_wait + self.delay + SYNCHRONISER + CHARACTER * (N_CHARACTERS - 1) * self.bit
+        return self.start_wait + self.delay + SYNCHRONISER + CHARACTER * (self.characters - 1) * self.bit
 
     @property
     def oldest(self) -> int:
@@ -63,7 +64,7 @@ class TformatReads(Reads):
 
     @property
     def age_spread(self) -> int:
-        return self.oldest - CHARACTER * (N_CHARACTERS - 1) * self.bit
+        return self.oldest - CHARACTER * (self.characters - 1) * self.bit
 
     @property
     def longest(self) -> int:

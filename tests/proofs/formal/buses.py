@@ -1,14 +1,12 @@
-"""These proofs are about registers on buses, the stream of records, and the reads of an encoder."""
+"""These proofs are about registers on buses, and the stream of records."""
 
 from functools import partial
 
 from proofs.formal.prove import Proof
 
 from tachometry.hdl.extras import stream as box
-from tachometry.hdl.front_end import serial_encoder
 from tachometry.spec import Encoder, MTachometer, Timing
 from tachometry.spec.core.extras.stream import Part
-from tachometry.spec.core.reads import Reads
 from tachometry.spec.registers.map import IDENTIFICATION, RegisterMap
 
 _SPEC = MTachometer(encoder=Encoder(1, 4), timing=Timing(8, 2, 4), frac_bits=4, position_width=8, average=2)
@@ -67,18 +65,6 @@ ON_BUSES = [
     _on("wishbone", "wishbone", _WISHBONE_PROBES, depth=5),
     _on("axi-lite", "axi_lite", _AXI_LITE_PROBES, depth=5),
 ]
-
-_READS = Reads(3, 1_000_000, 250_000, biss=True, crc=0b1011, start_wait=12)
-_READ_PROBES = {f"core_{name}": name for name in ("line", "silent", "at", "flags", "left", "check")}
-READ = Proof(
-    "read",
-    _SPEC,
-    "encoder_read",
-    {"W": _READS.width, "HALF": _READS.half, "WAIT": _READS.start_wait, "LONGEST": _READS.longest},
-    _READ_PROBES | {"core_state": "fsm_state"},
-    depth=2,
-    box=partial(lambda *given: serial_encoder.SerialEncoder(*given), _READS),
-)
 
 _PARTS = (Part("time", 32, 0, signed=False), Part("flags", 32, 4, signed=False), Part("position", 3, 8))
 _RECORD_PROBES = {"core_clocks": "clocks", "core_lost": "lost", "core_left": "left"}

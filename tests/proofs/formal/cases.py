@@ -6,11 +6,12 @@ from unittest.mock import patch
 
 from proofs.formal.angle import ANGLES
 from proofs.formal.axes import COUNTS_OF_AXES, POSITIONS_OF_AXES
-from proofs.formal.buses import ON_BUSES, READ, RECORDS
+from proofs.formal.buses import ON_BUSES, RECORDS
 from proofs.formal.control import CONTROL
 from proofs.formal.outputs import OUTPUTS
 from proofs.formal.probes import STANDSTILL_PROBES, counting, within
 from proofs.formal.prove import Proof
+from proofs.formal.reads import READS
 from proofs.formal.timed import mt_after_upset, timed
 from proofs.formal.tracking import COUNTS_OF_A_TICK
 
@@ -243,6 +244,8 @@ QUICK = [
     "axi-lite",
     "stream",
     "read",
+    "read amt22",
+    "read tformat",
     "control loop",
     "control loop, any gains",
     "outputs",
@@ -298,7 +301,7 @@ PROOFS = [
     *POSITIONS_OF_AXES,
     *ON_BUSES,
     RECORDS,
-    READ,
+    *READS,
     *CONTROL,
     *OUTPUTS,
     *ANGLES,

@@ -64,6 +64,7 @@ class Proof:
       `depth` clocks after so many.
     - `bus`: The bus for the registers of the core, or `none`.
     - `box`: Makes a box that stands in for the core.
+    - `held`: Inputs that keep a level while a wrong core is refuted, so that a long trace is soon found.
     """
 
     name: str
@@ -79,6 +80,7 @@ class Proof:
     recovers: int = 0
     bus: str = "none"
     box: Callable[[], wiring.Component] | None = None
+    held: dict[str, int] = field(default_factory=dict)
 
     def exported(self) -> str:
         """Return the Verilog of the core, as the mutants of this moment have it."""
@@ -145,6 +147,7 @@ def solve(proof: Proof, verilog: str, folder: Path, name: str, only: str = "", s
         delete="\n".join(left_out),
         upset=_UPSET if upset else "",
         how=(f"-seq {proof.recovers} " if proof.recovers else "")
+        + "".join(f"-set {name} 1'{level} " for name, level in proof.held.items() if only)
         + ("-tempinduct-baseonly" if only or proof.recovers else f"-tempinduct-def -initsteps {proof.depth - 1}"),
         steps=steps or proof.depth,
     )
