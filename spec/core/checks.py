@@ -51,7 +51,9 @@ def _check_sampled(spec: Core) -> None:
     if not -half <= (spec.encoder.zero or 0) < half:
         raise ParameterError("zero", f"must be from {-half} to {half - 1}, a position, not {spec.encoder.zero}")
     if (counts := spec.front_end.modulus) and (counts.denominator > 1 or counts.numerator.bit_count() > 1):
-        rest = f"must be a power of two for an encoder that is read, not {float(counts):.9g}"
+        above = 1 << max(int(counts), 2).bit_length()
+        typed = f"type {above // 2} or {above}"
+        rest = f"must be a power of two for an encoder that is read, not {float(counts):.9g}: {typed}"
         raise ParameterError("position_modulo", rest)
     refuse(spec.extras, "sampled")
     if (reads := spec.reads) is not None:
