@@ -79,7 +79,7 @@ class RegisterBank(Box):
         }
         with m.If(capture):
             m.d.sync += [captured[name].eq(value) for name, value in taken.items()]
-        return captured, waiting["updated"] & self.velocity_valid if "updated" in waiting else Const(0)
+        return captured, waiting["updated"] & events[self._map.events["updated"]] if "updated" in waiting else Const(0)
 
     def _answer(self, m: Module, shown: dict[str, Value]) -> None:
         """Answer a read a clock later; an address without a register reads 0."""

@@ -1,5 +1,7 @@
 """The whole core with registers, on a native port."""
 
+from collections.abc import Iterable
+
 from amaranth import Cat, Module, Mux, ResetInserter, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
@@ -11,7 +13,9 @@ from tachometry.hdl.bus.tick_position import TickPosition
 from tachometry.hdl.core.loop_core import LoopCore
 from tachometry.hdl.core.sampled_tachometer import tachometer_of
 from tachometry.hdl.core.tachometer import Tachometer
+from tachometry.hdl.wires.delay import held_with
 from tachometry.hdl.wires.ports import Box, by_name, drive, follow, members
+from tachometry.spec.language.port import UPDATE
 from tachometry.spec.registers.loop import LoopMap
 from tachometry.spec.registers.map import RegisterMap
 
@@ -55,6 +59,8 @@ class RegisterCore(Box):
         follow(m, self, whole, (port.name for port in spec.ports.streamed))
         follow(m, bank, whole, (port.name for port in spec.ports.outputs if port.name in names))
         follow(m, bank, whole, spec.ports.strobes)
+        if spec.whole != UPDATE:
+            self._hold(m, whole, spec.whole, spec.ports.strobes[UPDATE])
         drive(m, position, {"tick": core.tick, "position": core.position})
         drive(m, bank, {"capture": self.capture, "position": position.latest})
         self._place(m)
@@ -100,15 +106,10 @@ class RegisterCore(Box):
 
     def _keep(self, m: Module, loop: LoopCore) -> None:
         """Keep what a program changes as it was with its strobe, whenever it is captured."""
+        own = self._map.spec.ports.strobes
         for strobe, names in self._map.core.ports.strobes.items():
-            for name in names:
-                if name in self._map.spec.ports.strobes.get(strobe, ()):
-                    continue
-                value = getattr(loop, name)
-                kept = Signal.like(value, name=f"kept_{name}")
-                shown = Mux(getattr(loop, strobe), value, kept)
-                m.d.sync += kept.eq(shown)
-                if hasattr(self.bank, "restart"):
-                    with m.If(self.bank.restart):
-                        m.d.sync += kept.eq(0)
-                m.d.comb += getattr(self.bank, name).eq(shown)
+            self._hold(m, loop, strobe, (name for name in names if name not in own.get(strobe, ())))
+
+    def _hold(self, m: Module, whole: Tachometer | LoopCore, strobe: str, names: Iterable[str]) -> None:
+        clear = getattr(self.bank, "restart", None)
+        drive(m, self.bank, held_with(m, getattr(whole, strobe), by_name(whole, names), clear))

@@ -10,7 +10,6 @@ from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.front_end.serial_encoder import SerialEncoder
 from tachometry.hdl.front_end.spi_encoder import SpiEncoder
 from tachometry.hdl.front_end.tformat_encoder import TformatEncoder
-from tachometry.hdl.output.update import update_layout
 from tachometry.hdl.wires.ports import by_name, drive, follow, hand_through
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.chips import SpiReads
@@ -66,12 +65,10 @@ class SampledTachometer(Tachometer):
         return master
 
     def _taps(self, m: Module) -> dict[str, Value]:
-        updates = self.datapath.updates
-        shown = {f"native_{name}": updates.p[name] for name in update_layout(self._spec).members}
-        taps = {"read_fault": self.read_fault, "phase": self.reader.phase, "native_valid": updates.valid}
+        taps = {"read_fault": self.read_fault, "phase": self.reader.phase, **self._whole(m)}
         if "offset_read" in self.datapath.signature.members:
             taps |= by_name(self.datapath, ("offset_read",))
-        return taps | shown
+        return taps
 
 
 def master_of(reads: Reads) -> EncoderMaster:

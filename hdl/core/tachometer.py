@@ -21,17 +21,17 @@ from tachometry.hdl.front_end.pulse_counter import PulseCounter
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.front_end.standstill import Standstill
 from tachometry.hdl.methods import DATAPATHS
-from tachometry.hdl.methods.datapath import LongTicks, OwnStandstill, OwnTicks, TickSource
+from tachometry.hdl.methods.datapath import LongTicks, OwnStandstill, OwnTicks, RestLater, TickSource
 from tachometry.hdl.output.low_pass import LowPass
-from tachometry.hdl.output.update import update_layout
+from tachometry.hdl.output.update import rest_layout, update_layout
 from tachometry.hdl.output.update_age import UpdateAge
 from tachometry.hdl.output.velocity_output import PipelinedVelocityOutput, SerialVelocityOutput
-from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import Box, follow, members
+from tachometry.hdl.wires.delay import delay, held_with
+from tachometry.hdl.wires.ports import Box, by_name, follow, members
 from tachometry.spec import TachometerSpec
 from tachometry.spec.formats.displacement import DISPLACED, MAPPED
 from tachometry.spec.formats.tracking_sampled import EXCHANGED
-from tachometry.spec.language.port import MISSED, TICK, UPDATE, WIDE
+from tachometry.spec.language.port import MISSED, TICK, UPDATE, WHOLE, WIDE
 
 
 class Tachometer(Box):
@@ -209,6 +209,10 @@ class Tachometer(Box):
             updates = output.shown
         m.d.comb += self.velocity_valid.eq(updates.valid)
         m.d.comb += [getattr(self, name).eq(updates.p[name]) for name in self._spec.ports.strobes[UPDATE]]
+        if isinstance(self.datapath, RestLater):
+            rest = self.datapath.rest
+            m.d.comb += self.update_valid.eq(rest.valid)
+            m.d.comb += [getattr(self, name).eq(rest.p[name]) for name in self._spec.ports.strobes[WHOLE]]
         return updates
 
     def _age(self, m: Module, ticks: Signal, updates: stream.Interface) -> None:
@@ -288,6 +292,19 @@ class Tachometer(Box):
             given = box.signature.members.keys() & self.datapath.signature.members.keys()
             follow(m, self.datapath, box, given & {*DISPLACED, MAPPED, *EXCHANGED})
 
+    def _whole(self, m: Module) -> dict[str, Value]:
+        """Return what extras may be given of an update: as the method makes it, and as the ports show it when whole."""
+        updates = self.datapath.updates
+        rest = self.datapath.rest if isinstance(self.datapath, RestLater) else updates
+        taps: dict[str, Value] = {"native_valid": rest.valid}
+        taps |= {f"native_{name}": updates.p[name] for name in update_layout(self._spec).members}
+        if rest is not updates:
+            taps |= {f"native_{name}": rest.p[name] for name in rest_layout(self._spec).members} | {UPDATE: rest.valid}
+            taken = {name for box in self.extras.values() for name in box.signature.members}
+            names = [name for name in self._spec.ports.strobes[UPDATE] if name in taken]
+            taps |= held_with(m, rest.valid, by_name(self, names))
+        return taps
+
     def _taps(self, m: Module) -> dict[str, Value]:
         """Lead inputs of extras through the conditioner, and return what else they may be given, by name.
 
@@ -297,10 +314,9 @@ class Tachometer(Box):
         `native_velocity` and others are of an update as the method makes it; `index_rises` is a clock before
         `index_valid`, and `index_seen` two clocks after Z, also of an index that is not taken.
         """
-        decoder, box, counter, updates = self.decoder, self.conditioner, self.position_counter, self.datapath.updates
+        decoder, box, counter = self.decoder, self.conditioner, self.position_counter
         moves = counter.clear if self._spec.preset is None else counter.clear | counter.load
-        taps: dict[str, Value] = {"next_position": counter.next, "moves": moves, "native_valid": updates.valid}
-        taps |= {f"native_{name}": updates.p[name] for name in update_layout(self._spec).members}
+        taps = {"next_position": counter.next, "moves": moves, **self._whole(m)}
         taps |= {
             name: getattr(decoder, name) for name in decoder.signature.members if name[:5] in ("level", "ready", "step")
         }

@@ -64,7 +64,7 @@ class Gates(Box):
     def of(cls, extra: Probe, spec: TachometerSpec) -> Self:
         port, fine = extra.fine(spec), None
         if port is not None:
-            latency = spec.latency.tick + spec.latency.tick_to_velocity
+            latency = spec.latency.tick + spec.latency.tick_to_update
             fine = FinePosition(port.width, extra.age_width(spec), latency)
         return cls(extra.edges, spec.position_width, extra.time_width(spec), spec.latency.tick, fine)
 

@@ -7,7 +7,8 @@ from amaranth import Signal, Value, signed
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Member, Out
 
-from tachometry.hdl.output.update import VELOCITIES, update_layout, update_stream
+from tachometry.hdl.output.update import VELOCITIES, rest_layout, update_layout, update_stream
+from tachometry.hdl.wires.ports import only_if
 from tachometry.spec import MTachometer, STachometer, TachometerSpec
 
 
@@ -41,6 +42,13 @@ class OwnTicks(Datapath, TickSource, Protocol):
 
 
 @runtime_checkable
+class RestLater(Datapath, Protocol):
+    """A datapath that hands on some of an update after its velocity."""
+
+    rest: stream.Interface
+
+
+@runtime_checkable
 class LongTicks(Datapath, Protocol):
     """A datapath some of whose ticks are as long as 2^`tick_shift` nominal ones; valid with `tick`."""
 
@@ -61,6 +69,7 @@ def datapath_members(spec: TachometerSpec) -> dict[str, Member]:
         "tick": In(1),
         "pulse_count": In(signed(spec.widths.count)),
         "updates": Out(update_stream(update_layout(spec))),
+        **only_if(rest_layout(spec).members, rest=Out(update_stream(rest_layout(spec)))),
     }
 
 

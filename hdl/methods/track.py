@@ -37,7 +37,10 @@ class TrackMethod(Box):
         self._reads = spec.encoder.sampled is not None
         self.tick_counts = None if self._reads else TickCounts(spec.form, spec.timing.max_ticks)
         self.machine = TrackMachine(spec.program)
-        self.left = SamplingClock(spec.latency.datapath - 1, 5 if spec.settling else 0)
+        lead = 5 if spec.settling else 0
+        self.left = SamplingClock(spec.latency.datapath - 1, lead)
+        rest = spec.latency.native_update - spec.latency.datapath
+        self.rest_left = SamplingClock(rest, lead) if rest else None  # from the velocity to the rest of an update
         super().__init__(
             **datapath_members(spec),
             **only_if(not self._reads, step=In(signed(2))),  # as late as `tick`
@@ -63,7 +66,8 @@ class TrackMethod(Box):
 
     @property
     def idle(self) -> tuple[Idle, ...]:
-        boxes = {"tick_counts": self.tick_counts, "left": self.left, "machine": self.machine}
+        boxes = {"tick_counts": self.tick_counts, "left": self.left, "rest_left": self.rest_left}
+        boxes |= {"machine": self.machine}
         return (IdleBox("machine"), *idle_of(boxes))
 
     def build(self, m: Module) -> None:
@@ -83,21 +87,34 @@ class TrackMethod(Box):
         elapsed = self._take_counts(m)
         new = self.updates.p
         m.d.sync += self.updates.valid.eq(ready)
-        fine = self._fine(m, position, ready)
+        rest, whole = (new, ready) if self.rest_left is None else self._rest(m, self.rest_left, ready)
+        fine = self._fine(m, position, whole)
         if spec.smooth:
             delay = delay_of(machine.smooth_delay, spec.form.time_bits)
             with m.If(ready):
                 m.d.sync += [new.velocity_smooth.eq(machine.velocity_smooth), new.smooth_delay.eq(delay)]
+        shown = {"acceleration": machine.acceleration, "velocity_std": machine.velocity_std, "position_fine": fine}
+        shows = [rest[name].eq(value) for name, value in shown.items()]
         with m.If(ready):
             m.d.sync += [
                 new.velocity.eq(machine.velocity),
-                new.acceleration.eq(machine.acceleration),
-                new.velocity_std.eq(machine.velocity_std),
-                new.position_fine.eq(fine),
+                *([] if self.rest_left else shows),
                 new.interval.eq(elapsed),
                 new.forced.eq(~machine.number.any()),
                 new.standstill.eq(machine.standstill & ~(self.number if self._reads else machine.number.any())),
             ]
+        if self.rest_left:
+            with m.If(whole):
+                m.d.sync += shows
+
+    def _rest(self, m: Module, left: SamplingClock, ready: Value) -> tuple[Any, Value]:
+        """Return what follows the velocity of an update, and when it is taken."""
+        awaited = Signal()
+        whole = Signal()
+        m.submodules.rest_left = ResetInserter(ready)(left)
+        m.d.comb += whole.eq(awaited & left.last)
+        m.d.sync += [awaited.eq(ready | (awaited & ~whole)), self.rest.valid.eq(whole)]
+        return self.rest.p, whole
 
     def _fine(self, m: Module, position: Value, taken: Value) -> Value:
         """Return the position between counts."""

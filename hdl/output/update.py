@@ -1,12 +1,14 @@
 """An update of the velocity, as one typed payload on its way from the method to the ports."""
 
+from typing import Any
+
 from amaranth import signed
 from amaranth.lib import data, stream
 
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.ports import BOUNDS
 from tachometry.spec.formats.velocity_output import VelocityOutput
-from tachometry.spec.language.port import UPDATE
+from tachometry.spec.language.port import UPDATE, WHOLE
 
 # The velocities of an update, and which way each is rounded: to the nearest (0), down (−1) or up (1).
 VELOCITIES = {"velocity": 0, "velocity_smooth": 0, **BOUNDS}
@@ -27,10 +29,20 @@ def update_layout(spec: TachometerSpec) -> data.StructLayout:
         fields["rests"] = 1
     if spec.bounds:
         fields |= {name: signed(spec.velocity.bound_width) for name in BOUNDS} | {"bounds_valid": 1}
-    fields |= {port.name: signed(port.width) if port.signed else port.width for port in spec.method_ports}
+    fields |= _fields(spec, UPDATE)
     if "velocity_smooth" in fields:
         fields["velocity_smooth"] = fields["velocity"]
     return data.StructLayout(fields)
+
+
+def rest_layout(spec: TachometerSpec) -> data.StructLayout:
+    """Return what a method hands on after the velocity of an update, if there is such a thing."""
+    return data.StructLayout(_fields(spec, WHOLE))
+
+
+def _fields(spec: TachometerSpec, strobe: str) -> dict[str, Any]:
+    ports = (port for port in spec.method_ports if port.held_by == strobe and not port.is_strobe)
+    return {port.name: signed(port.width) if port.signed else port.width for port in ports}
 
 
 def shown_layout(layout: data.StructLayout, output: VelocityOutput) -> data.StructLayout:

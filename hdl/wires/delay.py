@@ -1,8 +1,8 @@
 """Values of some clocks ago."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from amaranth import Module, Signal, Value, ValueLike
+from amaranth import Module, Mux, Signal, Value, ValueLike
 
 
 def delay(m: Module, *values: ValueLike, clocks: int = 1, only_if: Value | None = None) -> Sequence[Signal]:
@@ -23,3 +23,16 @@ def delay(m: Module, *values: ValueLike, clocks: int = 1, only_if: Value | None 
             registers.append(register)
         values = tuple(registers)
     return values
+
+
+def held_with(m: Module, strobe: Value, values: Mapping[str, Value], clear: Value | None = None) -> dict[str, Value]:
+    """Return values by their names as they are with a strobe, from its clock to the next one; 0 after `clear`."""
+    held: dict[str, Value] = {}
+    for name, value in values.items():
+        kept = Signal.like(value, name=f"kept_{name}")
+        held[name] = Mux(strobe, value, kept)
+        m.d.sync += kept.eq(held[name])
+        if clear is not None:
+            with m.If(clear):
+                m.d.sync += kept.eq(0)
+    return held

@@ -9,7 +9,7 @@ from tachometry.sim.golden.axes import run_axes
 from tachometry.sim.golden.front_end import Steps, count, decoded
 from tachometry.sim.golden.low_pass import filtered
 from tachometry.sim.golden.methods import MODELS
-from tachometry.sim.golden.output import in_unit, with_age
+from tachometry.sim.golden.output import in_unit, with_age, with_whole
 from tachometry.sim.golden.sampled import ticks_of
 from tachometry.sim.golden.sampling import windows
 from tachometry.sim.golden.standstill import with_standstill
@@ -59,7 +59,8 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
     if "cause" not in measured.columns:
         measured = measured.having(cause=measured.clock - spec.latency.datapath)
     updates = in_unit(spec, filtered(spec, ticks, measured))
-    without = {"tick": ticks, "velocity_valid": updates, "index_valid": index, "measured": measured}
+    measured = measured.having(clock=measured.clock + (spec.latency.native_update - spec.latency.datapath))
+    without = {"tick": ticks, **with_whole(spec, updates), "index_valid": index, "measured": measured}
     added = extras.tables(extras.View(spec, trace, steps, without))
     ticks = ticks.having(**extras.shown(spec, added, ticks.clock))
     found = without | {

@@ -20,6 +20,7 @@ class GoldenAxesBank(GoldenBank):
         self._tables = golden.run(registers.axes, trace).tables
         self._strobes = tuple(strobe for strobe in (TICK, UPDATE, INDEX) if strobe in self._tables)
         ticks, updates = self._tables[TICK], self._tables[UPDATE]
+        self._updated = updates.clock
         # An update comes with the tick of its axis.
         whose = {TICK: ticks["axis"], UPDATE: ticks["axis"][np.searchsorted(ticks.clock, updates.clock)]}
         kinds = {"updated": UPDATE}

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.ports import BOUNDS
+from tachometry.spec.language.port import UPDATE
 
 
 def in_unit(spec: TachometerSpec, updates: Table) -> Table:
@@ -29,6 +30,12 @@ def in_unit(spec: TachometerSpec, updates: Table) -> Table:
     bounds |= {name: scaled(updates[name])[0] for name in ("velocity_smooth",) if name in updates.columns}
     clock = updates.clock + spec.latency.output
     return updates.having(clock=clock, velocity=velocity, velocity_overflow=overflow, **bounds)
+
+
+def with_whole(spec: TachometerSpec, updates: Table) -> dict[str, Table]:
+    """Return updates by their strobes, each with all columns: that of the velocity, and `whole`."""
+    later = spec.latency.tick_to_update - spec.latency.tick_to_velocity
+    return {UPDATE: updates} | ({spec.whole: updates.having(clock=updates.clock + later)} if spec.latency.rest else {})
 
 
 def with_age(spec: TachometerSpec, ticks: Table, updates: Table) -> Table:

@@ -6,7 +6,7 @@ import numpy as np
 
 from tachometry.sim.golden import model
 from tachometry.sim.golden.front_end import Steps, count, decoded, wrapped
-from tachometry.sim.golden.output import in_unit
+from tachometry.sim.golden.output import in_unit, with_whole
 from tachometry.sim.golden.standstill import with_standstill
 from tachometry.sim.signals.recording import PinTrace, packed
 from tachometry.sim.signals.run import Run, Table
@@ -50,7 +50,7 @@ class Golden:
         shown = cycles * self._n_ticks - 1 + spec.latency.tick  # clock of the last tick
         glitches = steps.swallowed[np.searchsorted(steps.swallowed, shown, side="right") :]
         self._steps = replace(steps.since(cycles * self._n_ticks), swallowed=glitches)
-        return Run.of_ports(spec, end, {"tick": ticks, "velocity_valid": updates, "decode_error": errors})
+        return Run.of_ports(spec, end, {"tick": ticks, **with_whole(spec, updates), "decode_error": errors})
 
     def _decoded(self, pins: PinTrace) -> Steps:
         """Return steps on the clock of all pieces, up to the end of this one; some are known already."""

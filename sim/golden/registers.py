@@ -10,7 +10,7 @@ from tachometry.sim.golden import extras
 from tachometry.sim.golden.front_end import decoded, homed
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec.language.field import WORD, Field, Register
-from tachometry.spec.language.port import INDEX, MISSED, TICK, UPDATE, WIDE
+from tachometry.spec.language.port import INDEX, MISSED, TICK, UPDATE, WHOLE, WIDE
 from tachometry.spec.registers.map import COUNTER_WIDTH, RegisterMap
 
 
@@ -59,13 +59,17 @@ class GoldenBank:
         self._map = registers
         # Flags, which have no unit, are 0 before the first update.
         self._of_updates = {
-            port.name for port in registers.ports if port.held_by == UPDATE and port.unit and port.name != "velocity"
+            port.name
+            for port in registers.ports
+            if port.held_by in (UPDATE, WHOLE) and port.unit and port.name != "velocity"
         }
         self._trace = trace.completed(registers.spec)
         self._pins = self._steps = decoded(registers.spec, self._trace)
         self._tables = golden.tables(registers.spec, self._trace, self._steps)
-        self._strobes = tuple(registers.spec.ports.strobes)
-        self._happened = {"updated": self._tables[UPDATE].clock, "indexed": self._tables[INDEX].clock}
+        spec = registers.spec  # the strobe of a whole update has the velocity as well
+        self._strobes = tuple(name for name in spec.ports.strobes if name != UPDATE or spec.whole == UPDATE)
+        self._updated = self._tables[spec.whole].clock
+        self._happened = {"updated": self._updated, "indexed": self._tables[INDEX].clock}
         self._happened |= {name: self._tables[name].clock for name in (WIDE, MISSED)}
         self._follow(self._tables[TICK].overflow)
         stalls = self._tables[registers.spec.facts.rests_with]
@@ -214,7 +218,7 @@ class GoldenBank:
                 taken[name] = int(column[row]) if row >= 0 else 0
         taken |= {flag: int(self._count(clocks, before, clock) > 0) for flag, clocks in self._happened.items()}
         taken |= self._of_clock(clock)
-        updates = self._tables[UPDATE].clock
+        updates = self._updated
         self._known = clock >= updates[0] if len(updates) else False
         self._captured = taken
         self._captures.append(clock)
@@ -275,7 +279,7 @@ class GoldenBank:
 
     def _lost(self, until: int) -> int:
         """Return updates since the counters were cleared that came when one waited for a capture."""
-        clocks = self._tables[UPDATE].clock
+        clocks = self._updated
         before = np.append(-1, clocks[:-1])
         captures = np.array([-1, *self._captures])
         latest = captures[np.searchsorted(captures, clocks) - 1]  # strictly before each

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim.signals.arrays import Ints
 from tachometry.spec.control import AnySpec
-from tachometry.spec.language.port import INDEX, TICK, UPDATE
+from tachometry.spec.language.port import INDEX, TICK, UPDATE, WHOLE
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +87,12 @@ class Run:
 
     @property
     def updates(self) -> Table:
-        """Rows of `velocity_valid`."""
-        return self.tables[UPDATE]
+        """Rows of `velocity_valid`, with what `update_valid` brings after each; the end of a run may cut that off."""
+        updates = self.tables[UPDATE]
+        if (rest := self.tables.get(WHOLE)) is None:
+            return updates
+        row = np.searchsorted(rest.clock, updates.clock)
+        return updates.having(**{name: np.append(column, 0)[row] for name, column in rest.columns.items()})
 
     @property
     def index(self) -> Table:

@@ -15,7 +15,7 @@ from tachometry.sim.signals.axes import of_axis
 from tachometry.sim.signals.files import rows_of, write_csv
 from tachometry.sim.signals.run import Run, Table
 from tachometry.spec import CoreSpec, TachometerSpec
-from tachometry.spec.language.port import TICK, UPDATE
+from tachometry.spec.language.port import TICK, UPDATE, WHOLE
 
 TrueSpeed = Callable[[NDArray[np.float64]], NDArray[np.float64]]  # rad/s at times in seconds
 
@@ -64,7 +64,7 @@ class Tally:
             first = self.begin - self._spec.latency.tick_to_velocity
             first = max(int(np.searchsorted(old.ticks.clock, first)) - 1, 0)
             self.n_ticks_before += first
-            before = {TICK: old.ticks.rows(slice(first, None)), UPDATE: old.updates.rows(slice(-1, None))}
+            before = {TICK: old.ticks.rows(slice(first, None)), UPDATE: old.tables[UPDATE].rows(slice(-1, None))}
             run = Run(run.n_clocks, run.tables | {name: rows.then(run.tables[name]) for name, rows in before.items()})
         self.window, held = run, held_velocity(self._spec, run)
         new = held.time >= self.begin / self._spec.timing.clock_hz
@@ -182,7 +182,7 @@ def write_events(path: Path, run: Run, tally: Tally | None = None) -> None:
 
     A row has the clock, the name of the strobe, and what the ports say that are held by it; other cells are empty.
     """
-    tables = {name: table for name, table in run.tables.items() if name not in (TICK, UPDATE)}
+    tables = {name: table for name, table in run.tables.items() if name not in (TICK, UPDATE, WHOLE)}
     columns = [name for table in tables.values() for name in table.columns]
     rows: list[tuple[Any, ...]] = []
     for event, table in tables.items():

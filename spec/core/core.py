@@ -10,6 +10,7 @@ from tachometry.spec.core.latency import TICK_IN_TO_WINDOW_END
 from tachometry.spec.core.numbers import Numbers
 from tachometry.spec.core.words import Words, speed_notes
 from tachometry.spec.formats.displacement import Displacement
+from tachometry.spec.language.port import UPDATE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +45,8 @@ class Core(Numbers):
             "tick_latency": latency.tick,
             "tick_to_velocity": latency.tick_to_velocity,
         }
+        if self.whole != UPDATE:
+            found["tick_to_update"] = latency.tick_to_update
         for extra in self.extras:
             found |= extra.latency(self)
         return found | ({"tick_in_to_window_end": TICK_IN_TO_WINDOW_END} if self.external_tick else {})

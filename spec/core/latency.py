@@ -18,6 +18,7 @@ class Latency:
     datapath: int = 0  # clocks from `tick` to the native velocity
     busy: int = 0  # clocks that a datapath needs from tick to tick, if it works step by step; else 0
     tick: int = 2  # clocks from the last one of a window to `tick`: one completes the sum, one registers it
+    rest: int = 0  # clocks from `tick` to the native rest of an update that comes after its velocity
     registers_steps: bool = False  # whether a step is in a register before it counts for the tick: a clock of `tick`
 
     @property
@@ -56,6 +57,16 @@ class Latency:
     def tick_to_velocity(self) -> int:
         """Clocks from `tick` to `velocity_valid`."""
         return self.datapath + self.low_pass + self.output
+
+    @property
+    def tick_to_update(self) -> int:
+        """Clocks from `tick` to the strobe `whole` of the core."""
+        return max(self.tick_to_velocity, self.rest)
+
+    @property
+    def native_update(self) -> int:
+        """Clocks from `tick` until a method has handed on all of an update."""
+        return self.tick_to_update if self.rest else self.datapath
 
     @property
     def tick_to_result(self) -> int:

@@ -12,7 +12,7 @@ from tachometry.spec.core.tick import Scale, Tick
 from tachometry.spec.core.times import Times, Widths
 from tachometry.spec.core.velocity import Bound, Velocity
 from tachometry.spec.formats.carrying import Carrying
-from tachometry.spec.language.port import Port, Ports
+from tachometry.spec.language.port import UPDATE, Port, Ports
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,5 +110,10 @@ class Numbers(Asked):
 
     @property
     def method_ports(self) -> tuple[Port, ...]:
-        """Outputs that only this method has; they are new with `velocity_valid`."""
+        """Outputs that only this method has; they are new with `velocity_valid`, or with `whole`."""
         return ()
+
+    @property
+    def whole(self) -> str:
+        """The strobe with which all of an update is there."""
+        return UPDATE

@@ -57,7 +57,7 @@ class Angles:
     tick: int  # clocks of a nominal tick
     longest: int  # clocks of the longest tick
     velocity_bits: int  # fraction bits of the velocity, in counts per tick
-    late: int  # clocks from a count to its angle; with `tracks`, from the end of a tick to the update
+    late: int  # clocks from a count to its angle; with `tracks`, from the end of a tick to the velocity
     # of method track: clocks from a tick to its update, or 0; fraction bits of the place, and LSB of the acceleration
     tracks: int
     position_fine_bits: int
@@ -68,6 +68,7 @@ class Angles:
     once: bool = False  # whether a phase is that of one clock, and does not grow
     place_bits: int = PLACE_BITS  # bits of the counts between the fine position and the position
     is_read: bool = False  # whether the place within a turn is read
+    rest: int = 0  # clocks from the velocity of an update to the rest of it
 
     @property
     def bits(self) -> int:
@@ -87,7 +88,7 @@ class Angles:
     @property
     def factor_bits(self) -> int:
         """Bits of a signed factor: times are at most half of a tick, the latency and a lead."""
-        most = self.late + 256 + (1 << LEAD_BITS) + (self.tick // 2 if self.tracks else 0)
+        most = self.late + self.rest + 256 + (1 << LEAD_BITS) + (self.tick // 2 if self.tracks else 0)
         return max(_FACTOR_BITS, most.bit_length() + 1)
 
     @property
@@ -108,7 +109,7 @@ class Angles:
     @property
     def span(self) -> int:
         """Clocks from the pins to the first clock in which the port shows the phase of a place."""
-        return self.late + (self.clocks + 1 if self.tracks else 2)
+        return self.late + self.rest + (self.clocks + 1 if self.tracks else 2)
 
     @property
     def factors(self) -> tuple[Factor, ...]:

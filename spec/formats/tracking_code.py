@@ -202,7 +202,13 @@ class Program:
     @property
     def ahead(self) -> int:
         """Clocks by which the shown velocity is ahead of the tick."""
-        return self.delay + self.clocks
+        return self.delay + self.velocity_clocks
+
+    @cached_property
+    def velocity_clocks(self) -> int:
+        """Clocks from the tick until the velocity holds, which the quick machine shows before the rest."""
+        first = self.times.ports > 1
+        return _longest(self.times, "velocity", **self._kind) + self.times.fetch_clocks if first else self.clocks
 
     @cached_property
     def clocks(self) -> int:
@@ -212,7 +218,7 @@ class Program:
     @cached_property
     def all_clocks(self) -> int:
         """Clocks from a tick until the next may come."""
-        return _longest(self.times, **self._kind) + self.times.fetch_clocks
+        return _longest(self.times, **self._kind) + self.times.fetch_clocks - 2 * (self.times.ports > 1)
 
     @cached_property
     def constants(self) -> dict[str, int]:

@@ -138,71 +138,73 @@ few:
     of_v = log_T - of_slope
     t + ~ + ~; if pos goto curved
     of_v + ~ exp
-    as = zero; velocity_std = of_straight
-    block of_e = log_e + log_X
+    as = zero; velocity_std = of_straight; block tick by
     vs = v s- ~
-    velocity = sum
-    log_X gain 0
+    serial velocity = sum; block velocity = sum product shown
+    serial log_X gain 0
     goto placed
 curved:
     as = a product velocity             # the velocity at the time when it is shown
-    velocity_std = of_curve
-    block of_e = log_e + log_X
+    velocity_std = of_curve; block tick by
     vs = v
-    velocity = sum + ~
-    log_X gain 0
+    serial velocity = sum + ~; block velocity = sum + ~ product shown
+    serial log_X gain 0
 placed:
-    e keep
-    of_e + ~ exp
-    edges block since by; noises = noises + noises_one min noises_most
-    p = P s+ ~
+    serial {; e keep; of_e + ~ exp
+    noises = noises + noises_one min noises_most; p = P s+ ~; }
     reads {; e - lag keep log; more = zero; log_X + log_3_2 + ~ exp
     lag = lag s+ ~ keep log             # half of it is shown as well, where an acceleration is
-    block since by; velocity_std - of_curve; if neg goto place
+    velocity_std - of_curve; block if neg goto shown; serial if neg goto place
     w = log_half + ~; log_X gain 3; w + log_X - log_dt + of_velocity + ~ exp
     vs = vs s+ ~; velocity = velocity s+ ~; log_X gain 0; w + log_X + ~ exp
-    more = zero s- ~; lag over 1; more = more + ~; block since by; }
+    more = zero s- ~; lag over 1; more = more + ~; block tick by; block velocity product shown; }
+    block {; made:                      # the velocity first
+    edges w = doubt + log_X - slips hi+ slips; reads w = doubt + log_X
+    triple = step + D
+    least_shown + ~ lo+ most_shown + most_shown hi+ least_shown out velocity
+    limit + w over 1
+    edges if empty goto shown_place     # it was, in a silence
+    phase; if neg goto shown_place
+    velocity_std - log_T + ~ exp
+    after - one; if neg goto same_place
+    noises = noises + noises_one min noises_most
+    w = ~; log_X gain 0; e keep; log_e + log_X + ~ exp
+    edges lost = slips hi+ lost; edges slips = slips lo+ fade max none
+    p = P s+ ~; }
 place:                                  # and the place at the end of the tick
-    serial since by
+    since by; block least = one
     as product half_velocity
-    v keep
-    t = zero s+ v min most
-    vs + ~ product place
-    block tick by
-    v = zero s+ t
-    least = one; edges if empty goto seen
+    v keep; t = zero s+ v min most
+    vs + ~ product place; block slope by
+    v = zero s+ t; serial least = one; edges if empty goto seen
     edges p + ~ out position_fine; reads p + more + ~ out position_fine
-shown:
-    serial tick by
+    serial {; shown:; tick by
     velocity product shown
     edges w = doubt + log_X - slips hi+ slips; reads w = doubt + log_X  # D·√X, more if errors keep a sign
     triple = step + D; t = ~
-    limit + w over 1
-    block slope by
-    velocity_std - log_T + ~ exp
-    t min most_shown max least_shown out velocity
-    t = ~
-    serial slope by
+    limit + w over 1; velocity_std - log_T + ~ exp
+    t min most_shown max least_shown out velocity; t = ~; slope by; }
+told:
     as product acceleration
-    t max least min most_std out velocity_std
+    serial t max least min most_std out velocity_std; block w max least min most_std out velocity_std
     ~ out acceleration
     after - one; if neg goto fewer
 learn:                                  # nothing below is in a hurry
-    edges {; e - lag keep log; lost = slips hi+ lost    # counts were lost or added, and now the place is right
-    log_X + log_3_2 + ~ exp; }
+    edges e - lag keep log; serial edges lost = slips hi+ lost  # counts were lost or added, and now the place is right
+    edges log_X + log_3_2 + ~ exp
     noises = noises max noises_first    # an upset may have made it less
     block sum min noises_offset by
     edges lag = lag s+ ~
     e over 1
     t = e - before keep
-    log_X + log_256; if pos goto short
-    trouble; if pos goto short
+    block log_X + log_256 max trouble; serial log_X + log_256; serial if pos goto short; serial trouble
+    if pos goto short
     t = e + ~ keep
 short:
     serial noises min noises_offset by
     before = e
-    edges slips = slips lo+ fade max none
-    zero s+ t - D min triple over by
+    serial edges slips = slips lo+ fade max none
+    block zero - D s+ t min triple over by; serial zero s+ t - D min triple over by
     a keep
     t = zero s+ a min most
     D = D + ~ min most_noise max least_noise
@@ -241,11 +243,9 @@ judged:
     growing = log_T - log_half
 end:; end
 fewer:
-    sum + one; if neg goto end
-    goto ready
+    sum + one; if neg goto end; goto ready
 halves:; slow_T = T + T
-shrinks:; growth = zero - count; growing = log_T + log_half
-    end
+shrinks:; growth = zero - count; growing = log_T + log_half; end
 edges {; some:
     w = minus_Ds - ~ min minus_sixteenth
     goto five; }
@@ -262,8 +262,7 @@ five:
 grows:
     growing = log_T
     T - slow_T; if pos goto end
-    growing = log_T + log_eighth
-    end
+    growing = log_T + log_eighth; end
 edges {; single:
     plain $places keep
     tau = $times; plain raw = zero s+ half; map raw = $places
@@ -303,9 +302,7 @@ alone:
     T = memory - ~ lo+ ~ log
     slow_T = zero
     goto sized
-calm:
-    T = memory log
-    goto sized
+calm:; T = memory log; goto sized
 edges {; slip:                          # counts were lost or added, or the offset was upset
     o@last = o@last min quarter max minus_quarter
     slips = slips hi+ one
@@ -350,9 +347,9 @@ silent:
 show:
     since + ahead by
     as product velocity
-    block since by
-    velocity = vs + ~
-    goto place
+    block tick by
+    serial velocity = vs + ~; block velocity = vs + ~ product shown
+    block edges if empty goto place; block goto made; serial goto place
 edges {; seen:
     P = p + ~ keep; if neg goto below
     plain sum + o@up; map t = $places; map P + o@up - t
@@ -395,6 +392,9 @@ nothing:
     p out position_fine
 quiet:
     as = zero
-    block tick by
-    goto shown
+    serial goto shown
+    block {; shown:; tick by
+    velocity product shown; goto made
+shown_place:; velocity_std - log_T + ~ exp; w = ~; slope by; goto told
+same_place:; w = ~; goto place; }
 """

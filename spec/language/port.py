@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 TICK, UPDATE, INDEX = "tick", "velocity_valid", "index_valid"
+WHOLE = "update_valid"  # of a core that shows the velocity before the rest
 WIDE, MISSED = "index_wide", "index_missed"
 FINE = "position_fine"
 STREAM = "m_axis"  # names of ports of a stream begin with it

@@ -22,7 +22,7 @@ from tachometry.spec.formats.tracking_sampled import SampledTracking
 from tachometry.spec.formats.tracking_units import BLOCK, Serial
 from tachometry.spec.formats.velocity_output import NATIVE, VelocityOutput
 from tachometry.spec.language.option import ParameterError, option, parse_whole
-from tachometry.spec.language.port import UPDATE, Port, held
+from tachometry.spec.language.port import UPDATE, WHOLE, Port, held, strobe
 from tachometry.spec.language.units import format_time, next_written_time, short_time, written_time
 
 NOISE = Fraction(1, 4 * 20_000)  # rad/s that an LSB has at 2000 counts: a quarter of what is left at constant speed
@@ -212,9 +212,15 @@ class TrackTachometer(TachometerSpec):
 
     @cached_property
     def latency(self) -> Latency:
-        found = replace(self._around, datapath=self.program.clocks)
+        program = self.program
+        clocks, rest = (program.clocks, 0) if self.whole == UPDATE else (program.velocity_clocks, program.clocks)
+        found = replace(self._around, datapath=clocks, rest=rest)
         # An update is shown before the next tick, so its age needs no number.
-        return replace(found, busy=max(self.program.all_clocks, found.tick_to_velocity + found.low_pass))
+        return replace(found, busy=max(program.all_clocks, found.tick_to_velocity + found.low_pass))
+
+    @property
+    def whole(self) -> str:
+        return WHOLE if self.program.times is BLOCK else UPDATE
 
     @cached_property
     def carrying(self) -> Carrying:
@@ -224,7 +230,7 @@ class TrackTachometer(TachometerSpec):
         ratio = Fraction(1 << bits, cycles << native + shift)
         per_clock = VelocityOutput(ratio, self.velocity.max << native + shift, bits + 2)
         latency = self.latency
-        late = latency.pin_to_count + latency.tick + latency.datapath + per_clock.serial_latency + 3
+        late = latency.pin_to_count + latency.tick + latency.native_update + per_clock.serial_latency + 3
         slope = Fraction(1, 2) ** self.acceleration.frac_bits / self.acceleration.per_count / cycles**2
         block = self.program.times is BLOCK
         return Carrying(per_clock, shift, self.position_fine_bits, bits - self.position_fine_bits, late, slope, block)
@@ -310,22 +316,26 @@ class TrackTachometer(TachometerSpec):
         shown = self.acceleration
         unit = f"2^{-shown.frac_bits} {shown.unit}"
         text = "Acceleration; multiplied by rad_per_s2_per_lsb of the manifest it is in rad/s²."
-        acceleration = held(UPDATE, "acceleration", shown.width, signed=True, unit=unit, help=text)
+        acceleration = held(self.whole, "acceleration", shown.width, signed=True, unit=unit, help=text)
         width, unit = self.position_width + self.position_fine_bits, f"2^{-self.position_fine_bits} counts"
         text = "Position at the end of this period, between the counts as well; it wraps as position does."
-        position = held(UPDATE, "position_fine", width, signed=True, unit=unit, help=text)
+        position = held(self.whole, "position_fine", width, signed=True, unit=unit, help=text)
         unit = f"2^{-self.velocity.frac_bits} {self.unit}"
         text = "Standard deviation that the velocity is expected to have, by the noise that was seen."
-        deviation = held(UPDATE, "velocity_std", self.form.std_bits, unit=unit, help=text)
+        deviation = held(self.whole, "velocity_std", self.form.std_bits, unit=unit, help=text)
+        rest: tuple[Port, ...] = acceleration, position, deviation
+        if self.whole != UPDATE:
+            text = "One clock for every update, when what follows its velocity is there as well."
+            rest = (strobe(WHOLE, text), *rest)
         if not self.smooth:
-            return acceleration, position, deviation
+            return rest
         width = self.velocity.width
         text = "Velocity smooth_delay ago, in the middle of the memory as it was before this period. It is in the "
         text += "format of velocity; 0 while no speed is known."
         smooth = held(UPDATE, SMOOTH[0], width, signed=True, unit=unit, help=text)
         text = "Time from the instant of velocity_smooth to velocity_valid; it stays at its greatest value."
         age = held(UPDATE, SMOOTH[1], SMOOTH_DELAY_BITS, unit=self.clock_unit, help=text)
-        return acceleration, position, deviation, smooth, age
+        return *rest, smooth, age
 
     @property
     def clock_unit(self) -> str:

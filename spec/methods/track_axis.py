@@ -7,6 +7,7 @@ from functools import cached_property
 
 from tachometry.spec.formats.tracking_code import Program
 from tachometry.spec.formats.tracking_units import BLOCK, Serial
+from tachometry.spec.language.port import UPDATE
 from tachometry.spec.methods.axis import WARM_UP, OneAxis, Plan, output_cycles, own_options
 from tachometry.spec.methods.track import TrackTachometer
 
@@ -31,7 +32,11 @@ class TrackAxis(OneAxis, TrackTachometer):
         """The program of a turn, on the block unit if nothing else is asked for."""
         times = Serial(self.form).times if self.multiplier == "serial" else BLOCK
         made = Program(self.form, times, 0, self.smooth)
-        return replace(made, delay=self.ahead - made.clocks)
+        return replace(made, delay=self.ahead - made.velocity_clocks)
+
+    @property
+    def whole(self) -> str:
+        return UPDATE
 
     @property
     def clock_unit(self) -> str:

@@ -23,7 +23,7 @@ from typing import Any, Self
 from tachometry.spec.control import AnySpec
 from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.language.field import WORD, Draft, Field, Register, position_words
-from tachometry.spec.language.port import INDEX, MISSED, UPDATE, WIDE, Port
+from tachometry.spec.language.port import INDEX, MISSED, WIDE, Port
 from tachometry.spec.registers.manifest import manifest
 
 IDENTIFICATION = int.from_bytes(b"TACH", "big")
@@ -123,7 +123,7 @@ class RegisterMap:
     @cached_property
     def events(self) -> dict[str, str]:
         """Flags that say that something has happened since the capture before, each with the input that says it."""
-        found = {"updated": UPDATE} | ({"indexed": INDEX} if self.spec.index else {})
+        found = {"updated": self.spec.whole} | ({"indexed": INDEX} if self.spec.index else {})
         return found | ({WIDE: WIDE, MISSED: MISSED} if self.spec.front_end.index_state else {})
 
     @cached_property

@@ -17,6 +17,7 @@ Row = dict[str, int]  # outputs by name, and "clock"
 PINS = ("a", "b", "z", "tick_in")
 _STROBES = (
     "velocity_valid",
+    "update_valid",
     "tick",
     "decode_error",
     "index_valid",

@@ -284,6 +284,7 @@ class Expected:
             # Measured: every tick and every update is compared at its clock.
             "latency_cycles.tick_latency": lambda: manifest["latency_cycles"]["tick_latency"],
             "latency_cycles.tick_to_velocity": lambda: self.to_velocity,
+            "latency_cycles.tick_to_update": lambda: manifest["latency_cycles"]["tick_to_update"],
             "latency_cycles.tick_in_to_window_end": lambda: 2,
             # Measured: every pulse is compared at its clock.
             "latency_cycles.pin_to_position_compare": lambda: manifest["latency_cycles"]["pin_to_position_compare"],
@@ -309,6 +310,7 @@ class Expected:
             "recovery_cycles": self.forgets,
             **dict.fromkeys((f"acceleration.{name}" for name in ACCELERATION), settings.method == "track"),
             "latency_cycles.pin_to_position_compare": "position-compare" in settings.words,
+            "latency_cycles.tick_to_update": settings.words.get("multiplier") == "block",
             "position_fine.frac_bits": settings.method == "track",
             **dict.fromkeys(
                 ("latency_cycles.tick_in_to_window_end", "external_tick_cycles.min", "external_tick_cycles.max"),
@@ -392,6 +394,7 @@ def check_ports(expected: Expected, ports: list[dict[str, Any]]) -> None:
     }
     single = ["velocity_valid", "forced", "tick", "decode_error", "overflow", "standstill"]
     single += ["velocity_overflow"] * (not own) + ["bounds_valid"] * settings.flag("bounds")
+    single += ["update_valid"] * (settings.words.get("multiplier") == "block")
     single += ["out_of_range"] * beyond + ["index_valid", "index_missed", "index_wide"] * settings.flag("index")
     single += ["position_compare", "position_compare_valid"] * ("position-compare" in settings.words)
     single += ["over_speed"] * ("over-speed" in settings.words)

@@ -148,13 +148,17 @@ def check_core(case: Case, folder: Path, manifest: Manifest) -> None:
     rows = in_icarus(folder, manifest, play)
     front = conditioned(case.settings, play, latency["pin_to_count"])
     updates, ticks, wrong = model(case, manifest, front)
-    late = latency["tick_latency"] + latency["tick_to_velocity"]
+    late = latency["tick_latency"] + latency.get("tick_to_update", latency["tick_to_velocity"])
     check_front(case, manifest, front, ticks, rows, wrong)
     shown = [row for row in rows if row["velocity_valid"]]
     updates = [update for update in updates if update.cause + late < front.n_clocks]
     absent = set[str]()
     if case.settings.method == "track":
-        check_tracking(case.settings, manifest, updates, shown, ticks)
+        whole = [row for row in rows if row.get("update_valid", row["velocity_valid"])]
+        check_tracking(case.settings, manifest, updates, whole, ticks)
+        first = latency["tick_to_velocity"] - latency.get("tick_to_update", latency["tick_to_velocity"])
+        early = [(row["clock"] + first, row["velocity"]) for row in whole]
+        assert early == [(row["clock"], row["velocity"]) for row in shown[: len(early)]]
     else:
         absent = check_updates(case.settings, manifest, updates, shown, ticks)
     if "over-speed" in case.settings.words:

@@ -26,7 +26,7 @@ def check_tracking(
 ) -> None:
     """Every update with its clock; velocity, acceleration and fine position as far as they need no filter."""
     latency = manifest["latency_cycles"]
-    late = latency["tick_latency"] + latency["tick_to_velocity"]
+    late = latency["tick_latency"] + latency.get("tick_to_update", latency["tick_to_velocity"])
     assert [update.cause + late for update in updates] == [row["clock"] for row in rows]
     seen = {"rests": 0, "waits": 0}
     one, bits = 1 << settings.position_fine_bits, settings.position_bits + settings.position_fine_bits

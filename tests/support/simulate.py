@@ -26,11 +26,15 @@ class Resettable(Elaboratable):
 
 
 def member(component: wiring.Component, name: str) -> Any:
-    """Return what `name` is of a component, or of its updates, whose strobe is `velocity_valid`; a path has dots."""
+    """Return what `name` is of a component, or of its updates, whose strobe is `velocity_valid`, or of what comes after
+    these with `update_valid`; a path has dots.
+    """
     if "." in name or hasattr(component, name):
         return attrgetter(name)(component)
-    updates = component.updates
-    return updates.valid if name == "velocity_valid" else updates.p[name]
+    updates, rest = component.updates, getattr(component, "rest", component.updates)
+    if name in ("velocity_valid", "update_valid"):
+        return (updates if name == "velocity_valid" else rest).valid
+    return (updates if name in updates.p.shape().members else rest).p[name]
 
 
 class Seen(Sequence[dict[str, int]]):

@@ -15,7 +15,7 @@ from tachometry.spec.core.extras.extra import refuse
 from tachometry.spec.core.front_end import OF_CONTROLS
 from tachometry.spec.core.ports import bound_ports
 from tachometry.spec.language.option import ParameterError
-from tachometry.spec.language.port import INDEX, TICK, UPDATE, Port
+from tachometry.spec.language.port import INDEX, TICK, UPDATE, WHOLE, Port
 from tachometry.spec.registers.buses import Bus
 from tachometry.spec.registers.map import RegisterMap
 
@@ -150,7 +150,7 @@ def _values(spec: CoreSpec) -> tuple[Port, ...]:
     alone = spec.tachometer
     left_out = {port.name for port in (*alone.method_ports, *bound_ports(alone))} | {*_NO_PIN}
     left_out -= {"velocity", "position"}
-    kept = [port for port in spec.ports.outputs if port.held_by in (TICK, UPDATE, INDEX) and not port.is_strobe]
+    kept = [port for port in spec.ports.outputs if port.held_by in (TICK, UPDATE, WHOLE, INDEX) and not port.is_strobe]
     return tuple(
         port
         for end in _ends(spec)

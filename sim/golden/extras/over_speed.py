@@ -10,12 +10,11 @@ from tachometry.sim.golden.extras import View
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.over_speed import OverSpeed
-from tachometry.spec.language.port import UPDATE
 
 
 def tables(extra: OverSpeed, view: View) -> dict[str, Table]:
     """Return the clocks of updates beyond the limit."""
-    updates = view.tables[UPDATE]
+    updates = view.tables[view.spec.whole]
     return {"over_speed": Table(updates.clock[np.abs(updates.velocity) > extra.greatest(view.spec)], {})}
 
 

@@ -84,7 +84,7 @@ def _carried(view: View, compare: Compare, way: Carrying) -> Iterator[tuple[int,
     spec, updates = view.spec, view.tables["measured"]
     half = 1 << spec.position_width - 1 + way.position_fine_bits
     widest = half << way.more_bits
-    before = np.searchsorted(_sets(spec, view.steps), updates.clock - spec.latency.datapath, side="right")
+    before = np.searchsorted(_sets(spec, view.steps), updates.clock - spec.latency.native_update, side="right")
     begins = [*(updates.clock + way.latency).tolist(), view.trace.n_clocks]
     columns = (updates.velocity, updates.position_fine, np.diff(before, prepend=0))
     rows = zip(begins[:-1], begins[1:], *(column.tolist() for column in columns), strict=True)

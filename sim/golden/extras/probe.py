@@ -12,7 +12,7 @@ from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.probe import FALLING, RISING, Probe
-from tachometry.spec.language.port import FINE, UPDATE
+from tachometry.spec.language.port import FINE
 
 Ints = NDArray[np.int64]
 
@@ -36,7 +36,7 @@ def tables(extra: Probe, view: View) -> dict[str, Table]:
             f"probe_position_{number}": positions_at(spec, view.steps, clock - spec.latency.tick),
             f"probe_time_{number}": np.minimum(since, end),
         }
-        if FINE in (updates := view.tables[UPDATE]).columns:  # the latest before these clocks
+        if FINE in (updates := view.tables[spec.whole]).columns:  # the latest before these clocks
             row = np.searchsorted(updates.clock, clock)
             age = np.where(row > 0, clock - np.append(0, updates["cause"])[row], (1 << extra.age_width(spec)) - 1)
             columns |= {f"probe_fine_{number}": np.append(0, updates[FINE])[row], f"probe_age_{number}": age}

@@ -13,7 +13,7 @@ from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.stream import LOST, OVERRUNS_WIDTH, READY, Stream
-from tachometry.spec.language.port import TICK, UPDATE
+from tachometry.spec.language.port import TICK
 
 Ints = NDArray[np.int64]
 
@@ -22,7 +22,7 @@ def _events(extra: Stream, spec: TachometerSpec, steps: Steps, tables: Mapping[s
     """Return clocks of records, sent or not."""
     if extra.records.when == "edge":
         return steps.clock[steps.step != 0] + spec.latency.tick
-    return tables[TICK if extra.records.when == "tick" else UPDATE].clock
+    return tables[TICK if extra.records.when == "tick" else spec.whole].clock
 
 
 def _free(trace: PinTrace, clock: Ints) -> NDArray[np.bool_]:
@@ -68,7 +68,7 @@ def records(
     assert extra is not None
     entry, clock = extra.entry(spec), _events(extra, spec, steps, tables)
     free = _free(trace, clock)
-    rows = {name: np.searchsorted(tables[name].clock, clock, side="right") for name in (TICK, UPDATE)}
+    rows = {name: np.searchsorted(tables[name].clock, clock, side="right") for name in (TICK, spec.whole)}
     held = {
         name: np.append(np.zeros_like(column[:1]) if len(column) else 0, column)[row]
         for strobe, row in rows.items()

@@ -100,16 +100,21 @@ class ElectricalAngle(Extra):
     def angles(self, spec: Numbers) -> Angles:
         """Return the formats of the angles of a core."""
         counts, tick, bits = spec.encoder.encoder_counts, spec.timing.tick_cycles, spec.velocity.native_frac_bits
-        late, carrying, tracks = spec.latency.pin_to_count + spec.latency.tick, spec.carrying, spec.latency.datapath
-        of_track = (tracks, carrying.position_fine_bits, carrying.slope) if carrying else (0, 0, Fraction(0))
+        late, carrying, latency = spec.latency.pin_to_count + spec.latency.tick, spec.carrying, spec.latency
+        of_track = (
+            (latency.native_update, carrying.position_fine_bits, carrying.slope) if carrying else (0, 0, Fraction(0))
+        )
         states = spec.encoder.kind.cycle[:: -1 if spec.encoder.reverse else 1] if spec.encoder.sensor == "hall" else ()
         halls = tuple(map(packed_levels, states))
-        block, late = carrying is not None and carrying.block, late + of_track[0]
+        block, late = carrying is not None and carrying.block, late + (latency.datapath if carrying else 0)
+        rest = of_track[0] - latency.datapath if carrying else 0
         speed, led = spec.velocity, None
         if carrying and self.lead is not None:
             led = speed.output or VelocityOutput(Fraction(1), speed.max << speed.native_frac_bits, speed.width)
         read = spec.encoder.sampled
-        angles = Angles(counts, self.pole_pairs, tick, spec.tick.longest, bits, late, *of_track, halls, block, led)
+        angles = Angles(
+            counts, self.pole_pairs, tick, spec.tick.longest, bits, late, *of_track, halls, block, led, rest=rest
+        )
         return replace(angles, place_bits=read.bits, is_read=True) if read else angles
 
     def least_fine_bits(self, spec: Numbers) -> int:
@@ -136,7 +141,7 @@ class ElectricalAngle(Extra):
             raise ParameterError(self.name, f"must be at most {most} with so few counts per revolution")
         angles = self.angles(spec)
         # All products are there before the next update, the first one before a tick.
-        clocks = max(angles.all_clocks, angles.tracks + angles.product + 1)
+        clocks = max(angles.all_clocks + angles.rest, angles.tracks + angles.product + 1)
         if (spec.times.shortest_tick if angles.tracks else angles.tick) < clocks:
             needs = f"needs a tick of {clocks} clocks"
             raise ParameterError(self.name, f"{needs}: take a longer --tick", needs)

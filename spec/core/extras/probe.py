@@ -85,7 +85,7 @@ class Probe(Extra):
 
     def age_width(self, spec: Numbers) -> int:
         """Return the bits of the time from the end of a period whose update is shown to a probe."""
-        return (spec.tick.longest + spec.latency.tick_to_velocity + 2).bit_length()
+        return (spec.tick.longest + spec.latency.tick_to_update + 2).bit_length()
 
     def missing(self) -> Mapping[str, str]:
         return {

@@ -9,7 +9,7 @@ from tachometry.spec.core.extras.extra import Extra
 from tachometry.spec.core.front_end import Pin
 from tachometry.spec.core.numbers import Numbers
 from tachometry.spec.language.option import REQUIRED, ParameterError, option
-from tachometry.spec.language.port import STREAM, TICK, UPDATE, Port, held, pin
+from tachometry.spec.language.port import STREAM, TICK, UPDATE, WHOLE, Port, held, pin
 
 READY = f"{STREAM}_tready"
 OVERRUNS_WIDTH = 16  # bits of the number of records that were dropped, which stays at its end
@@ -97,7 +97,7 @@ class Stream(Extra):
 
     def flags(self, spec: Numbers) -> tuple[str, ...]:
         """Return the bits of `flags`, the lowest first: `LOST`, and ports."""
-        held = (port for port in spec.ports.outputs if port.held_by in (TICK, UPDATE) and not port.is_strobe)
+        held = (port for port in spec.ports.outputs if port.held_by in (TICK, UPDATE, WHOLE) and not port.is_strobe)
         return (LOST, *(port.name for port in held if port.width == 1))
 
     def pins(self, spec: Numbers) -> Iterable[Pin]:

@@ -12,10 +12,12 @@ from support import compiled
 from support.nightly import only
 from support.random_case import random_case
 from support.simulate import clock_by_clock
+from support.tracking import core
 
 from tachometry.hdl.bus import counter
 from tachometry.hdl.core import register_core
 from tachometry.hdl.export.files import top_of
+from tachometry.sim.encoder.stress import stress
 from tachometry.sim.golden.registers import Access, GoldenBank
 from tachometry.spec import METHODS
 from tachometry.spec.registers.buses import bus_of
@@ -86,6 +88,13 @@ def test_registers_are_those_of_the_golden_model(method: str, seed: int) -> None
     short = replace(trace, n_clocks=min(trace.n_clocks, CLOCKS))
     played = random_accesses(registers, seed, short.n_clocks)
     assert differing(register_core.RegisterCore(registers), short, played, GoldenBank(registers, short)) == []
+
+
+def test_a_capture_between_the_velocity_and_the_rest_takes_the_update_before() -> None:
+    spec = core(tick="300clk", max_time="3000clk", multiplier="block")
+    registers, trace = RegisterMap(spec), replace(stress(spec, 1, 40), n_clocks=2 * CLOCKS)
+    played = random_accesses(registers, 1, trace.n_clocks)
+    assert differing(register_core.RegisterCore(registers), trace, played, GoldenBank(registers, trace)) == []
 
 
 @pytest.mark.parametrize("bus", only(["wishbone"], [name for name in LINES if name != "alone"]))

@@ -30,13 +30,14 @@ EXTERNAL = replace(
     SPEC, timing=Timing(1_000_000, 1400, 10), external_tick=True, max_tick_cycles=1400, multiplier="serial"
 )
 NAMES = ["velocity", "acceleration", "position_fine", "velocity_std", "interval", "forced", "standstill"]
+REST = ("acceleration", "position_fine", "velocity_std")  # they come with `update_valid`
 COMPILED = compiled.clock_by_clock
 Update = tuple[int, ...]  # clock, and what the update says
 
 
 def rows_of(spec: TrackTachometer, steps: Steps, last: NDArray[np.int64]) -> list[dict[str, int]]:
     """Return inputs of every clock, until the last update has come."""
-    rows = [{"step": 0, "tick": 0, "rst": 0} for _ in range(int(last[-1]) + spec.latency.datapath + 1)]
+    rows = [{"step": 0, "tick": 0, "rst": 0} for _ in range(int(last[-1]) + spec.latency.native_update + 1)]
     for clock, step in zip(steps.clock.tolist(), steps.step.tolist(), strict=True):
         rows[clock]["step"] = step
     through = np.append(0, np.cumsum(steps.step))[np.searchsorted(steps.clock, last, side="right")]
@@ -47,13 +48,15 @@ def rows_of(spec: TrackTachometer, steps: Steps, last: NDArray[np.int64]) -> lis
 
 
 def updates_of(spec: TrackTachometer, rows: Sequence[Mapping[str, int]], play: Player = COMPILED) -> Iterator[Update]:
-    """Yield all updates; from one to the next the outputs stay."""
-    seen = play(Resettable(track.TrackMethod(spec)), rows, ["velocity_valid", *NAMES])
-    held = dict.fromkeys(NAMES, 0)
+    """Yield all updates, with the clock of the velocity; from one to the next the outputs stay."""
+    seen = play(Resettable(track.TrackMethod(spec)), rows, ["velocity_valid", "update_valid", *NAMES])
+    held, later = dict.fromkeys(NAMES, 0), spec.latency.native_update - spec.latency.datapath
     for clock, (row, given) in enumerate(zip(seen, rows, strict=True)):
         if row["velocity_valid"]:
-            held = row
-            yield clock, *(row[name] for name in NAMES)
+            held = held | {name: row[name] for name in NAMES if name not in REST}
+        if row["update_valid"]:
+            held = held | {name: row[name] for name in REST}
+            yield clock - later, *held.values()
         assert given["rst"] or all(row[name] == held[name] for name in NAMES)
         held = dict.fromkeys(NAMES, 0) if given["rst"] else held
 

@@ -36,6 +36,7 @@ def check(program: Program, rows: Sequence[Sequence[int]], play: Player = clock_
     right = Interpreter(program)
     for number, row in enumerate(rows):
         expected = right.tick(*row)
+        assert seen[number * spacing + program.velocity_clocks - 1]["velocity"] == expected[0], f"tick {number}"
         for after in (program.clocks - 1, spacing - 1):
             shown = seen[number * spacing + after]
             assert tuple(shown[name] for name in program.outputs) == expected, f"tick {number}, {after} clocks later"

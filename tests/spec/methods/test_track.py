@@ -37,11 +37,13 @@ def with_tick(cycles: int, multiplier: str) -> TrackTachometer:
 
 @pytest.mark.parametrize("multiplier", ["serial", "block"])
 def test_the_shortest_tick_is_that_of_the_program(multiplier: str) -> None:
-    """The update comes earlier."""
+    """The update comes earlier, and the velocity of the quick machine before the rest of it."""
     spec = core(multiplier=multiplier)
     shortest = spec.times.min_tick_cycles
     assert shortest == spec.program.all_clocks == spec.latency.busy
-    assert spec.latency.datapath == spec.program.clocks < shortest
+    assert spec.latency.datapath == spec.program.velocity_clocks <= spec.latency.native_update == spec.program.clocks
+    assert spec.program.clocks < shortest
+    assert ("tick_to_update" in spec.latency_entries) == (multiplier == "block")
     assert with_tick(shortest, multiplier).times.min_tick_cycles == shortest
     with pytest.raises(ParameterError, match=r"^tick must be longer for method track"):
         with_tick(shortest - 1, multiplier)
