@@ -130,7 +130,7 @@ class Gates(wiring.Component):
             m.d.sync += before.eq(Mux(marks, place, before))
             with m.If(marks & ~zeroes & ~self.angle_refused.all()):
                 m.d.sync += self.angle_refused.eq(self.angle_refused + 1)
-        angle, left = counted_on(m, angles, step, sum_, rest)
+        angle, left = counted_on(angles, step, sum_, rest)
         # A zero is added to no sum, as it is known late.
         first = Mux(step[0], Mux(step[1], angles.of(-1), angles.of(1)), angles.of(0))
         begun = Mux(step[0], Mux(step[1], -angles.count[1] % counts, angles.count[1]), 0)
@@ -254,15 +254,13 @@ class Gates(wiring.Component):
         return (phase + debt)[:bits], grows
 
 
-def counted_on(m: Module, angles: Angles, step: Value, angle: Value, left: Value) -> tuple[Value, Value]:
+def counted_on(angles: Angles, step: Value, angle: Value, left: Value) -> tuple[Value, Value]:
     """Return an angle, and what is left of it in 1/counts, after a step."""
     counts, (quotient, remainder), back = angles.counts, angles.count, step[1]
-    on = Signal(signed(counts.bit_length() + 2))
-    over = Signal.like(on)
-    m.d.comb += [on.eq(left + Mux(back, -remainder, remainder)), over.eq(on + Mux(back, counts, -counts))]
-    wraps, move = Mux(back, on[-1], ~over[-1]), Const(quotient, angles.bits)
+    wraps, move = Mux(back, left < remainder, left >= counts - remainder), Const(quotient, angles.bits)
+    change = Mux(back, Mux(wraps, counts - remainder, -remainder), Mux(wraps, remainder - counts, remainder))
     moved = angle + Mux(step[0], move ^ back.replicate(len(move)), 0) + (step[0] & (wraps ^ back))
-    return moved, Mux(step[0], Mux(wraps, over, on)[: len(left)], left)
+    return moved, Mux(step[0], (left + change)[: len(left)], left)
 
 
 def phase_products(

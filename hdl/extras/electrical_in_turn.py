@@ -82,7 +82,7 @@ class Gates(wiring.Component):
         before = Signal(kept)
         after = Signal(kept)
         zeroes = rises | ~ready  # the memory is not that of a reset
-        moved, rest = counted_on(m, angles, step, before.angle, before.rest)
+        moved, rest = counted_on(angles, step, before.angle, before.rest)
         m.d.sync += [
             before.eq(read.data),
             after.angle.eq(Mux(zeroes, angles.of(0), moved)),
