@@ -7,21 +7,25 @@ import re
 import struct
 import subprocess
 import sys
+import tempfile
+from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import IO, Any, cast
 
 from tachometry.sim.captures.file import ANY, CaptureError, Channels, OptionError, check_regular, flow_of, reading
 from tachometry.sim.captures.waveform import Changes, Names, Variable
 from tachometry.sim.signals.flow import Flow, Parts
-from tachometry.sim.signals.temporary import run_tool
+from tachometry.sim.signals.temporary import running
 
 _HEADER = struct.Struct(">BQQQ")  # type of the first block, its length, time of the beginning and of the end
 _PLAIN, _PACKED = 0, 254  # types of it
 # Limits of the process that reads a file, which may be packed a thousand times as tightly: seconds, bytes of its memory
-# (its list of times has 8 for each), and characters that it prints of the names, and of the changes, some 16 for each.
-_LONGEST, _MOST_MEMORY, _MOST_NAMES, _MOST_CHANGES = 600.0, 2 << 30, 1 << 24, 1 << 28
+# (its list of times has 8 for each), and characters of all names and of one change that it prints, and of its errors.
+_LONGEST, _MOST_MEMORY, _MOST_NAMES, _MOST_CHANGE, _MOST_ERRORS = 600.0, 2 << 30, 1 << 24, 1 << 16, 1 << 16
 _TOO_MUCH = 3  # exit status of one that would print more
+_CHILD = [sys.executable, "-P", "-m", "tachometry.sim.captures.fst_child"]
+_CHANGE = re.compile(r"(\d+) (\d+) (.*)\n")
 
 
 def _head(path: Path, samplerate_hz: float | None) -> bytes:
@@ -53,7 +57,7 @@ def read_fst(path: str | os.PathLike[str], wanted: Channels = ANY, samplerate_hz
 
 
 def _parts(path: Path, wanted: Channels, head: bytes) -> Parts:
-    known: dict[str, Any] = json.loads(_printed(path))
+    known: dict[str, Any] = json.loads("".join(_printed(path)))
     if not known["unit"]:
         raise CaptureError(f"{path} must have a unit of its times")
     names = Names(path)
@@ -64,33 +68,42 @@ def _parts(path: Path, wanted: Channels, head: bytes) -> Parts:
     changes = Changes(path, variables, wanted, factor * Fraction(10) ** power)
     codes = sorted(map(int, changes.codes))
     *_, end = _HEADER.unpack(head)
-    time = -1
-    for row in re.finditer(r"(\d+) (\d+) (.*)\n", _printed(path, *codes)):
-        time = int(row[1])
-        yield from changes.at(time)
-        changes.change(int(row[2]), row[3])
+    time, size = -1, path.stat().st_size
+    if head[0] == _PLAIN:
+        changes.position = lambda: min(time, end) * size // max(end, 1)
+    for line in _printed(path, *codes):
+        if row := _CHANGE.fullmatch(line):
+            time = int(row[1])
+            yield from changes.at(time)
+            changes.change(int(row[2]), row[3])
     if head[0] == _PLAIN and end > time:
         yield from changes.at(end)
     notes = [f"bit 0 of {variables[code].name} is its last one" for code in codes if variables[code].size > 1]
     return (yield from changes.end(notes))
 
 
-def _printed(path: Path, *codes: int) -> str:
-    """Return the output of another process that reads the file, see `fst_child`."""
-    child = [sys.executable, "-P", "-m", "tachometry.sim.captures.fst_child"]
-    most = _MOST_CHANGES if codes else _MOST_NAMES
-    try:
-        done = run_tool([*child, str(path), str(most), *map(str, codes)], seconds=_LONGEST, memory=_MOST_MEMORY)
-    except subprocess.TimeoutExpired:
-        raise _too_large(path, f"{_LONGEST:g} s") from None
-    if done.returncode == _TOO_MUCH:
-        raise _too_large(path, f"{most} characters for its {'changes' if codes else 'names'}")
-    if done.returncode and re.search(r"MemoryError|memory allocation", done.stderr):
+def _printed(path: Path, *codes: int) -> Iterator[str]:
+    """Yield the lines that another process prints, which reads the file, see `fst_child`."""
+    most = _MOST_CHANGE if codes else _MOST_NAMES
+    words = [*_CHILD, str(_LONGEST), str(path), str(most), *map(str, codes)]
+    with tempfile.TemporaryFile() as errors:
+        try:
+            with running(words, seconds=_LONGEST, memory=_MOST_MEMORY, errors=errors) as child:
+                cast(IO[str], child.stdin).close()
+                yield from cast(IO[str], child.stdout)
+        except subprocess.TimeoutExpired:
+            raise _too_large(path, f"{_LONGEST:g} s") from None
+        errors.seek(max(errors.seek(0, os.SEEK_END) - _MOST_ERRORS, 0))
+        said = errors.read().decode(errors="replace")
+    if child.returncode == _TOO_MUCH:
+        raise _too_large(path, f"{most} characters for {'a change' if codes else 'its names'}")
+    if child.returncode and said.startswith("Timeout"):
+        raise _too_large(path, f"{_LONGEST:g} s")
+    if child.returncode and re.search(r"MemoryError|memory allocation", said):
         raise _too_large(path, f"{_MOST_MEMORY} bytes of memory")
-    if done.returncode:
-        reasons = re.findall(r"^\w+Error: (.*\w)", done.stderr, re.MULTILINE)  # a panic speaks of the reader's inside
+    if child.returncode:
+        reasons = re.findall(r"^\w+Error: (.*\w)", said, re.MULTILINE)  # a panic speaks of the reader's inside
         raise _damaged(path, *reasons[-1:])
-    return done.stdout
 
 
 def _too_large(path: Path, limit: str) -> CaptureError:

@@ -1,6 +1,7 @@
 """Print what is in a waveform, for `read_fst`: pywellen ends the process where a file is damaged."""
 
 import contextlib
+import faulthandler
 import json
 import sys
 from collections import defaultdict
@@ -12,14 +13,11 @@ def main(path: str, most: str, *chosen: str) -> None:
     """Print, as JSON, the unit of the times as a factor and a power of ten of seconds, and name and size of all
     variables that have bits; or, of the variables with these numbers, a line for each change: time, number, value.
 
-    It ends with status 3 rather than print more than `most` characters.
+    It ends with status 3 rather than print more than `most` characters at once.
     """
-    left = int(most)
 
     def show(text: str) -> None:
-        nonlocal left
-        left -= len(text)
-        if left < 0:
+        if len(text) > int(most):
             sys.exit(3)
         sys.stdout.write(text)
 
@@ -44,5 +42,8 @@ def main(path: str, most: str, *chosen: str) -> None:
 
 if __name__ == "__main__":
     sys.stdin.read()  # it ends when the limits of this process are set
+    _, seconds, *words = sys.argv
+    if sys.platform != "linux":  # where there are none
+        faulthandler.dump_traceback_later(float(seconds), exit=True)
     with contextlib.suppress(BrokenPipeError):
-        main(*sys.argv[1:])
+        main(*words)

@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import IO
 
 if sys.platform != "win32":
     import fcntl
@@ -133,18 +134,51 @@ def locked(folder: Path) -> Iterator[None]:
             os.close(descriptor)
 
 
-def _begun(command: Sequence[str], folder: Path | None, variables: Mapping[str, str]) -> "subprocess.Popen[str]":
-    return subprocess.Popen(
-        command,
-        cwd=folder,
-        env=variables,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        encoding="utf-8",  # whatever the locale is
-        errors="replace",
-        process_group=0,
-    )
+@contextmanager
+def running(
+    command: Sequence[str],
+    folder: Path | None = None,
+    seconds: float | None = None,
+    memory: int | None = None,
+    variables: Mapping[str, str] | None = None,
+    errors: int | IO[bytes] = subprocess.PIPE,
+) -> Iterator["subprocess.Popen[str]"]:
+    """Give a tool that runs, with its streams, which ends with all of its processes, whatever ends the wait for it.
+
+    Its temporary files are in `folder`, in which it runs, if that is given. A signal from the terminal does not reach
+    it. It has at most `memory` bytes, by default those of the computer, where Linux keeps it to them, and these
+    environment variables in addition to those of this process.
+
+    It raises OSError if it cannot be run; subprocess.TimeoutExpired if it takes more than `seconds` of the processor,
+    where Linux counts them.
+    """
+    ours = {} if folder is None else dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(folder))
+    started: list[subprocess.Popen[str]] = []
+    try:
+        with held_back():
+            process = subprocess.Popen(
+                command,
+                cwd=folder,
+                env={**os.environ, **ours, **(variables or {})},
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                encoding="utf-8",  # whatever the locale is
+                errors="replace",
+                process_group=0,
+            )
+            started.append(process)
+        _running.update(started)
+        _limit(process.pid, memory, seconds)
+        yield process
+        process.wait()
+        if sys.platform == "linux" and process.returncode == -signal.SIGXCPU:
+            raise subprocess.TimeoutExpired(command, seconds or _LONGEST)
+    finally:
+        with held_back():
+            for process in started:
+                _end(process)
+        _running.difference_update(started)
 
 
 def run_tool(
@@ -155,33 +189,13 @@ def run_tool(
     memory: int | None = None,
     variables: Mapping[str, str] | None = None,
 ) -> "subprocess.CompletedProcess[str]":
-    """Run a tool with a text as its input; it ends with all of its processes, whatever ends the wait for it.
+    """Run a tool, see `running`, with a text as its input.
 
-    Its temporary files are in `folder`, in which it runs, if that is given. A signal from the terminal does not reach
-    it. It has at most `memory` bytes, by default those of the computer, where Linux keeps it to them, and these
-    environment variables in addition to those of this process.
-
-    It raises OSError if it cannot be run; subprocess.TimeoutExpired if it takes more than `seconds` of the processor,
-    or four hours; without Linux, if it takes `seconds`.
+    It also raises subprocess.TimeoutExpired if it takes four hours; without Linux, if it takes `seconds`.
     """
-    ours = {} if folder is None else dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(folder))
-    started: list[subprocess.Popen[str]] = []
-    try:
-        with held_back():
-            started.append(_begun(command, folder, {**os.environ, **ours, **(variables or {})}))
-        _running.update(started)
-        _limit(started[0].pid, memory, seconds)
-        out, err = started[0].communicate(text, _LONGEST if sys.platform == "linux" else seconds or _LONGEST)
-        if sys.platform == "linux" and started[0].returncode == -signal.SIGXCPU:
-            raise subprocess.TimeoutExpired(command, seconds or _LONGEST)
-    except BaseException:
-        with held_back():
-            for process in started:
-                _end(process)
-        raise
-    finally:
-        _running.difference_update(started)
-    return subprocess.CompletedProcess(command, started[0].returncode, out, err)
+    with running(command, folder, seconds, memory, variables) as process:
+        out, err = process.communicate(text, _LONGEST if sys.platform == "linux" else seconds or _LONGEST)
+    return subprocess.CompletedProcess(command, process.returncode, out, err)
 
 
 def _limit(pid: int, memory: int | None, seconds: float | None) -> None:
@@ -203,12 +217,9 @@ def end_tools() -> None:
 
 def _end(process: "subprocess.Popen[str]") -> None:
     """Kill a tool with all that it has started."""
-    if sys.platform == "win32":
-        process.kill()
-    elif process.returncode is None:
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-    for stream in (process.stdin, process.stdout, process.stderr):
-        if stream is not None:
-            stream.close()
-    process.wait()
+    with process:  # which closes its streams, and waits
+        if sys.platform == "win32":
+            process.kill()
+        elif process.returncode is None:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)

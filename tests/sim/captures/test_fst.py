@@ -2,6 +2,7 @@
 
 import importlib.util
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -9,10 +10,10 @@ from pathlib import Path
 import pytest
 from support.captures import assert_same
 
-from tachometry.sim.captures import fst
+from tachometry.sim.captures import file, fst, waveform
 from tachometry.sim.captures.file import CaptureError
 from tachometry.sim.captures.read import read_capture
-from tachometry.sim.signals.temporary import run_tool
+from tachometry.sim.signals import temporary
 
 BENCH = """\
 `timescale 1 ns / 1 ps
@@ -98,7 +99,7 @@ def test_a_plain_waveform_of_this_name_is_refused(folder: Path) -> None:
 
 @pytest.mark.parametrize(
     ("limit", "most", "said"),
-    [("_MOST_NAMES", 10, "10 characters for its names"), ("_MOST_CHANGES", 100, "100 characters for its changes")],
+    [("_MOST_NAMES", 10, "10 characters for its names"), ("_MOST_CHANGE", 5, "5 characters for a change")],
 )
 def test_a_file_beyond_a_limit_is_refused(
     limit: str, most: int, said: str, folder: Path, monkeypatch: pytest.MonkeyPatch
@@ -117,9 +118,34 @@ def test_a_reader_that_takes_too_much_is_ended(
 ) -> None:
     greedy = [sys.executable, "-c", f"import sys; {work}"]
     monkeypatch.setattr(fst, "_LONGEST", 1)
-    monkeypatch.setattr(fst, "run_tool", lambda command, **limits: run_tool(greedy, **limits))
+    monkeypatch.setattr(fst, "_CHILD", greedy)
     with pytest.raises(CaptureError, match=rf"w\.fst needs more than {said}: dump only "):
         read_capture(folder / "w.fst")
+
+
+ENDLESS = """\
+import itertools, sys
+sys.stdin.read()
+if len(sys.argv) < 5:
+    sys.exit(print('{"unit": [1, -9], "variables": [["a", 1], ["b", 1]]}'))
+for k in itertools.count():
+    print(k, k & 1, k >> 1 & 1)
+"""
+
+
+def test_changes_are_taken_as_they_come(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From a reader that would never end, which ends with those who take them, or with their refusal."""
+    monkeypatch.setattr(fst, "_CHILD", [sys.executable, "-c", ENDLESS])
+    monkeypatch.setattr(waveform, "ROWS", 16)
+    flow = fst.read_fst(folder / "w.fst")
+    assert len(next(flow.parts).time) == 16
+    (child,) = temporary._running
+    flow.parts.close()
+    assert child.returncode == -signal.SIGKILL
+    monkeypatch.setattr(file, "MAX_EDGES", 40)
+    with pytest.raises(CaptureError, match=r"w\.fst must have at most 40 changes of the lines, and has more$"):
+        read_capture(folder / "w.fst")
+    assert not temporary._running
 
 
 def test_a_missing_file_is_named(folder: Path) -> None:
