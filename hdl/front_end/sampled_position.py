@@ -73,7 +73,7 @@ class SampledPosition(Box):
         with m.If(taken):
             m.d.sync += [self.open_number.eq(1), self.open_sample.eq(read), self.open_times.eq(age)]
         if (reach := self._spec.reach) is not None:
-            self._find_jumps(m, reach, good, read)
+            self._find_jumps(m, reach, good, taken, read)
         if self._spec.external_tick:
             length = Signal.like(self.length, name="open_length", init=1)
             m.d.sync += length.eq(length + 1)
@@ -81,27 +81,28 @@ class SampledPosition(Box):
                 m.d.sync += [self.length.eq(length), length.eq(1)]
         self._close(m)
 
-    def _find_jumps(self, m: Module, reach: Reach, good: Value, read: Value) -> None:
+    def _find_jumps(self, m: Module, reach: Reach, good: Value, taken: Value, read: Value) -> None:
         """Refuse a good read out of reach of the last one, unless it is within reach of one that was just refused."""
         held = Signal()  # a read has been taken
         before = Signal(reach.width)  # the good read before, taken or not
-        value = Signal(range(reach.most + 1))
-        raised = value + reach.step
+        value = Signal(reach.bits, init=reach.first)  # so its load is a reset of registers, which takes no cell
 
         def is_far(name: str, other: Value) -> Value:
             way = Signal(signed(reach.width), name=name)
             m.d.comb += way.eq(read - other)
             return Cat(way[-1], (way ^ way[-1].replicate(reach.width))[:-1]) > Cat(C(0, 1), value >> reach.frac_bits)
 
-        far = held & is_far("way", self.open_sample)
-        again = far & ~is_far("way_before", before)
+        far = Signal()
+        again = Signal()  # unless it is far too
+        m.d.comb += [far.eq(held & is_far("way", self.open_sample)), again.eq(~is_far("way_before", before))]
         m.d.comb += self.jump.eq(good & far & ~again)
-        m.d.sync += value.eq(Mux(raised > reach.most, reach.most, raised))
+        with m.If(~value[-1]):
+            m.d.sync += value.eq(value + reach.step)
+        with m.If(taken):
+            m.d.sync += [held.eq(1), value.eq(reach.first)]
         with m.If(good):
             m.d.sync += before.eq(read)
-            with m.If(~self.jump):
-                m.d.sync += [held.eq(1), value.eq(reach.first)]
-            with m.If(again):
+            with m.If(far & again):
                 m.d.sync += self.anew.eq(1)
 
     def _close(self, m: Module) -> None:

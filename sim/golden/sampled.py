@@ -85,7 +85,7 @@ def _jumps(
     refused, anew = np.zeros(len(clock), dtype=bool), np.zeros(len(clock), dtype=bool)
     held, since, before = int(sample[0]) if len(sample) else 0, int(clock[0]) if len(clock) else 0, 0
     for row, (at, place) in enumerate(zip(clock.tolist(), sample.tolist(), strict=True)):
-        most = min(reach.first + reach.step * (at - since - 1), reach.most) >> reach.frac_bits
+        most = reach.first + reach.step * (at - since - 1) >> reach.frac_bits
         if far := abs((place - held + size // 2) % size - size // 2) > most:
             anew[row] = abs((place - before + size // 2) % size - size // 2) <= most
         refused[row] = far and not anew[row]

@@ -27,8 +27,9 @@ def parse_bits(what: str, text: str) -> str:
 class Reach:
     """How far a read may be from the last one that was taken: more is a jump, and is not taken.
 
-    A register holds it, with `frac_bits` bits below an LSB of the read: it is `first` in the clock after a read
-    that is taken, and rises by `step` in each clock, up to `most`.
+    A register of `bits` holds it, with `frac_bits` of them below an LSB of the read: it is `first` in the clock after a
+    read that is taken, and rises by `step` in each clock, until its highest bit is set: no read is further away than
+    half of all.
     """
 
     width: int  # bits of a read
@@ -41,12 +42,12 @@ class Reach:
         """Return it for this greatest speed; ages of reads differ by at most `age_spread` clocks."""
         bits = max(0, 10 - math.floor(math.log2(counts_per_clock)))
         step = math.ceil(counts_per_clock * (1 << bits))
-        return cls(width, min((_AT_ONCE << bits) + step * (age_spread + 1), (1 << width - 1 + bits) - 1), step, bits)
+        return cls(width, min((_AT_ONCE << bits) + step * (age_spread + 1), 1 << width - 1 + bits), step, bits)
 
     @property
-    def most(self) -> int:
-        """Its greatest value: no read is further away than half of all."""
-        return (1 << self.width - 1 + self.frac_bits) - 1
+    def bits(self) -> int:
+        """Bits of the register."""
+        return self.width + self.frac_bits
 
 
 @dataclass(frozen=True)
