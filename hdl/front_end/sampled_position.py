@@ -50,7 +50,7 @@ class SampledPosition(Box):
         # Of the window that has not ended.
         self.open_number = Signal()
         self.open_sample = Signal(sampled.width)
-        self.open_times = Signal.like(self.times)
+        self.open_times = Signal.like(self.times)  # from the strobe of the read
         self.sample_before = Signal(sampled.width)
         self.anew = Signal()  # all that was known is not: a read of the window is far from those before it
         self.turns = Signal(signed(max(spec.position_width - sampled.width, 1)))
@@ -60,6 +60,7 @@ class SampledPosition(Box):
         age = by_name(self, ("sample_age",))["sample_age"] if sampled.age is None else sampled.age
         good = Signal()
         taken = Signal()
+        open_age = Signal.like(self.times, init=0)  # added late: a load of `open_times` would cost many cells
         read = Signal(sampled.width)
         m.d.comb += [
             read.eq(-self.sample if self._spec.encoder.reverse else self.sample),
@@ -71,7 +72,7 @@ class SampledPosition(Box):
         with m.If(self.coming):
             m.d.sync += [self.open_number.eq(0), self.anew.eq(0), self.forgets.eq(self.anew)]
         with m.If(taken):
-            m.d.sync += [self.open_number.eq(1), self.open_sample.eq(read), self.open_times.eq(age)]
+            m.d.sync += [self.open_number.eq(1), self.open_sample.eq(read), self.open_times.eq(0), open_age.eq(age)]
         if (reach := self._spec.reach) is not None:
             self._find_jumps(m, reach, good, taken, read)
         if self._spec.external_tick:
@@ -79,7 +80,7 @@ class SampledPosition(Box):
             m.d.sync += length.eq(length + 1)
             with m.If(self.coming):
                 m.d.sync += [self.length.eq(length), length.eq(1)]
-        self._close(m)
+        self._close(m, open_age)
 
     def _find_jumps(self, m: Module, reach: Reach, good: Value, taken: Value, read: Value) -> None:
         """Refuse a good read out of reach of the last one, unless it is within reach of one that was just refused."""
@@ -105,7 +106,7 @@ class SampledPosition(Box):
             with m.If(far & again):
                 m.d.sync += self.anew.eq(1)
 
-    def _close(self, m: Module) -> None:
+    def _close(self, m: Module, open_age: Value) -> None:
         """Take the read of a window that has ended."""
         width, most_ticks = self._sampled.width, self._spec.timing.max_ticks
         known = self.position_valid & self.open_number & ~self.anew
@@ -133,7 +134,7 @@ class SampledPosition(Box):
                 self.pulse_count.eq(held),
                 self.overflow.eq(overflow),
                 self.number.eq(self.open_number),
-                self.times.eq(self.open_times),
+                self.times.eq(self.open_times + open_age),
                 self.elapsed.eq(waited),
                 self.silent.eq(Mux(self.open_number, 0, waited)),
             ]
