@@ -36,7 +36,8 @@ def of_frames(recording: Recording, spec: TachometerSpec) -> Recording:
     reads_at_rise = isinstance(reads, SpiReads) and not reads.facts.falling
     edge = recording.time[1:][(recording.a[1:] == reads_at_rise) & (recording.a[:-1] != reads_at_rise)]
     if len(edge) < 3:
-        raise CaptureError("a capture must have frames: line A must be the encoder's clock, which falls in each bit")
+        line = "the request" if isinstance(reads, TformatReads) else "the encoder's clock, which falls in each bit"
+        raise CaptureError(f"a capture must have frames: line A must be {line}")
     time, found = (_requested if isinstance(reads, TformatReads) else _clocked)(recording, edge, reads)
     good = found.reason == 0
     wrong = ", ".join(f"{_REASONS[why]} {n}" for why, n in Counter(found.reason[~good].tolist()).items())

@@ -92,3 +92,6 @@ def test_what_is_no_frame_is_refused(tmp_path: Path, capsys: pytest.CaptureFixtu
     ):
         assert run("replay", *line, *more, *(() if "--a" in more else ("--a", "MA"))) == 2
         assert why in capsys.readouterr().err
+    read = ["--sensor", "tformat", "--bits", "17", "--clock", "20MHz", "--tick", "200us"]
+    assert run("replay", *[words[0], *read, "--a", "x", "--b", "MA"]) == 2
+    assert "line A must be the request" in capsys.readouterr().err
