@@ -95,3 +95,10 @@ def test_what_is_no_frame_is_refused(tmp_path: Path, capsys: pytest.CaptureFixtu
     read = ["--sensor", "tformat", "--bits", "17", "--clock", "20MHz", "--tick", "200us"]
     assert run("replay", *[words[0], *read, "--a", "x", "--b", "MA"]) == 2
     assert "line A must be the request" in capsys.readouterr().err
+
+
+def test_a_capture_of_positions_that_are_read_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Their lines are not A and B: it would have two lines that rest."""
+    read = ["--sensor", "biss", "--bits", "17", "--clock", "20MHz", "--tick", "200us", "--motion", "stop:1ms"]
+    assert run("simulate", *read, "--save-capture", str(tmp_path / "x.sr")) == 2
+    assert "--save-capture must not be given with positions that are read" in capsys.readouterr().err
