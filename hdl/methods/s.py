@@ -28,8 +28,8 @@ class SMethod(Box):
 
     def __init__(self, spec: STachometer) -> None:
         self._spec = spec
-        off, ticks = spec.displacement, spec.timing.max_ticks
-        self.ends = None if off is None else WindowEnds(off, ticks, spec.form.kept_ticks)
+        off, ticks, once = spec.displacement, spec.timing.max_ticks, spec.tick.room <= 1
+        self.ends = None if off is None else WindowEnds(off, ticks, spec.form.kept_ticks, every_clock=once)
         super().__init__(
             **datapath_members(spec),
             coming=In(1),  # `tick` is high in the next clock

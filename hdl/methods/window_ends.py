@@ -19,10 +19,11 @@ class WindowEnds(Box):
     tick are seen by then.
 
     - `max_ticks`, `kept_ticks`: See `IntervalAccumulator`.
+    - `every_clock`: `coming` may come with the `tick` of the tick before.
     """
 
-    def __init__(self, form: Displacement, max_ticks: int, kept_ticks: int) -> None:
-        self._form = form
+    def __init__(self, form: Displacement, max_ticks: int, kept_ticks: int, *, every_clock: bool) -> None:
+        self._form, self._every_clock = form, every_clock
         self._moved_on, self._is_next = max_ticks - kept_ticks, max_ticks == 2 * kept_ticks
         super().__init__(
             **dict.fromkeys(DISPLACED, In(signed(form.width))),
@@ -38,7 +39,8 @@ class WindowEnds(Box):
 
     def build(self, m: Module) -> None:
         pair = signed(self._form.width + 1)
-        end, opening, kept = (Signal(pair, name=name) for name in ("end", "opening", "kept"))
+        end, opening, kept, begun = (Signal(pair, name=name) for name in ("end", "opening", "kept", "begun"))
+        closes = self.tick & self.closes
         above, below, above_was, below_was = (
             Signal(signed(self._form.width), name=name) for name in ("above", "below", "above_was", "below_was")
         )
@@ -51,12 +53,13 @@ class WindowEnds(Box):
             above.eq(Mux(back, latest, self.displaced)),
             below.eq(Mux(back, self.displaced, latest)),
             now.eq(Mux(self.rises, above_was, below_was) + Mux(self.rises, below, above)),
-            self.difference.eq(now - opening),
+            begun.eq(Mux(self.forced, kept, end)),
+            self.difference.eq(now - (Mux(closes, begun, opening) if self._every_clock else opening)),
         ]
         with m.If(self.coming):
             m.d.sync += [above_was.eq(above), below_was.eq(below), end.eq(now)]
-        with m.If(self.tick & self.closes):
-            m.d.sync += opening.eq(Mux(self.forced, kept, end))
+        with m.If(closes):
+            m.d.sync += opening.eq(begun)
         # With this tick the half of a window opens that a forced update keeps.
         with m.If(self.tick & ((self.m_s == self._moved_on) | (self.forced if self._is_next else 0))):
             m.d.sync += kept.eq(end)

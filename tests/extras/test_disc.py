@@ -103,6 +103,7 @@ WRITTEN = (
     Mapped("track", "disc-table=sectors:20 index=yes tick=300clk max-time=3000clk max-speed=20rev/s", 60, 90_000),
     Mapped("t", "disc-table=sectors index=yes bounds=yes", edges=100, late=True),
     Mapped("s", "disc-table=sectors:11 index=yes", edges=100, late=True),
+    Mapped("s", "disc=far.json index=yes tick=1clk max-time=3clk max-speed=9000rev/s", edges=200, clocks=4000),
 )
 # Beside what shows a place of the shaft.
 _FINE = "disc=far.json index=yes tick=400clk max-time=4000clk"
