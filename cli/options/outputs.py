@@ -49,7 +49,7 @@ def outputs_of(spec: CoreSpec, targets: Mapping[str, Path], inputs: Sequence[Pat
     outputs = Outputs(targets, inputs)
     if spec.axes is not None and "--plot" in targets:
         raise ValueError("--plot must not be given together with --axes: a figure is of one axis")
-    if "--save-capture" in targets and spec.axes is None and spec.tachometer.encoder.sampled is not None:
+    if "--save-capture" in targets and spec.tachometer.encoder.sampled is not None:
         raise ValueError("--save-capture must not be given with positions that are read: it has A and B")
     return outputs
 

@@ -156,17 +156,11 @@ def running(
     started: list[subprocess.Popen[str]] = []
     try:
         with held_back():
+            env, pipe = {**os.environ, **ours, **(variables or {})}, subprocess.PIPE
             process = subprocess.Popen(
-                command,
-                cwd=folder,
-                env={**os.environ, **ours, **(variables or {})},
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=errors,
-                encoding="utf-8",  # whatever the locale is
-                errors="replace",
-                process_group=0,
-            )
+                command, cwd=folder, env=env, stdin=pipe, stdout=pipe, stderr=errors, process_group=0,
+                encoding="utf-8", errors="replace",  # whatever the locale is
+            )  # fmt: skip
             started.append(process)
         _running.update(started)
         _limit(process.pid, memory, seconds)
