@@ -3,14 +3,13 @@
 from typing import Self
 
 from amaranth import Array, C, Cat, Const, Module, Mux, Signal, Value, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.products import Product, take_products
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.arithmetic.sine_cosine import SineCosine, SineTable
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import by_name, only_if
+from tachometry.hdl.wires.ports import Box, by_name, only_if
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.electrical import LEADS, REFUSED, REFUSED_BITS, ElectricalAngle
 from tachometry.spec.formats.angles import LEAD_BITS, SHOWN_BITS, SLOPE_BITS, Angles, Factor
@@ -18,7 +17,7 @@ from tachometry.spec.formats.sine import AHEAD_BITS
 from tachometry.spec.formats.velocity_output import VelocityOutput
 
 
-class Gates(wiring.Component):
+class Gates(Box):
     """The angle of the counts, carried on to every clock, and a shift that `angle_set` and an offset make.
 
     A set in clock c takes the value of clock c + 1. `latency` is that of a step to the position that has it. `inputs`
@@ -62,8 +61,7 @@ class Gates(wiring.Component):
             inputs |= {"home_rises": 1} if spec.front_end.index_once else {}
         return cls(extra, extra.angles(spec), spec.latency.tick, inputs, corrects=extra.corrects(spec))
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         indexed = Signal()
         sets = Signal()
         members = self.signature.members
@@ -105,7 +103,6 @@ class Gates(wiring.Component):
                 self.angle_sin.eq(box.sin),
                 self.angle_cos.eq(box.cos),
             ]
-        return m
 
     def _count(self, m: Module, step: Value, rises: Value, indexed: Value) -> tuple[Signal, Signal]:
         """Return the angle of the counts, a clock after a step, and whether an index zeroes it in the next clock.

@@ -3,20 +3,21 @@
 from typing import Self
 
 from amaranth import Array, C, Module, Mux, Signal, signed
-from amaranth.lib import data, wiring
+from amaranth.lib import data
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.products import take_products
 from tachometry.hdl.extras.electrical import counted_on, phase_products
 from tachometry.hdl.wires.delay import delay
+from tachometry.hdl.wires.ports import Box
 from tachometry.spec import AxesSpec
 from tachometry.spec.core.extras.electrical import AngleInTurn
 from tachometry.spec.formats.angles import SHOWN_BITS
 from tachometry.spec.formats.settling import PLACE_BITS
 
 
-class Gates(wiring.Component):
+class Gates(Box):
     """Adds up the angles of the counts of all axes in a memory, and carries that of one on when it is shown.
 
     With `tick` the outputs of the datapath are those of `axis`, until the next one.
@@ -48,8 +49,7 @@ class Gates(wiring.Component):
     def of(cls, extra: AngleInTurn, spec: AxesSpec) -> Self:
         return cls(extra, spec)
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         angles, extra = self._angles, self._extra
         at, known = self._count(m)
         fine_bits = angles.position_fine_bits
@@ -65,7 +65,6 @@ class Gates(wiring.Component):
         m.d.sync += self.shows.eq(done)
         with m.If(done):
             m.d.sync += [self.angle.eq(start[-SHOWN_BITS:] + extra.offset), self.angle_valid.eq(known)]
-        return m
 
     def _count(self, m: Module) -> tuple[Signal, Signal]:
         """Add up the steps of all axes; return the angle of `axis` in its tick, and whether there was an index."""

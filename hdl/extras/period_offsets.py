@@ -3,26 +3,29 @@
 from typing import Self
 
 from amaranth import Module, Mux, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from tachometry.hdl.wires.ports import Box
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.period_offsets import PeriodOffsets
 from tachometry.spec.formats.tracking_sampled import OFFSET_BITS
 
 
-class Gates(wiring.Component):
+class Gates(Box):
     """A write waits until the machine begins, which reads no offset then; the first time it forgets them all."""
 
     def __init__(self) -> None:
         word = signed(OFFSET_BITS)
         super().__init__(
-            {
-                **{name: In(1) for name in ("tick", "period_write")},
-                **{"period_address": In(2), "period_data": In(OFFSET_BITS), "offset_read": In(word)},
-                **{"offset_written": Out(1), "offset_at": Out(2), "offset_value": Out(word)},
-                "period_offset": Out(word),
-            }
+            tick=In(1),
+            period_write=In(1),
+            period_address=In(2),
+            period_data=In(OFFSET_BITS),
+            period_offset=Out(word),
+            offset_written=Out(1),
+            offset_at=Out(2),
+            offset_value=Out(word),
+            offset_read=In(word),
         )
 
     @classmethod
@@ -30,8 +33,7 @@ class Gates(wiring.Component):
         """Return the gates of this core."""
         return cls()
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         begun = Signal()
         waits = Signal()
         shows = Signal()  # the memory has been read
@@ -45,4 +47,3 @@ class Gates(wiring.Component):
         m.d.sync += waits.eq((waits & ~self.offset_written) | self.period_write)
         with m.If(self.tick):
             m.d.sync += begun.eq(1)
-        return m

@@ -5,7 +5,7 @@ from functools import reduce
 from operator import and_, or_
 
 from amaranth import Array, C, Cat, Module, Mux, Signal, Value, signed
-from amaranth.lib import data, wiring
+from amaranth.lib import data
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.idle import Idle, IdleBox
@@ -14,7 +14,7 @@ from tachometry.hdl.methods.block_unit import BlockUnit
 from tachometry.hdl.methods.serial_unit import SerialUnit
 from tachometry.hdl.methods.track_instruction import encoded, layout_of
 from tachometry.hdl.wires.commented_memory import CommentedMemory
-from tachometry.hdl.wires.ports import by_name, only_if
+from tachometry.hdl.wires.ports import Box, by_name, only_if
 from tachometry.spec.formats.tracking import PLACE_BITS, WIDTH
 from tachometry.spec.formats.tracking_code import ADDRESS_BITS, FIRST_INPUT, INPUTS, OUTPUTS, Program
 from tachometry.spec.formats.tracking_instruction import CHOSEN, EARLY, OFFSETS, Jump
@@ -28,7 +28,7 @@ EXCHANGE = {
 }
 
 
-class TrackMachine(wiring.Component):
+class TrackMachine(Box):
     """Runs the program once for every tick; `spec.formats.tracking_code` defines each instruction.
 
     An instruction is fetched, and executed three clocks later: there is a register in front of the memory of words and
@@ -131,8 +131,7 @@ class TrackMachine(wiring.Component):
         busy = ("unit.reads", "unit.adds", "unit.shifts")
         return (IdleBox("unit", busy),) if isinstance(self.unit, SerialUnit) else ()
 
-    def elaborate(self, platform: object) -> Module:
-        m = Module()
+    def build(self, m: Module) -> None:
         m.submodules.unit = self.unit
         m.submodules.program = self._rom
         m.submodules.words = self._words
@@ -158,7 +157,6 @@ class TrackMachine(wiring.Component):
         self._jump(m)
         if self._program.form.exchanges:
             self._exchange(m)
-        return m
 
     def _state(self, label: str) -> int:
         return self._states[self._program.code.labels[label]]

@@ -269,10 +269,10 @@ def first_beyond(steps: Steps, last: NDArray[np.int64], limit: int) -> NDArray[n
     return found[:-1]
 
 
-def wrapped(spec: TachometerSpec, position: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return positions in two's complement."""
-    half = 1 << (spec.position_width - 1)
-    return ((position + half) & (2 * half - 1)) - half
+def wrapped(value: NDArray[np.int64], bits: int) -> NDArray[np.int64]:
+    """Return values in two's complement."""
+    half = 1 << bits - 1
+    return (value + half & 2 * half - 1) - half
 
 
 @dataclass(frozen=True)
@@ -316,7 +316,8 @@ def positions_at(
     """Return the position with all steps of each clock and before, before an index of the clock resets it or after."""
     total = np.append(0, np.cumsum(steps.step))[np.searchsorted(steps.clock, clock, side="right")]
     origins = _Origins.of(spec, steps)
-    return wrapped(spec, total - (origins.after(clock) if reset else origins.before_reset(clock, steps)))
+    position = total - (origins.after(clock) if reset else origins.before_reset(clock, steps))
+    return wrapped(position, spec.position_width)
 
 
 def homed(spec: TachometerSpec, steps: Steps, clock: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -347,7 +348,7 @@ def count(
     strobe = last + spec.latency.tick
     columns = {
         "pulse_count": np.clip(sums, -spec.widths.max_pulse_count, spec.widths.max_pulse_count),
-        "position": wrapped(spec, reached - origins.after(last)),
+        "position": wrapped(reached - origins.after(last), spec.position_width),
         "overflow": overflow,
     }
     if spec.front_end.index_once:
@@ -361,5 +362,5 @@ def count(
         columns["filtered_edges"] = 2 * np.minimum(places(steps.swallowed, strobe, "right"), (1 << 15) - 1)
     if steps.wheel is not None:
         columns["synced"] = steps.wheel.synced(strobe - 1)
-    index = {"index_position": wrapped(spec, origins.captured - origins.at_index)}
+    index = {"index_position": wrapped(origins.captured - origins.at_index, spec.position_width)}
     return Table(strobe, columns), Table(steps.index + spec.latency.tick, index)

@@ -73,7 +73,7 @@ class Golden:
     def _continued(self, ticks: Table) -> Table:
         """Return ticks with what came before them."""
         spec = self._spec
-        columns = {"position": wrapped(spec, ticks.position + self._position)}
+        columns = {"position": wrapped(ticks.position + self._position, spec.position_width)}
         if spec.filter_clocks:
             columns["filtered_edges"] = np.minimum(ticks.filtered_edges + self._filtered, 2 * (1 << 15) - 2)
         ticks = ticks.having(**columns)

@@ -87,10 +87,9 @@ def _vectors(core: AnySpec, traces: Sequence[PinTrace]) -> dict[str, Any]:
 
 
 def _acts(core: AnySpec) -> set[str]:
-    """Return inputs, or registers on a bus, which no bench writes."""
+    """Return inputs that are registers on a bus, which no bench writes."""
     spec = core.tachometer
-    registers = {field.port for extra in spec.extras for _, _, fields, _ in extra.registers(spec) for field in fields}
-    return registers | {pin.port.name for pin in spec.front_end.pins if pin.act}
+    return {field.port for extra in spec.extras for _, _, fields, _ in extra.registers(spec) for field in fields}
 
 
 def _put(core: AnySpec, traces: Sequence[PinTrace]) -> tuple[list[str], list[NDArray[Any]], Run]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.extras import View
-from tachometry.sim.golden.front_end import Steps
+from tachometry.sim.golden.front_end import Steps, wrapped
 from tachometry.sim.golden.sorted_lookup import Ints
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
@@ -103,7 +103,7 @@ def _contents(
     epoch = np.searchsorted(writes.clock, clock)
     for until in np.unique(epoch).tolist():
         for one in range(done, until):
-            table[row[one]] = _signed(writes.data[one], bits)
+            table[row[one]] = wrapped(writes.data[one], bits)
         done, now = until, epoch == until
         value[now] = find(table, at[now])
     return value
@@ -114,16 +114,12 @@ def _row(extra: DiscMap, spec: TachometerSpec, address: Ints) -> Ints:
     return address if (lines := extra.sectors(spec)) is None else np.minimum(address, lines.depth + address % 4)
 
 
-def _signed(value: Ints, bits: int) -> Ints:
-    return (value + (1 << bits - 1)) % (1 << bits) - (1 << bits - 1)
-
-
 def _on_lines(lines: Sectors, bits: int, table: Ints, edge: Ints) -> Ints:
     """Return the displacements of edges since the latest index from the slopes of sectors, which need not close."""
     slopes = np.append(table[np.arange(lines.edges - 1) >> lines.bits], table[len(lines.slopes) - 1])
     turns, place = np.divmod(edge, lines.edges)
     value = np.append(0, np.cumsum(slopes))[place] + turns * slopes.sum() + (1 << lines.fine - 1) >> lines.fine
-    return _signed(value + (table[lines.depth + edge % 4] if lines.quarters else 0), bits)
+    return wrapped(value + (table[lines.depth + edge % 4] if lines.quarters else 0), bits)
 
 
 def _turns(view: View, busy: Ints) -> list[tuple[int, int]]:

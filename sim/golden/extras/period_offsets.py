@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.extras import View
-from tachometry.sim.golden.front_end import Steps
+from tachometry.sim.golden.front_end import Steps, wrapped
 from tachometry.sim.golden.sorted_lookup import Ints
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.period_offsets import PeriodOffsets
+from tachometry.spec.formats.tracking_sampled import OFFSET_BITS
 
 
 def displaced(extra: PeriodOffsets, view: View) -> Steps:
@@ -29,7 +30,7 @@ def _exchanged(pins: PinTrace, tick: Ints) -> tuple[Ints, Ints]:
     A write before the first tick waits for the second.
     """
     latest = np.searchsorted(pins.high("period_write"), tick) * (tick > tick[:1].sum())
-    word = (pins.line_at("period_data", tick) + (1 << 31) & (1 << 32) - 1) - (1 << 31)
+    word = wrapped(pins.line_at("period_data", tick), OFFSET_BITS)
     told = (8 * word + 2 * pins.line_at("period_address", tick) + 1) * (np.diff(latest, prepend=0) > 0)
     return pins.line_at("period_address", tick + 1), told
 

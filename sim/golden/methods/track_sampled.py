@@ -1,8 +1,9 @@
 """The tracking recursion of positions that are read; docs/concepts/track.md has its rules."""
 
 from tachometry.sim.golden.methods.track_recursion import ONE, REST, TRACKS, Recursion, Row, log2
+from tachometry.spec.formats.angles import wrapped
 from tachometry.spec.formats.tracking import WIDTH
-from tachometry.spec.formats.tracking_sampled import SampledTracking
+from tachometry.spec.formats.tracking_sampled import OFFSET_BITS, SampledTracking
 
 _NEVER = 1 << WIDTH  # more than any error
 
@@ -23,7 +24,7 @@ class SampledRecursion(Recursion):
         """Return the lower bits of an offset after a write; `told` has 8 times it, twice its number, and 1, or is 0."""
         if told:
             self.offsets[told >> 1 & 3] = told >> 3
-        return (self.offsets[number] + (1 << 31) & (1 << 32) - 1) - (1 << 31)
+        return wrapped(self.offsets[number], OFFSET_BITS)
 
     def _event(self, n: int, times: int, places: int, kind: int, down: int) -> Row:
         """Take a read, whose place is that of the end of the tick; the shaft was there `times` before."""

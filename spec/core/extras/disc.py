@@ -189,7 +189,6 @@ class DiscMap(Extra):
             return f"DISC_{register}", field, Pin(port, act=field in ("forget", "now", "write"))
 
         bits = (spec.encoder.encoder_counts - 1).bit_length()
-        entry = self.entry_bits(spec) if self.writable else 0
         yield row("CONTROL", "bypass", "bypass", "The map is not used while this is high.")
         yield row("CONTROL", "forget", "forget", "Forgets the place in the turn, and with it the use of the map.")
         if self.index_place(spec) is None:
@@ -199,7 +198,7 @@ class DiscMap(Extra):
             bits = (len(self.entries(spec)) - 1).bit_length()
             what = "Entry" if self.sectors(spec) else "Edge"
             yield row("ADDRESS", "edge", "address", f"{what} that disc_write writes, and disc_entry shows.", bits)
-            yield row("DATA", "value", "data", "Entry that is written, signed.", entry)
+            yield row("DATA", "value", "data", "Entry that is written, signed.", self.entry_bits(spec))
             yield row("DATA", "write", "write", "Writes disc_data of the next clock, and forgets the place.")
 
     def ports(self, spec: Numbers) -> Iterable[Port]:

@@ -29,7 +29,7 @@ from tachometry.spec.registers.buses import BUSES
 CLOCKED = "--ppr 8 --clock 1MHz --max-speed 2000rad/s --method"
 SMALL = f"--tick 8us --max-time 160us {CLOCKED}"
 CORES = {
-    "s": f"{SMALL} s --bus axi-lite --irq --probe 2 --testbench cocotb --ci github",
+    "s": f"{SMALL} s --bus axi-lite --irq --probe 2 --disc-table edges --testbench cocotb --ci github",
     "rio": f"{SMALL} t --for rio --ci gitlab",
     "litex": f"{SMALL} mt --for litex --index",
     "axes": f"{CLOCKED} s --axes 3 --tick 20us --max-time 160us --testbench cocotb",
