@@ -4,7 +4,7 @@ import gc
 import os
 import signal
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,22 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         seconds[folder if "." not in folder else "others"] += getattr(report, "duration", 0)
     told = (f"{folder} {time:.0f}" for folder, time in seconds.most_common(12) if time >= 1)
     terminalreporter.write_line(f"seconds: {', '.join(told)}")
+
+
+@pytest.fixture(scope="session")
+def local() -> Iterator[Any]:
+    """Yield a scheduler of Dask with a worker, in threads of this process."""
+    from distributed import LocalCluster
+
+    ours = {"protocol": "tcp", "dashboard_address": "127.0.0.1:0"}
+    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, **ours) as cluster:
+        yield cluster
+
+
+@pytest.fixture
+def scheduler(local: Any) -> list[str]:
+    """Return the options that run points on that scheduler."""
+    return ["--scheduler", local.scheduler_address]
 
 
 @pytest.fixture

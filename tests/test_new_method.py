@@ -2,14 +2,12 @@
 
 import csv
 import json
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
 from amaranth import Module
-from distributed import LocalCluster
 from support.command import run
 
 from tachometry.hdl.methods import DATAPATHS
@@ -74,15 +72,6 @@ def registered(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(METHODS, "x", XTachometer)
     monkeypatch.setitem(MODELS, "x", XModel)
     monkeypatch.setitem(DATAPATHS, "x", XMethod)
-
-
-@pytest.fixture(scope="module")
-def scheduler() -> Iterator[list[str]]:
-    """Yield a scheduler with a worker in a thread of this process, where the method is known."""
-    with LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address="127.0.0.1:0"
-    ) as local:
-        yield ["--scheduler", local.scheduler_address]
 
 
 def told(capsys: pytest.CaptureFixture[str]) -> str:

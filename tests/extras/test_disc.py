@@ -216,7 +216,7 @@ def test_sectors_are_the_nearest_line() -> None:
     for far, left in ((np.sin(angle), 0.003), (np.sin(angle) + np.tile((0.1, 0, 0.1, 0), 500), 0.003), (noise, 0.1)):
         lines = sectors_of(tuple(far.tolist()), 32, 1 / 960, True)
         wrong = np.array(lines.values) / 960 / 2**lines.fine + np.tile(lines.quarters, 500) / 960 - far
-        assert (len(lines.slopes), lines.bits) == (33, 6)
+        assert (len(lines.slopes), lines.bits, lines.values[-1] + lines.slopes[-1]) == (33, 6, 0)
         assert len(sectors_of(tuple(far[:100].tolist()), 32, 1 / 960, True).slopes) == 26
         assert np.std(wrong) < left
         assert np.abs(np.fft.rfft(wrong)[1:7]).max() * 2 / 2000 < 0.003

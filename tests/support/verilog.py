@@ -35,6 +35,9 @@ module bench;
       #1 clk = 1;
     end
     #1 rst = 0;
+"""
+# The same of any module.
+PLAY = """\
     for (clock = 0; clock < @N_CLOCKS@; clock = clock + 1) begin
       if (more == 1 && at == clock) begin
         more = $fscanf(in, "@FORMAT@", @PINS@);
@@ -57,7 +60,7 @@ def _ports(spec: AnySpec) -> tuple[list[Port], list[Port], list[str]]:
     return list(spec.ports.pins), list(spec.ports.outputs), list(spec.ports.strobes)
 
 
-def _filled(text: str, **parts: str | int) -> str:
+def filled(text: str, **parts: str | int) -> str:
     for name, part in parts.items():
         text = text.replace(f"@{name}@", str(part))
     return text
@@ -133,8 +136,8 @@ def play(
     n_clocks: int,
 ) -> np.ndarray:
     """Return outputs of a module in each clock in which there is a strobe, behind the clock."""
-    bench = _filled(
-        _ICARUS,
+    bench = filled(
+        _ICARUS + PLAY,
         N_CLOCKS=n_clocks,
         DECLARATIONS="\n  ".join(
             [f"reg [{pin.width - 1}:0] {pin.name};" for pin in pins]

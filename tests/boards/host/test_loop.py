@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from tachometry.boards.host import loop
+from tachometry.boards.host.registers import HostRegisters
 from tachometry.spec import of_texts
 from tachometry.spec.control import LoopSpec
 from tachometry.spec.control.form import Term
@@ -61,6 +62,9 @@ def test_settings() -> None:
     with pytest.raises(KeyError, match=r"there is no setting 'mode': the core has no command generator"):
         client.set(mode=2)
     assert not there.written
+    (upper,) = (one for one in there.manifest["registers"]["map"] if one["name"] == "COMMAND_POSITION_HIGH")
+    upper["fields"][0] |= {"least": -4, "most": 3}  # those of two words are the upper one's
+    assert HostRegisters(there.manifest).limits("COMMAND_POSITION")[1:] == (-4 << 32, (4 << 32) - 1)
 
 
 def test_a_generator() -> None:

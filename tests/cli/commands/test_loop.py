@@ -1,11 +1,10 @@
 """`tachometry loop`."""
 
 import csv
-from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
-from distributed import LocalCluster
 from support import command
 
 from tachometry.sim import build
@@ -46,23 +45,13 @@ def test_one_loop_and_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert f"{float(whole['rms_error_rad_s']):.3g}" == table[3].split()[1]
 
 
-@pytest.fixture(scope="module")
-def cluster_here() -> Iterator[LocalCluster]:
-    """Yield a scheduler with a worker, in threads of this process."""
-    with LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address="127.0.0.1:0"
-    ) as local:
-        yield local
-
-
 def test_many_loops_and_their_files(
-    cluster_here: LocalCluster, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    local: Any, scheduler: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     files = ["--csv", tmp_path / "all.csv", "--plot", tmp_path / "loops.pdf"]
     options = ["--methods", "s", "--vary", "kv=20,80", "--vary", "synchronised=yes,no"]
-    given = ["--scheduler", cluster_here.scheduler_address]
-    assert run(*SHORT, *options, "--seeds", "1", *given, *files) == 0
-    assert cluster_here.scheduler.transition_counter > 0
+    assert run(*SHORT, *options, "--seeds", "1", *scheduler, *files) == 0
+    assert local.scheduler.transition_counter > 0
     table = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert table[0][:3] == ["method", "kv", "synchronised"]
     assert [row[1:3] for row in table[1:5]] == [[kv, o] for kv in ("20", "80") for o in ("yes", "no")]
@@ -79,9 +68,9 @@ def test_many_loops_and_their_files(
 
 
 def test_a_loop_alone_may_be_run_elsewhere(
-    cluster_here: LocalCluster, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    scheduler: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(*SHORT, "--kv", "80", "--seeds", "1", "--scheduler", cluster_here.scheduler_address) == 0
+    assert run(*SHORT, "--kv", "80", "--seeds", "1", *scheduler) == 0
     assert "1 loop with 1 seed each, run in " in " ".join(capsys.readouterr().out.split())
 
 

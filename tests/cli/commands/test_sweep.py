@@ -8,7 +8,6 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -33,15 +32,6 @@ def run(*args: object) -> int:
 def rows(path: Path) -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = pq.read_table(path).to_pylist()
     return found
-
-
-@pytest.fixture(scope="module")
-def scheduler() -> Iterator[list[str]]:
-    """Yield a scheduler with a worker, in threads of this process."""
-    with LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address="127.0.0.1:0"
-    ) as local:
-        yield ["--scheduler", local.scheduler_address]
 
 
 def test_all_cores_of_this_machine(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

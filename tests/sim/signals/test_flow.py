@@ -14,7 +14,7 @@ from tachometry.sim.captures.header import PLAIN
 from tachometry.sim.captures.read import read_parts, with_last_tick
 from tachometry.sim.captures.sigrok import write_sr
 from tachometry.sim.encoder import crossings
-from tachometry.sim.encoder.imperfections import Bounce
+from tachometry.sim.encoder.imperfections import Bounce, LineFault
 from tachometry.sim.encoder.motion import Vibration, parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.signals import flow
@@ -45,7 +45,10 @@ def test_a_motion_in_parts(values: dict[str, Any], monkeypatch: pytest.MonkeyPat
     assert (truth.n_illegal, truth.n_lost) == (0, 0)
 
 
-@pytest.mark.parametrize("values", [{"lost": 0.1}, {"illegal": 0.1}, {"index": True}, {"sensor": "step-dir"}])
+STUCK = {"stuck": LineFault("b", 0.01)}
+
+
+@pytest.mark.parametrize("values", [{"lost": 0.1}, {"illegal": 0.1}, {"index": True}, {"sensor": "step-dir"}, STUCK])
 def test_a_motion_that_is_made_as_a_whole(values: dict[str, Any]) -> None:
     parts, truth = VirtualEncoder(25, **values).flow(MOTION)
     assert parts is truth.recording
@@ -70,6 +73,15 @@ def test_pieces_are_what_the_pins_see(clock_hz: int, monkeypatch: pytest.MonkeyP
     assert (parts.n_changes, parts.n_together) == (recording.n_changes, recording.n_together)
     assert merged[-1] > 0
     assert parts.n_together > 0
+    monkeypatch.setattr(flow, "MOST_IN_PIECES", 5)
+    with pytest.raises(ValueError, match="must have at most 5 ticks, 50ms of this tick, not "):
+        [*Flow.of(recording).pieces(spec, 100)]
+
+
+def test_a_short_recording_is_a_clock() -> None:
+    spec = of_texts("m", {"ppr": "25", "clock": "1MHz", "tick": "10ms"}).tachometer
+    recording = VirtualEncoder(25).record(parse_motion("stop:100ns")).recording
+    assert [piece.n_clocks for piece in Flow.of(recording).pieces(spec, 100)] == [PinTrace.of(recording, spec).n_clocks]
 
 
 @pytest.mark.parametrize("suffix", [".vcd", ".csv", ".sr"])

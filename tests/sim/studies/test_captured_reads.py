@@ -17,14 +17,7 @@ from tachometry.spec.core.tformat import REQUEST, TformatReads
 CORE = {"clock": "50MHz", "tick": "200us", "max-time": "20ms"}
 KINDS = {
     "biss": {"sensor": "biss", "bits": "4+13", "encoder-clock": "2MHz"},
-    "ssi": {
-        "sensor": "ssi",
-        "bits": "4+13",
-        "encoder-clock": "1MHz",
-        "line-delay": "700ns",
-        "gray": "yes",
-        "reverse": "yes",
-    },
+    "ssi": {"sensor": "ssi", "bits": "4+13", "encoder-clock": "1MHz", "line-delay": "700ns"},
     "spi": {"sensor": "spi", "chip": "as5047p", "bits": "14"},
     "amt22": {"sensor": "spi", "chip": "amt22", "bits": "12", "line-delay": "200ns"},
     "tformat": {"sensor": "tformat", "bits": "4+17", "line-delay": "100ns"},

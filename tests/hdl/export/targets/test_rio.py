@@ -21,6 +21,7 @@ from support.nightly import only
 from support.options import had_by
 from support.random_case import random_case
 from support.rio import component, hal_type, loaded
+from support.verilog import PLAY, filled
 
 from tachometry.hdl.export import export
 from tachometry.hdl.export.targets.rio import hal_pins
@@ -51,7 +52,7 @@ START = 50  # the frame with which the host begins
 _BENCH = """
 module bench;
   reg clk = 0;
-  reg @PINS@;
+  reg @LEVELS@;
   @WIRES@
   spindle_rio dut (.clk(clk), @CONNECTIONS@);
   integer in, out, more, at, clock;
@@ -59,20 +60,6 @@ module bench;
     in = $fopen("pins.txt", "r");
     out = $fopen("rows.txt", "w");
     more = $fscanf(in, "%d", at);
-    for (clock = 0; clock < @N_CLOCKS@; clock = clock + 1) begin
-      if (more == 1 && at == clock) begin
-        more = $fscanf(in, "@FORMAT@", @READ@);
-        more = $fscanf(in, "%d", at);
-      end
-      #1 clk = 0;
-      #1 if (dut.core.tick) $fdisplay(out, "%0d@FORMAT_OUT@", clock, @SENT@);
-      #1 clk = 1;
-      #1;
-    end
-    $fclose(out);
-    $finish;
-  end
-endmodule
 """
 
 
@@ -107,17 +94,18 @@ def run(seed: int, folder: Path) -> tuple[list[int], list[dict[str, float]]]:
     sent, pins = plugin.interface_data(), [*plugin.PINDEFAULTS]
     # HAL takes what RIO sends as signed.
     wires = [f"wire {'signed ' * (one['size'] > 1)}[{one['size'] - 1}:0] {name};" for name, one in sent.items()]
-    parts = {
-        "PINS": ", ".join(f"{pin} = 0" for pin in pins),
+    parts: dict[str, str | int] = {
+        "LEVELS": ", ".join(f"{pin} = 0" for pin in pins),
         "WIRES": "\n  ".join(wires),
         "CONNECTIONS": ", ".join(f".{name}({name})" for name in (*pins, *sent)),
         "N_CLOCKS": trace.n_clocks,
         "FORMAT": " ".join(["%b"] * len(pins)),
-        "READ": ", ".join(pins),
+        "PINS": ", ".join(pins),
+        "STROBES": "dut.core.tick",
         "FORMAT_OUT": " %0d" * len(sent),
-        "SENT": ", ".join(sent),
+        "OUTPUTS": ", ".join(sent),
     }
-    bench = re.sub("@([A-Z_]+)@", lambda mark: str(parts[mark[1]]), _BENCH)
+    bench = filled(_BENCH + PLAY, **parts)
     lines: dict[str, NDArray[Any]] = dict(trace.lines)
     if isinstance(trace, AxesTrace):
         lines = {f"{name}_{axis}": trace.lines[name] >> np.uint64(axis) & np.uint64(1) for axis, name in trace.names}
