@@ -177,7 +177,9 @@ def in_icarus(folder: Path, manifest: Manifest, play: Play) -> list[Row]:
     return _rows(folder, manifest)
 
 
-def in_verilator(folder: Path, manifests: Sequence[Manifest], plays: Sequence[Play]) -> list[list[Row]]:
+def in_verilator(
+    folder: Path, manifests: Sequence[Manifest], plays: Sequence[Play], strobe: str = "velocity_valid"
+) -> list[list[Row]]:
     """Play on several cores in a folder, side by side in one program, in Verilator.
 
     Rows are those of updates only, as there may be millions of ticks.
@@ -192,7 +194,7 @@ def in_verilator(folder: Path, manifests: Sequence[Manifest], plays: Sequence[Pl
     def run(*command: object, **kwargs: Any) -> None:
         subprocess.run([str(word) for word in command], cwd=folder, check=True, capture_output=True, **kwargs)
 
-    text = "".join(shell(manifest, ["velocity_valid"]) for manifest in manifests)
+    text = "".join(shell(manifest, [strobe]) for manifest in manifests)
     text += f"module all(input clk, input rst, input [{4 * len(names) - 1}:0] pins);\n"
     for nth, (manifest, play) in enumerate(zip(manifests, plays, strict=True)):
         text += f"  shell_{names[nth]} shell_{nth} (.clk(clk), .rst(rst), .pins(pins[{4 * nth + 3}:{4 * nth}]));\n"

@@ -63,7 +63,9 @@ class Motion:
                 self.lines.pulses.append((at, 3, 1))
                 at += rng.randrange(manifest["external_tick_cycles"]["min"], settings.tick * 9 // 8)
         play = self.lines.play()
-        self.rows = in_verilator(folder, [manifest], [play])[0]
+        rest = latency.get("tick_to_update", latency["tick_to_velocity"]) - latency["tick_to_velocity"]
+        rows = in_verilator(folder, [manifest], [play], "update_valid" if rest else "velocity_valid")[0]
+        self.rows = [row | {"clock": row["clock"] - rest} for row in rows]  # in which the velocity is shown
         self.late = latency["tick_latency"] + latency["tick_to_velocity"]  # from the end of a tick to its update
         self.delay = latency["pin_to_count"] + self.late
         steps = conditioned(settings, play, latency["pin_to_count"]).steps

@@ -108,11 +108,10 @@ def dense(spec: TachometerSpec, run: Run) -> dict[str, NDArray[np.int64]]:
         found[strobe] = 1
         return found
 
-    ticks, updates = run.ticks, run.updates
-    found = {name: held(ticks.clock, values) for name, values in ticks.columns.items()}
-    found |= {name: held(updates.clock, values) for name, values in updates.columns.items()}
-    found["tick"], found["velocity_valid"] = high(ticks.clock), high(updates.clock)
-    found["decode_error"] = high(run.errors)
+    ticks, found = run.ticks, dict[str, NDArray[np.int64]]()
+    for strobe, table in run.tables.items():
+        found[strobe] = high(table.clock)
+        found |= {name: held(table.clock, values) for name, values in table.columns.items()}
     found["age"] = np.zeros(run.n_clocks, dtype=np.int64)
     found["age"][ticks.clock] = ticks.age
     return found
