@@ -64,7 +64,7 @@ class Configuration:
 def _texts(options: str) -> dict[str, str]:
     first, *others = options.split()
     base = _texts(_DATA["core"][0]["options"]) if first == "reference" else {"method": first} | _pairs(_DATA["usual"])
-    return base | _pairs(" ".join(others))
+    return {name: text for name, text in (base | _pairs(" ".join(others))).items() if text}
 
 
 def _pairs(words: str) -> dict[str, str]:

@@ -10,6 +10,7 @@ from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.front_end.serial_encoder import SerialEncoder
 from tachometry.hdl.front_end.spi_encoder import SpiEncoder
 from tachometry.hdl.front_end.tformat_encoder import TformatEncoder
+from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import by_name, drive, follow, hand_through
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.chips import SpiReads
@@ -41,12 +42,13 @@ class SampledTachometer(Tachometer):
         inputs = [port.name for port in sampled.ports(self._spec.tick.longest)]
         source = self if self.master is None else self._read(m, self.master)
         follow(m, reader, source, inputs)
-        wrong, warning = WRONG_CHECK, 0
+        wrong, warned = WRONG_CHECK, 0
         if self.master is not None:
-            wrong, warning = self.master.reason, self.master.sample_warning
-        fault = Mux(reader.jump, JUMP, Mux(reader.decode_error, NO_ANSWER, Mux(warning, WARNING, 0)))
-        fault = Mux(reader.sample_ok, fault, wrong)
-        m.d.comb += self.read_fault.eq(Mux(reader.sample_valid, fault, 0))
+            wrong = self.master.reason
+            warning = self.master.sample_valid & self.master.sample_warning & ~reader.decode_error
+            (warned,) = delay(m, warning, clocks=reader.spent)  # unless it is a jump
+        fault = Mux(reader.decode_error, Mux(reader.sample_ok, NO_ANSWER, wrong), Mux(warned, WARNING, 0))
+        m.d.comb += self.read_fault.eq(Mux(reader.jump, JUMP, fault))
         drive(m, reader, {"last": self.sampling_clock.last})
         if self._spec.front_end.modulus is not None:
             m.d.comb += self.position_modulo.eq(reader.position)

