@@ -100,7 +100,7 @@ class TrackMethod(Box):
                 new.velocity.eq(machine.velocity),
                 *([] if self.rest_left else shows),
                 new.interval.eq(elapsed),
-                new.forced.eq(~machine.number.any()),
+                new.forced.eq(~machine.number.any() | (machine.standstill if spec.form.waits else 0)),
                 new.standstill.eq(machine.standstill & ~(self.number if self._reads else machine.number.any())),
             ]
         if self.rest_left:

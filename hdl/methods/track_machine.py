@@ -285,6 +285,9 @@ class TrackMachine(Box):
         shows = Signal(3)
         domain = m.d.sync if self._two else m.d.comb
         domain += shows.eq(Mux(self.go, self.now.output, 0))
+        if self._program.form.waits:  # of a tick with a read: that waits
+            with m.If(self.begin):
+                m.d.sync += self.standstill.eq(0)
         for name, port in by_name(self, self._program.outputs).items():
             with m.If(shows == OUTPUTS.index(name)):
                 m.d.sync += port.eq(~self.made[-1] if name == "standstill" else self.made)

@@ -335,7 +335,7 @@ edges {; same:
     edge = edge - moved; p = p - moved
     goto show; }
 waits {; later:                         # the next read is taken, wherever it is
-    since = tau + dt; p = p - moved; far = zero - most
+    since = tau + dt out standstill; p = p - moved; far = zero - most
     goto show; }
 silent:
     since = $length + since min most_since

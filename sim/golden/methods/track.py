@@ -210,8 +210,9 @@ class Model:
             before = np.maximum.accumulate(np.append(self._latest, np.where(counted, number, self._latest)))
             self._next, self._latest = self._next + len(last), int(before[-1])
             interval = np.minimum(number - before[:-1], most)
-            if spec.encoder.sampled is not None:
-                interval, standstill = ticks.elapsed[piece], standstill * ~ticks.forgets[piece]
+            if spec.encoder.sampled is not None:  # a read that waits has the mark of a silence
+                interval, waits = ticks.elapsed[piece], counted & (standstill > 0)
+                counted, standstill = counted & ~waits, standstill * ~(waits | ticks.forgets[piece])
             delay = np.minimum(delay >> spec.form.time_bits, (1 << SMOOTH_DELAY_BITS) - 1)
             fine = fine << unused >> unused
             values = [velocity, interval, ~counted, acceleration, velocity_std, fine, standstill]

@@ -41,7 +41,7 @@ class SampledRecursion(Recursion):
         expected = self._expected(dt, log_dt)
         e = at - expected.p
         if abs(e) >= self.far:
-            self.far, self.since, self.p = _NEVER, tau + dt, self.p - self._moved
+            self.far, self.since, self.p, self.standstill = _NEVER, tau + dt, self.p - self._moved, True
             return self._emit(self._ahead())
         self.since, self.more = tau, 0
         return self._take(e, expected)

@@ -200,6 +200,23 @@ def test_tracking_begins_anew_after_two_jumps_that_agree() -> None:
     assert speed[[7, 8]] == pytest.approx(1, abs=0.01)
 
 
+def test_a_read_that_waits_is_no_update() -> None:
+    """Its tick is forced: the position is that of the read, and the place between counts is carried on."""
+    spec = of_texts("track", BASE | SLOW | {"bits": "12", "crc": "none", "multiplier": "block"})
+    places = [100 + at + 400 * (at == 12) for at in range(20)]
+    found = lockstep(
+        spec, trace_of(spec, [(800 + 900 * at, place, 0, 1) for at, place in enumerate(places)], 18_800), Cxxrtl()
+    )
+    assert found.n_mismatches == 0, found.first
+    ticks, updates = found.actual.ticks, found.actual.updates
+    assert np.flatnonzero(updates.forced).tolist() == [12]
+    assert not updates.standstill.any()
+    assert ticks.position[11:14].tolist() == [111, 512, 113]
+    assert spec.carrying is not None
+    fine = updates.position_fine * 2.0**-spec.carrying.position_fine_bits
+    assert fine[11:14] == pytest.approx([111.1, 112.1, 113.1], abs=0.1)
+
+
 def test_after_the_maximum_time_the_next_read_is_absolute() -> None:
     spec = of_texts("m", BASE | {"bits": "9"})
     run = both(spec, [(20, 500, 0, 1), (60, 5, 0, 1), (1020, 7, 0, 1), (1060, 8, 0, 1)], 1200)
