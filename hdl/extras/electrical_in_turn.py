@@ -13,8 +13,7 @@ from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import Box
 from tachometry.spec import AxesSpec
 from tachometry.spec.core.extras.electrical import AngleInTurn
-from tachometry.spec.formats.angles import SHOWN_BITS
-from tachometry.spec.formats.settling import PLACE_BITS
+from tachometry.spec.formats.angles import PLACE_BITS, SHOWN_BITS
 
 
 class Gates(Box):

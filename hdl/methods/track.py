@@ -8,7 +8,6 @@ from amaranth.lib.wiring import In
 from tachometry.hdl.arithmetic.idle import Idle, IdleBox, idle_of
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.methods.datapath import datapath_members
-from tachometry.hdl.methods.settling import SettlingPlace
 from tachometry.hdl.methods.tick_counts import TickCounts
 from tachometry.hdl.methods.track_machine import EXCHANGE, TrackMachine
 from tachometry.hdl.wires.ports import Box, drive, follow, only_if
@@ -37,10 +36,9 @@ class TrackMethod(Box):
         self._reads = spec.encoder.sampled is not None
         self.tick_counts = None if self._reads else TickCounts(spec.form, spec.timing.max_ticks)
         self.machine = TrackMachine(spec.program)
-        lead = 5 if spec.settling else 0
-        self.left = SamplingClock(spec.latency.datapath - 1, lead)
+        self.left = SamplingClock(spec.latency.datapath - 1)
         rest = spec.latency.native_update - spec.latency.datapath
-        self.rest_left = SamplingClock(rest, lead) if rest else None  # from the velocity to the rest of an update
+        self.rest_left = SamplingClock(rest) if rest else None  # from the velocity to the rest of an update
         super().__init__(
             **datapath_members(spec),
             **only_if(not self._reads, step=In(signed(2))),  # as late as `tick`
@@ -88,7 +86,9 @@ class TrackMethod(Box):
         new = self.updates.p
         m.d.sync += self.updates.valid.eq(ready)
         rest, whole = (new, ready) if self.rest_left is None else self._rest(m, self.rest_left, ready)
-        fine = self._fine(m, position, whole)
+        shift = spec.form.moved_shift - spec.position_fine_bits
+        fine = (position << spec.position_fine_bits) + (machine.position_fine >> shift)
+        fine += machine.position_fine[shift - 1]
         if spec.smooth:
             delay = delay_of(machine.smooth_delay, spec.form.time_bits)
             with m.If(ready):
@@ -115,24 +115,6 @@ class TrackMethod(Box):
         m.d.comb += whole.eq(awaited & left.last)
         m.d.sync += [awaited.eq(ready | (awaited & ~whole)), self.rest.valid.eq(whole)]
         return self.rest.p, whole
-
-    def _fine(self, m: Module, position: Value, taken: Value) -> Value:
-        """Return the position between counts."""
-        machine, spec = self.machine, self._spec
-        shift = spec.form.moved_shift - spec.position_fine_bits
-        if spec.settling is None:
-            whole = (position << spec.position_fine_bits) + (machine.position_fine >> shift)
-            return whole + machine.position_fine[shift - 1]
-        between = Signal(signed(len(machine.position_fine) - shift + 1))
-        m.d.sync += between.eq((machine.position_fine >> shift) + machine.position_fine[shift - 1])
-        m.submodules.settling = box = SettlingPlace(spec.settling, len(between), spec.velocity.native)
-        m.d.comb += [
-            box.between.eq(between),
-            box.velocity.eq(machine.velocity),
-            box.forced.eq(~machine.number.any()),
-            box.taken.eq(taken),
-        ]
-        return (position << spec.position_fine_bits) + box.settled
 
     def _take_counts(self, m: Module) -> Value:
         """Give the machine the counts of a tick, or its read; return the ticks since the one before."""

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from tachometry.spec.formats.settling import PLACE_BITS
 from tachometry.spec.formats.velocity_output import VelocityOutput
 
 SHOWN_BITS = 16  # of the angle: 2^16 is an electrical turn
 SLOPE_BITS = 16  # bits of an acceleration below those of an angle
 LEAD_BITS = 16  # of a lead, in clocks
+PLACE_BITS = 8  # bits of the counts between the fine position and the position
 _FACTOR_BITS = 18  # of a factor, with its sign, or more where times need them
 
 

@@ -1,29 +1,25 @@
-"""How a place that waits for a count goes to the middle of its count as the velocity falls."""
+"""How a place that waits for a count goes to the middle of its count as the velocity falls, as a part of the program.
 
-from dataclasses import dataclass
+A place that is 3/8 count away begins to wait when the velocity has fallen to half of that at the last count. Half a
+count is its limit then; the limit halves each time the velocity halves again. Velocities are compared by logarithms.
+"""
 
-PLACE_BITS = 8  # bits of the counts between the fine position and the position
-_SPEED_BITS = 12  # of a fraction of a count per tick, where two velocities are compared
+SETTLING = """
+settles {; settle:
+    speed log
+    mark + log_half - ~; if neg goto steady
+    mark = mark + log_half
+    reach over 1
+    reach = ~
+steady:
+    P keep
+    bar s+ P; if neg goto told
+    reach - half; if pos goto told
+    bar = zero
+    s+ P - reach; if neg goto told
+    zero s+ reach out position_fine
+    goto told; }
+"""
 
-
-@dataclass(frozen=True)
-class Settling:
-    """Formats of places, relative to the position, and of velocities in counts per tick."""
-
-    position_fine_bits: int
-    velocity_bits: int  # fraction bits of the velocity
-
-    @property
-    def half(self) -> int:
-        """Half a count."""
-        return 1 << self.position_fine_bits - 1
-
-    @property
-    def place_bits(self) -> int:
-        """Bits of a place, with its sign."""
-        return self.position_fine_bits + PLACE_BITS
-
-    @property
-    def speed_shift(self) -> int:
-        """Bits of a velocity that do not matter where it is compared with an earlier one."""
-        return max(0, self.velocity_bits - _SPEED_BITS)
+# Its words are where others are that only a count needs.
+SHARED = {"speed": "V", "mark": "c", "reach": "raw", "bar": "moved"}

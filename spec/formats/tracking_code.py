@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
+from tachometry.spec.formats.settling import SETTLING, SHARED
 from tachometry.spec.formats.tracking import Tracking
 from tachometry.spec.formats.tracking_instruction import CHOSEN, EARLY, OFFSETS, Code, Instruction, Jump, Left
 from tachometry.spec.formats.tracking_listing import LISTING
@@ -99,19 +100,19 @@ def _paired(chain: list[Instruction]) -> list[Instruction]:
 
 
 @cache
-def assembled(listing: str = LISTING, ports: int = 1, **kind: bool) -> Code:
+def assembled(listing: str = LISTING + SETTLING, ports: int = 1, **kind: bool) -> Code:
     """Return the instructions of a listing, with some that do nothing where a word would be read too early.
 
     The one that reads a word is `APART` instructions behind one that stores it, or more. Each reads `ports` words.
     """
     code: list[Instruction] = []
     labels: dict[str, int] = {}
-    wanted = dict.fromkeys(("smooth", "reads", "map", "period", "waits"), False)
+    wanted = dict.fromkeys(("smooth", "reads", "map", "period", "waits", "settles"), False)
     wanted |= {"block": ports > 1, "serial": ports == 1, **kind}
     within, wanted["edges"], wanted["plain"] = True, not wanted["reads"], not wanted["map"]
     wanted["kinds"] = wanted["edges"] or wanted["period"]
     for line in re.sub("#.*", "", listing).replace(";", "\n").splitlines():
-        words = line.split()
+        words = [SHARED.get(word, word) for word in line.split()]
         while words and words[0] in wanted:
             if words[1] == "{":
                 within = wanted[words[0]]
@@ -182,6 +183,7 @@ class Program:
     # clocks from an edge to the port, less those of the program: the velocity is that of the clock in which it is shown
     delay: int
     smooth: bool = False  # whether it also has the outputs `SMOOTH`
+    settles: bool = False  # whether a place that waits for a count goes to the middle of it
 
     @cached_property
     def code(self) -> Code:
@@ -192,7 +194,7 @@ class Program:
     def _kind(self) -> dict[str, bool]:
         form, mapped = self.form, self.form.displacement is not None
         kind = {"smooth": self.smooth, "reads": form.sampled, "map": mapped, "period": form.period_bits > 0}
-        return kind | {"waits": form.waits}
+        return kind | {"waits": form.waits, "settles": self.settles}
 
     @property
     def outputs(self) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ what is begun with the sum`.
     gain k        begin: log of the gain of p (0), v (1), a (2)  block, serial  before a line: for that machine only
     smooth, edges, reads   before a line, or several in braces: with --smooth, of counted edges, of read positions
     period, kinds, waits   the same: of reads with --period, of edges or reads with offsets, of reads without a check
-    map, plain    before a line: for a core with a map of the disc, without one
+    map, plain, settles    before a line: for a core with a map of the disc, without one, with `SETTLING`
     by            the factor of products      product name  begin: sum·factor/2^shift of that name
     over n        begin: shift right by n     over by       by ⌊log2⌋ of the factor's whole part
 """
@@ -161,7 +161,7 @@ placed:
     block {; made:                      # the velocity first
     edges w = doubt + log_X - slips hi+ slips; reads w = doubt + log_X
     triple = step + D
-    least_shown + ~ lo+ most_shown + most_shown hi+ least_shown out velocity
+    least_shown + ~ lo+ most_shown + most_shown hi+ least_shown out velocity; settles speed = sum
     limit + w over 1
     edges if empty goto shown_place     # it was, in a silence
     phase; if neg goto shown_place
@@ -183,11 +183,14 @@ place:                                  # and the place at the end of the tick
     edges w = doubt + log_X - slips hi+ slips; reads w = doubt + log_X  # D·√X, more if errors keep a sign
     triple = step + D; t = ~
     limit + w over 1; velocity_std - log_T + ~ exp
-    t min most_shown max least_shown out velocity; t = ~; slope by; }
+    t min most_shown max least_shown out velocity; settles speed = sum; t = ~; slope by
+    settles if empty goto settle; }
 told:
     as product acceleration
     serial t max least min most_std out velocity_std; block w max least min most_std out velocity_std
     ~ out acceleration
+    settles {; if empty goto end; speed log; mark = ~; reach = half
+    bar = minus_quarter + minus_sixteenth + minus_sixteenth; }
     after - one; if neg goto fewer
 learn:                                  # nothing below is in a hurry
     edges e - lag keep log; serial edges lost = slips hi+ lost  # counts were lost or added, and now the place is right
@@ -308,8 +311,7 @@ edges {; slip:                          # counts were lost or added, or the offs
     slips = slips hi+ one
     sum - three; if pos goto begin
     log_dt + log_4 - log_T - one; if pos goto begin
-    p = c - moved
-    goto show; }
+    p = c - moved; goto show; }
 first:
     p = c - moved; edges edge = raw - moved; since = tau
     phase = minus_one
@@ -382,19 +384,17 @@ whole:
 still:
     P out position_fine
     quiet - max_time; if neg goto shown
-    velocity = zero
-    goto quiet; }
+    velocity = zero; goto quiet; }
 rest:
     phase = minus_two; since = zero; p = zero
 nothing:
     velocity_std = none; least = zero; velocity = zero
     smooth sum out smooth_delay; smooth sum out velocity_smooth
-    p out position_fine
+    p out position_fine; settles P = sum
 quiet:
-    as = zero
-    serial goto shown
+    as = zero; serial goto shown
     block {; shown:; tick by
     velocity product shown; goto made
-shown_place:; velocity_std - log_T + ~ exp; w = ~; slope by; goto told
+shown_place:; velocity_std - log_T + ~ exp; w = ~; slope by; settles if empty goto settle; goto told
 same_place:; w = ~; goto place; }
 """

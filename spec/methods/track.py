@@ -15,7 +15,6 @@ from tachometry.spec.core.timing import Timing, parse_clocks
 from tachometry.spec.core.velocity import Velocity
 from tachometry.spec.core.words import Words
 from tachometry.spec.formats.carrying import Carrying
-from tachometry.spec.formats.settling import Settling
 from tachometry.spec.formats.tracking import MOST_MEMORY, RESULT_BITS, WIDTH, Tracking
 from tachometry.spec.formats.tracking_code import SMOOTH, SMOOTH_DELAY_BITS, Program
 from tachometry.spec.formats.tracking_sampled import SampledTracking
@@ -202,7 +201,7 @@ class TrackTachometer(TachometerSpec):
         """The program of the datapath from a tick to the update."""
         around = self._around
         delay = around.pin_to_count + around.tick + around.low_pass + around.output
-        serial = Program(self.form, Serial(self.form).times, delay, self.smooth)
+        serial = Program(self.form, Serial(self.form).times, delay, self.smooth, self.settles)
         fits = serial.all_clocks <= self.tick.room
         return (
             serial
@@ -236,11 +235,9 @@ class TrackTachometer(TachometerSpec):
         return Carrying(per_clock, shift, self.position_fine_bits, bits - self.position_fine_bits, late, slope, block)
 
     @cached_property
-    def settling(self) -> Settling | None:
-        """How `position_fine` goes to the middle of a count in a silence; None: it stays at the edge."""
-        if self.encoder.sampled or not any(extra.settles for extra in self.extras):
-            return None
-        return Settling(self.position_fine_bits, self.velocity.native_frac_bits)
+    def settles(self) -> bool:
+        """Whether `position_fine` goes to the middle of a count in a silence, and does not stay at the edge."""
+        return self.encoder.sampled is None and any(extra.settles for extra in self.extras)
 
     @property
     def remembered(self) -> None:

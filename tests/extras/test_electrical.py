@@ -4,6 +4,7 @@ import math
 import random
 import re
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,22 +14,25 @@ from proofs.formal.mutants import mutant
 from support.command import run
 from support.nightly import nightly
 from support.simulate import clock_by_clock
+from support.tracking import Interpreter, core, windows
 
 from tachometry.hdl.extras import electrical
-from tachometry.hdl.methods.settling import SettlingPlace
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
 from tachometry.sim.encoder.virtual import VirtualEncoder
 from tachometry.sim.engines.cxxrtl import Cxxrtl
 from tachometry.sim.engines.pysim import PySim
 from tachometry.sim.golden.methods.settling import Settled
+from tachometry.sim.golden.methods.track import rows
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.studies.extras import expected_rows
 from tachometry.sim.studies.lockstep import lockstep
 from tachometry.spec import of_options, of_texts
 from tachometry.spec.core.extras.electrical import ElectricalAngle
+from tachometry.spec.formats import tracking_code
 from tachometry.spec.formats.angles import Angles
-from tachometry.spec.formats.settling import Settling
+from tachometry.spec.formats.settling import SETTLING
+from tachometry.spec.formats.tracking_listing import LISTING
 
 TRACK = "tick=2000clk max-time=8000clk"
 LED = "sincos-table=yes lead=0clk unit=rpm velocity-width=12"
@@ -120,37 +124,52 @@ def test_wrong_gates_are_seen(text: str, wrong: str, case: int) -> None:
 
 
 @nightly
-def test_a_wrong_limit_of_a_silence_is_seen() -> None:
-    """In slow swings, places wait for a count at all distances from the edge."""
+def test_places_that_wait_agree() -> None:
+    """In slow swings, they wait for a count at all distances from the edge."""
     texts = {"lines": "100", "clock": "2MHz", "tick": "250us", "max-time": "40ms", "electrical": "7"}
     spec, disc = of_texts("track", texts), VirtualEncoder(100, jitter=0.05, seed=3)
     trace = PinTrace.of(disc.record(parse_motion("sine:20rad/s:5Hz:400ms")).recording, spec)
     assert lockstep(spec, trace, Cxxrtl()).n_mismatches == 0
-    for right, wrong in (
-        ("half - (half >> 2)", "half - (half >> 1)"),
-        ("stays & (ahead > now)", "stays & ~stays"),
-        ("waits | (", "("),
-        ("eq(mark >> 1)", "eq(mark)"),
-    ):
-        with mutant(SettlingPlace, right, wrong):
-            assert lockstep(spec, trace, Cxxrtl()).n_mismatches, right
 
 
-def test_a_place_settles_however_far_it_is() -> None:
-    """The low bits alone are compared, but none is lost."""
-    rng, settling, n = np.random.default_rng(1), Settling(6, 14), 1000
-    counted, far = rng.random(n) < 0.05, rng.random(n) < 0.2
-    places = np.where(far, rng.integers(-(1 << 24), 1 << 24, n), rng.integers(-64, 64, n)).tolist()
-    velocities = (rng.integers(-(1 << 16), 1 << 16, n) >> rng.integers(0, 16, n)).tolist()
-    rows = [
-        {"between": place, "velocity": velocity, "forced": int(not count), "taken": int(clock == 4)}
-        for place, velocity, count in zip(places, velocities, counted, strict=True)
-        for clock in range(5)
-    ]
-    seen = clock_by_clock(SettlingPlace(settling, 30, 20), rows, ["settled"])
-    settled = Settled(settling).places(velocities, counted.tolist(), places)
-    assert [row["settled"] for row in seen[4::5]] == settled
-    assert settled != places
+def settles(spec: Any) -> bool:
+    """Return whether the program has the places of the golden model; some of them settle."""
+    machine, shift = Interpreter(spec.program), spec.form.moved_shift - spec.position_fine_bits
+    ticks = windows(spec, 2, 1500)
+    model = rows(spec.form, spec.program.ahead)(ticks)
+    settled = Settled().places(model[:, 0], ticks.number > 0, model[:, 1])
+    assert np.abs(settled - model[:, 1]).max() > 1 << 18
+    seen = np.array([machine.tick(*row)[1] for row in ticks.rows()])
+    return not ((seen + (1 << shift - 1) >> shift) - (settled + (1 << shift - 1) >> shift)).any()
+
+
+def waiting(multiplier: str) -> Any:
+    return core(electrical="7", tick="100us", max_speed="1000rad/s", multiplier=multiplier)
+
+
+@pytest.mark.parametrize("multiplier", ["serial", "block"])
+def test_the_program_settles_places(multiplier: str) -> None:
+    assert settles(waiting(multiplier))
+
+
+@nightly
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("bar = minus_quarter", "bar = zero - count"),
+        ("zero s+ reach", "zero s+ half"),
+        ("bar = zero", "bar = bar"),
+        ("mark = mark + log_half", "mark = mark"),
+        ("mark = ~; reach", "reach"),
+    ],
+)
+def test_a_wrong_program_is_seen(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    listing = LISTING + SETTLING
+    assert listing.count(right) == 1
+    monkeypatch.setattr(tracking_code, "assembled", partial(tracking_code.assembled, listing.replace(right, wrong)))
+    tracking_code._longest.cache_clear()
+    assert not settles(waiting("serial"))
+    tracking_code._longest.cache_clear()
 
 
 ENGINE = Cxxrtl()  # compiles a core once

@@ -12,8 +12,7 @@ from tachometry.sim.golden.sorted_lookup import Ints
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.electrical import AngleInTurn
-from tachometry.spec.formats.angles import SHOWN_BITS, wrapped
-from tachometry.spec.formats.settling import PLACE_BITS
+from tachometry.spec.formats.angles import PLACE_BITS, SHOWN_BITS, wrapped
 from tachometry.spec.methods.axis import OneAxis
 
 

@@ -1,31 +1,31 @@
 """Golden model of a place that waits for a count."""
 
-from collections.abc import Iterable
+import numpy as np
+from numpy.typing import NDArray
 
-from tachometry.spec.formats.angles import wrapped
-from tachometry.spec.formats.settling import Settling
+from tachometry.sim.golden.methods.track_recursion import log2
+from tachometry.sim.golden.sorted_lookup import Ints
+from tachometry.spec.formats.tracking import LOG_BITS, PLACE_BITS
+
+_HALF = 1 << PLACE_BITS - 1
 
 
 class Settled:
     """Moves places that wait for a count to the middle of it as the velocity falls."""
 
-    def __init__(self, settling: Settling) -> None:
-        self._settling = settling
-        self._waits, self._limit, self._mark = False, settling.half, 0
+    def __init__(self) -> None:
+        self._waits, self._limit, self._mark = False, _HALF, 0
 
-    def places(self, velocities: Iterable[int], counted: Iterable[bool], places: Iterable[int]) -> list[int]:
-        """Return the places of the next updates, relative to their positions."""
-        half, found, bits = self._settling.half, list[int](), self._settling.place_bits
-        for velocity, has_count, place in zip(velocities, counted, places, strict=True):
-            speed = velocity >> self._settling.speed_shift
-            size, near = max(speed, ~speed), wrapped(place, bits)
-            ahead = max(near, ~near)
+    def places(self, velocities: Ints, counted: NDArray[np.bool_], places: Ints) -> Ints:
+        """Return the places of the next updates, relative to their positions, in 2^-PLACE_BITS."""
+        found = list[int]()
+        for velocity, has_count, place in np.column_stack((velocities, counted, places)).tolist():
+            size = log2(velocity)
             if has_count:
-                self._waits, self._limit, self._mark = False, half, size >> 1
-            else:
-                slow = size <= self._mark
-                self._waits |= ahead >= half - (half >> 2) and (slow or self._limit < half)
-                self._limit, self._mark = self._limit >> slow, self._mark >> slow
-            limited = self._limit if near >= 0 else ~self._limit
-            found.append(limited if self._waits and ahead > self._limit else place)
-        return found
+                self._waits, self._limit, self._mark = False, _HALF, size
+            elif size <= self._mark - (1 << LOG_BITS):
+                self._limit, self._mark = self._limit >> 1, self._mark - (1 << LOG_BITS)
+            self._waits |= self._limit < _HALF and abs(place) >= _HALF - (_HALF >> 2)
+            limited = min(abs(place), self._limit) if self._waits else abs(place)
+            found.append(limited if place >= 0 else -limited)
+        return np.array(found, dtype=np.int64)

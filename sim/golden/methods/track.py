@@ -175,7 +175,7 @@ class Model:
         sampled = spec.encoder.sampled is not None
         begin = rows if sampled else compiled(tuple(constants_of(spec.form, spec.program.ahead))) or rows
         self._shown = begin(spec.form, spec.program.ahead)
-        self._settled = None if spec.settling is None else Settled(spec.settling)
+        self._settled = None if not spec.settles else Settled()
         # The last clock of the ticks before, the position there, the tick of the last count, and the next tick.
         self._end, self._reached, self._latest, self._next = -1, 0, -spec.timing.max_ticks, 0
 
@@ -200,11 +200,10 @@ class Model:
                 windows = Windows.of_reads(ticks.rows(piece), spec.form)
             self._end, self._reached = int(last[-1]), self._reached + int(windows.moved.sum())
             *offset, velocity, place, velocity_std, acceleration, standstill, smooth, delay = self._shown(windows).T
-            place, counted = (place + (1 << shift - 1)) >> shift, windows.number > 0
+            counted = windows.number > 0
             if self._settled is not None:
-                place = np.array(
-                    self._settled.places(velocity.tolist(), counted.tolist(), place.tolist()), dtype=np.int64
-                )
+                place = self._settled.places(velocity, counted, place)
+            place = (place + (1 << shift - 1)) >> shift
             fine = (ticks.position[piece] << fine_bits) + place
             number = np.arange(self._next, self._next + len(last))
             before = np.maximum.accumulate(np.append(self._latest, np.where(counted, number, self._latest)))
