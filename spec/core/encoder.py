@@ -91,10 +91,17 @@ def _teeth(what: str, text: str) -> str:
     return pattern
 
 
+# Polynomials of 8, 16, 24 and 32 bits as many write them, without the highest term.
+_SHORT = "0x(0[0-9a-f]{1,7}|1d|2f|31|97|9b|d5|1021|3d65|8005|8bb7|90d9|864cfb|1edc6f41)"
+
+
 def _polynomial(what: str, text: str) -> str:
     word = text.strip().lower()
     if word == "none":
         return word
+    if re.fullmatch(_SHORT, word):
+        right = f"0x1{word[2:]} of {4 * len(word) - 8} bits"
+        raise ParameterError(what, f"must begin with its highest term, as {right}, not {text!r}")
     if not re.fullmatch(r"0x[0-9a-f]{1,9}", word) or not 1 << 3 <= int(word, 16) < 1 << 33 or not int(word, 16) & 1:
         raise ParameterError(what, f"must be none, or a polynomial of degree 3 to 32, as 0x43, not {text!r}")
     return hex(int(word, 16))
