@@ -96,7 +96,8 @@ def figures(results: Results, name: str, places: Sequence[tuple[str, str]]) -> l
 
 def core_table(results: Results) -> str:
     """Return the cores that a reader chooses between."""
-    shown = [one for one in CONFIGURATIONS if not one.is_option and one.has_speed_bar and "external" not in one.name]
+    beside = [one for one in CONFIGURATIONS if one.has_speed_bar and not one.is_option]
+    shown = [one for one in beside if "external" not in one.name and "8-output" not in one.name]
     found = {(one.name, one.what): figures(results, one.name, SHOWN) for one in shown}
     made = [[*one, *("" if n is None else f"{n:.0f}" for n in row)] for one, row in found.items() if any(row)]
     header = ["configuration", "what", *(f"{target} {heading(figure)}" for target, figure in SHOWN)]

@@ -4,10 +4,15 @@ from collections.abc import Sequence
 
 from amaranth import Array, C, Cat, Module, Mux, Signal, Value, signed
 
-from tachometry.spec.formats.angles import clocks_of_product
+from tachometry.spec.formats.angles import Factor, clocks_of_product
 
 # A term, a factor, a base, and what takes the result, or None.
 Product = tuple[Value, Value | int, Value, Signal | None]
+
+
+def term_of(factor: Factor, value: Value) -> Value:
+    """Return the term of a factor, with no more bits than it has."""
+    return value.shift_left(factor.shift) if factor.shift >= 0 else value.shift_right(-factor.shift)
 
 
 def take_products(
@@ -27,7 +32,8 @@ def take_products(
     whole = Signal()
     last = clocks_of_product(bits, block=block)
     m.d.comb += [done.eq(clock == last), ends.eq(number == len(products) - 1)]
-    m.d.comb += whole.eq(number == [target is None for *_, target in products].index(True))
+    wholes = [target is None for *_, target in products]
+    m.d.comb += whole.eq(number == wholes.index(True) if any(wholes) else 0)
     m.d.sync += clock.eq(Mux(begin | (done & ~ends), 1, Mux(clock.any() & ~done, clock + 1, 0)))
     with m.If(begin | done):
         m.d.sync += number.eq(Mux(begin, 0, number + 1))

@@ -5,14 +5,15 @@ from typing import Self
 from amaranth import Array, C, Cat, Const, Module, Mux, Signal, Value, signed
 from amaranth.lib.wiring import In, Out
 
-from tachometry.hdl.arithmetic.products import Product, take_products
+from tachometry.hdl.arithmetic.phase import take_phase
+from tachometry.hdl.arithmetic.products import Product, take_products, term_of
 from tachometry.hdl.arithmetic.saturate import saturate
 from tachometry.hdl.arithmetic.sine_cosine import SineCosine, SineTable
 from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import Box, by_name, only_if
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.electrical import LEADS, REFUSED, REFUSED_BITS, ElectricalAngle
-from tachometry.spec.formats.angles import LEAD_BITS, SHOWN_BITS, SLOPE_BITS, Angles, Factor
+from tachometry.spec.formats.angles import LEAD_BITS, SHOWN_BITS, Angles
 from tachometry.spec.formats.sine import AHEAD_BITS
 from tachometry.spec.formats.velocity_output import VelocityOutput
 
@@ -158,27 +159,12 @@ class Gates(Box):
 
         It begins anew after each update. The first phase owes nothing.
         """
-        angles = self._angles
-        bits, factor_bits, half = angles.bits, angles.factor_bits, angles.tick >> 1
-        # Angle and place of the counts at a tick, for the update that it has.
-        at = Signal(bits)
-        place = Signal(angles.place_bits)
-        fine_bits = angles.position_fine_bits
-        between = Signal(signed(fine_bits + angles.place_bits))
-        with m.If(self.tick):
-            m.d.sync += [at.eq(counted), place.eq(self.position)]
-        m.d.comb += between.eq(self.native_position_fine - (place << fine_bits))
-        s = Signal(factor_bits)
-        now = Signal(signed(bits))
-        led = Signal()
-        update = between, self.native_velocity, self.native_acceleration
-        *first, mean, last = phase_products(angles, update, at, (s, (s >> 1) - angles.late))
-        more = self._lead(m, s + (angles.all_clocks - angles.clocks), angles.led, led) if angles.led else ()
-        products = (*first, (mean[0], s + (half - angles.late), mean[2], now), mean, last, *more)
-        done, ends, start = take_products(m, self.native_valid, products, factor_bits, bits, block=angles.block)
+        angles, bits = self._angles, self._angles.bits
+        s = Signal(angles.factor_bits)
+        done, start, now = self._carried(m, counted, s)
         phase = Signal(bits)
         run = Signal(bits)
-        grows = Signal(signed(bits))
+        grows = Signal.like(now)
         begun = Signal()
         m.d.comb += run.eq(phase + grows)
         m.d.sync += [phase.eq(Mux(done, start, run)), begun.eq(begun | done)]
@@ -187,35 +173,61 @@ class Gates(Box):
             m.d.sync += s.eq(self.angle_lead + angles.span)
         with m.If(done):
             m.d.sync += grows.eq(now)
-        if angles.led:
-            m.d.sync += led.eq(ends)
         if angles.is_read:
             with m.If(done | ~self.position_valid):
                 m.d.sync += self.angle_valid.eq(self.position_valid)
         return begun, (phase + debt)[:bits], grows
 
+    def _carried(self, m: Module, counted: Value, s: Value) -> tuple[Value, Value, Signal]:
+        """Return when the products of an update are there, the phase `s` after it, and the slope from then on."""
+        angles, begin = self._angles, self.native_valid
+        bits, factor_bits, fine_bits = angles.bits, angles.factor_bits, angles.position_fine_bits
+        # Place of the counts at a tick, for the update that it has.
+        place = Signal(angles.place_bits)
+        between = Signal(signed(fine_bits + angles.place_bits))
+        with m.If(self.tick):
+            m.d.sync += place.eq(self.position)
+        m.d.comb += between.eq(self.native_position_fine - (place << fine_bits))
+        led = Signal()
+        update = between, self.native_velocity, self.native_acceleration
+        more = self._lead(m, s + (angles.all_clocks - angles.clocks), angles.led, led) if angles.led else ()
+        if angles.block:
+            done, start, now = take_phase(m, angles, self.tick, counted, (begin, *update), s)
+            if more:
+                _, ends, _ = take_products(m, done, more, factor_bits, bits, block=True)
+                m.d.sync += led.eq(ends)
+            return done, start, now
+        at = Signal(bits)
+        now = Signal(signed(bits))
+        with m.If(self.tick):
+            m.d.sync += at.eq(counted)
+        *first, mean, last = phase_products(angles, update, at, (s, (s >> 1) - angles.late))
+        products = (*first, mean, (mean[0], s - (s >> 1) + (angles.tick >> 1), mean[2], now), last, *more)
+        done, ends, start = take_products(m, begin, products, factor_bits, bits)
+        m.d.sync += led.eq(ends)
+        return done, start, now
+
     def _lead(self, m: Module, s: Value, led: VelocityOutput, ready: Value) -> tuple[Product, ...]:
         """Return products of velocity and position at a time, which are shown when they are ready."""
         angles, velocity, fine = self._angles, self.native_velocity, self.native_position_fine
-        bits, (of_curve, of_way, of_shown) = angles.factor_bits, angles.lead_factors
-        bend = _term(of_curve, self.native_acceleration)
+        of_curve, of_way, of_shown = angles.lead_factors
+        bend = term_of(of_curve, self.native_acceleration)
         curve = Signal(signed(len(bend)))
-        bent = curve << bits - SLOPE_BITS
-        mean = Signal(signed(max(len(bent), len(velocity)) + 1))
+        mean = Signal(signed(max(len(curve), len(velocity)) + 1))
         end = Signal.like(mean)
-        way = Signal(signed(len(_term(of_way, mean))))
+        way = Signal(signed(len(term_of(of_way, mean))))
         place = Signal.like(fine)
-        shown = Signal(signed(len(_term(of_shown, end))))
+        shown = Signal(signed(len(term_of(of_shown, end))))
         most, _ = saturate(m, shown, led.limit)
         with m.If(ready):
             m.d.sync += [self.velocity_lead.eq(most), self.position_lead.eq(place)]
         return (
             (bend, of_curve.number, C(0), curve),
-            (bent, (s >> 1) - angles.late, velocity, mean),
-            (bent, s - angles.late, velocity, end),
-            (_term(of_way, mean), of_way.number, C(0), way),
-            (way << bits - SLOPE_BITS, s, fine, place),
-            (_term(of_shown, end), of_shown.number, C(0), shown),
+            (curve, (s >> 1) - angles.late, velocity, mean),
+            (curve, s - angles.late, velocity, end),
+            (term_of(of_way, mean), of_way.number, C(0), way),
+            (way, s, fine, place),
+            (term_of(of_shown, end), of_shown.number, C(0), shown),
         )
 
     def _counted(self, m: Module, step: Value, counted: Value, moves: Value, known: Value) -> tuple[Value, Signal]:
@@ -227,7 +239,7 @@ class Gates(Box):
         velocity, *_ = angles.factors
         s = Signal(angles.factor_bits)
         slope = Signal(signed(bits))
-        products = ((_term(velocity, self.native_velocity), velocity.number, C(0), slope), (slope, s, C(0), None))
+        products = ((term_of(velocity, self.native_velocity), velocity.number, C(0), slope), (slope, s, C(0), None))
         done, _, far = take_products(m, self.native_valid, products, angles.factor_bits, bits)
         most, _ = saturate(m, slope, half)
         grows = Signal.like(most)
@@ -267,22 +279,17 @@ def phase_products(
     acceleration. Beside the time is how much later than the velocity its middle is.
     """
     (between, speed, acceleration), (velocity, fine, slopes) = update, angles.factors
-    bend = _term(slopes, acceleration)
+    bend = term_of(slopes, acceleration)
     curve = Signal(signed(max(len(bend), 2)))
     target = Signal(angles.bits)
     slope = Signal(signed(angles.bits))
     return (
-        (_term(fine, between), fine.number, at, target),  # before the next tick
+        (term_of(fine, between), fine.number, at, target),  # before the next tick
         (bend, slopes.number, C(0), curve),
-        (_term(velocity, speed), velocity.number, C(0), slope),
-        (curve << angles.factor_bits - SLOPE_BITS, times[1], slope, slope),
+        (term_of(velocity, speed), velocity.number, C(0), slope),
+        (curve, times[1], slope, slope),
         (slope, times[0], target, None),
     )
-
-
-def _term(factor: Factor, value: Value) -> Value:
-    """Return the term of a factor, with no more bits than it has."""
-    return value.shift_left(factor.shift) if factor.shift >= 0 else value.shift_right(-factor.shift)
 
 
 def _owed(m: Module, angles: Angles, jumps: Value, gap: Value) -> Signal:

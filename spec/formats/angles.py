@@ -8,7 +8,6 @@ from typing import Any
 from tachometry.spec.formats.velocity_output import VelocityOutput
 
 SHOWN_BITS = 16  # of the angle: 2^16 is an electrical turn
-SLOPE_BITS = 16  # bits of an acceleration below those of an angle
 LEAD_BITS = 16  # of a lead, in clocks
 PLACE_BITS = 8  # bits of the counts between the fine position and the position
 _FACTOR_BITS = 18  # of a factor, with its sign, or more where times need them
@@ -113,10 +112,10 @@ class Angles:
 
     @property
     def factors(self) -> tuple[Factor, ...]:
-        """LSBs as angles: of a velocity, per clock, a fine position, an acceleration, per clock² with `SLOPE_BITS`."""
+        """LSBs as angles: velocity, per clock, fine position, acceleration, per clock² and finer by `factor_bits`."""
         lsb = (Fraction(1, self.tick << self.velocity_bits), Fraction(1, 1 << self.position_fine_bits), self.slope)
         per_count = Fraction(self.pole_pairs << self.bits, self.counts)
-        values = (lsb[0] * per_count, lsb[1] * per_count, (lsb[2] or 1) * per_count * (1 << SLOPE_BITS))
+        values = (lsb[0] * per_count, lsb[1] * per_count, (lsb[2] or 1) * per_count * (1 << self.factor_bits))
         return tuple(Factor.of(value, self.factor_bits) for value in values)
 
     @property
@@ -124,7 +123,8 @@ class Angles:
         """LSBs: of an acceleration in those of a velocity, that in those of a fine position, per clock, and `led`."""
         per_tick, fine = self.tick << self.velocity_bits, 1 << self.position_fine_bits
         shown = self.led.ratio if self.led else self.slope
-        values = (self.slope * per_tick * (1 << SLOPE_BITS), Fraction(fine << SLOPE_BITS, per_tick), shown)
+        finer = 1 << self.factor_bits
+        values = (self.slope * per_tick * finer, Fraction(fine * finer, per_tick), shown)
         return tuple(Factor.of(value, self.factor_bits) for value in values)
 
     @property

@@ -16,6 +16,7 @@ from support.nightly import nightly
 from support.simulate import clock_by_clock
 from support.tracking import Interpreter, core, windows
 
+from tachometry.hdl.arithmetic.phase import take_phase
 from tachometry.hdl.extras import electrical
 from tachometry.sim import golden
 from tachometry.sim.encoder.motion import parse_motion
@@ -121,6 +122,22 @@ FAULTS = (
 def test_wrong_gates_are_seen(text: str, wrong: str, case: int) -> None:
     with mutant(electrical.Gates, text, wrong):
         assert lockstep(CASES[case].spec, CASES[case].trace(), PySim()).n_mismatches
+
+
+@nightly
+@pytest.mark.parametrize(
+    ("text", "wrong"),
+    [
+        ("(phase >> finer) + whole", "phase >> finer"),
+        ("begin | begins[2]", "begin"),
+        ("begins[2] | begins[4]", "begins[2]"),
+        ("s - half + (", "s + ("),
+        ("(half - angles.late", "(half"),
+    ],
+)
+def test_a_wrong_phase_of_the_block_multiplier_is_seen(text: str, wrong: str) -> None:
+    with mutant(take_phase, text, wrong):
+        assert lockstep(CASES[1].spec, CASES[1].trace(), PySim()).n_mismatches
 
 
 @nightly

@@ -11,7 +11,7 @@ from tachometry.sim.golden.sorted_lookup import Ints
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.electrical import LEADS, REFUSED, REFUSED_BITS, ElectricalAngle
-from tachometry.spec.formats.angles import SHOWN_BITS, SLOPE_BITS, Angles, Factor, wrapped
+from tachometry.spec.formats.angles import SHOWN_BITS, Angles, Factor, wrapped
 from tachometry.spec.formats.sine import (
     AHEAD_BITS,
     ASIDE,
@@ -180,7 +180,7 @@ def _tracked(extra: ElectricalAngle, view: View, counts: Table) -> Table:
     rows = list[list[int]]()
     for clock, at, between, ahead, velocity, acceleration in columns:
         s = angles.span + ahead
-        times = (s >> 1) - angles.late, s + (angles.tick >> 1) - angles.late
+        times = (s >> 1) - angles.late, s - (s >> 1) + (angles.tick >> 1)
         mean, now = slopes_at(angles, velocity, acceleration, times)
         start = at + angles.factors[1].times(between) + mean * s
         rows.append([clock + angles.clocks, wrapped(start, angles.bits), wrapped(now, angles.bits), 0, 0])
@@ -188,10 +188,12 @@ def _tracked(extra: ElectricalAngle, view: View, counts: Table) -> Table:
 
 
 def slopes_at(angles: Angles, velocity: int, acceleration: int, times: Sequence[int]) -> list[int]:
-    """Return the slopes of the phase so many clocks after the velocity."""
+    """Return slopes of the phase, each so many clocks after the one before; the first one, after the velocity."""
     of_velocity, _, of_acceleration = angles.factors
-    curve = of_acceleration.times(acceleration) << angles.factor_bits - SLOPE_BITS
-    return [of_velocity.times(velocity) + Factor(time, angles.factor_bits, 0).times(curve) for time in times]
+    curve, slopes = of_acceleration.times(acceleration), [of_velocity.times(velocity)]
+    for time in times:
+        slopes.append(slopes[-1] + Factor(time, angles.factor_bits, 0).times(curve))
+    return slopes[1:]
 
 
 def _led(extra: ElectricalAngle, view: View) -> Table:
@@ -203,9 +205,9 @@ def _led(extra: ElectricalAngle, view: View) -> Table:
     limit = angles.led.limit if angles.led else 0
     names, found = ("velocity", "acceleration", "position_fine"), list[tuple[int, int]]()
     for s, velocity, acceleration, fine in zip(ends, *(updates[name].tolist() for name in names), strict=True):
-        curve = of_curve.times(acceleration) << bits - SLOPE_BITS
+        curve = of_curve.times(acceleration)
         mean, end = (velocity + Factor(t - angles.late, bits, 0).times(curve) for t in (s >> 1, s))
-        way = Factor(s, bits, 0).times(of_way.times(mean) << bits - SLOPE_BITS)
+        way = Factor(s, bits, 0).times(of_way.times(mean))
         width = spec.position_width + angles.position_fine_bits
         found.append((max(-limit, min(limit, of_shown.times(end))), wrapped(fine + way, width)))
     columns = np.array(found, np.int64).reshape(-1, 2).T

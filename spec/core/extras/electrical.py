@@ -140,8 +140,9 @@ class ElectricalAngle(Extra):
         if self.pole_pairs > most:
             raise ParameterError(self.name, f"must be at most {most} with so few counts per revolution")
         angles = self.angles(spec)
-        # All products are there before the next update, the first one before a tick.
-        clocks = max(angles.all_clocks + angles.rest, angles.tracks + angles.product + 1)
+        # All products are there before the next update, and what holds the angle of a tick is free before that.
+        first = angles.clocks if angles.block else angles.product
+        clocks = max(angles.all_clocks + angles.rest, angles.tracks + first + 1)
         if (spec.times.shortest_tick if angles.tracks else angles.tick) < clocks:
             needs = f"needs a tick of {clocks} clocks"
             raise ParameterError(self.name, f"{needs}: take a longer --tick", needs)
