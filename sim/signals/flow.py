@@ -76,19 +76,26 @@ class Flow:
         return any(self.n_changes for _ in self._counted())
 
     def pieces(self, spec: TachometerSpec, size: int) -> Iterator[PinTrace]:
-        """Yield what the pins of a core see, at most `size` clocks at a time.
+        """Yield what the pins of a core see, at most `size` clocks at a time, which are a tick or more.
 
+        A piece ends before an update of a tick, so that all that the update brings is in one piece.
         It raises ValueError for more than `MOST_IN_PIECES` ticks, or if clocks are too many to be told apart.
         """
+
+        def cut(clock: int) -> int:
+            update = spec.latency.tick + spec.latency.tick_to_velocity - 1
+            return clock - (clock - update) % spec.timing.tick_cycles
+
         clock_hz, begin, held = spec.timing.clock_hz, 0, Part(np.empty(0), np.empty(0, dtype=np.uint8), 0.0)
         for time, level, until, read in self._counted():
             self.read = max(self.read, read)
             check_ticks(until, spec, MOST_IN_PIECES)
             held = Part(np.append(held.time, time), np.append(held.level, level), until)
-            n_clocks = max(int(until * clock_hz), until == self.duration)
+            n_clocks = int(until * clock_hz)
+            n_clocks = max(n_clocks, 1) if until == self.duration else cut(n_clocks)
             while begin < n_clocks:
                 self._n_merged = self.n_merged(clock_hz, begin)
-                end = min(begin + size, n_clocks)
+                end = cut(begin + size) if begin + size < n_clocks else n_clocks
                 self._held = Recording.of_level(held.time, held.level, until, self.lines)
                 yield self._held.place(clock_hz).completed(spec).part(begin, end)
                 first = int(np.searchsorted(self._held.clock(clock_hz), end)) - 1

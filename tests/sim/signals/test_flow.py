@@ -60,16 +60,18 @@ def test_pieces_are_what_the_pins_see(clock_hz: int, monkeypatch: pytest.MonkeyP
     recording = VirtualEncoder(25, illegal=0.1, bounce=Bounce(2, 1e-3)).record(MOTION).recording
     spec = of_texts("m", {"ppr": "25", "clock": f"{clock_hz}Hz", "tick": "10ms"}).tachometer
     whole = PinTrace.of(recording, spec)
+    first_update = spec.latency.tick + spec.latency.tick_to_velocity
     monkeypatch.setattr(flow, "ROWS", 5)
     parts, pieces, merged = Flow.of(recording), list[PinTrace](), list[int]()
-    for piece in parts.pieces(spec, clock_hz // 500):
+    for piece in parts.pieces(spec, clock_hz // 100):
         pieces.append(piece)
         n_clocks = sum(each.n_clocks for each in pieces)
+        assert n_clocks == whole.n_clocks or (n_clocks + 1) % spec.timing.tick_cycles == first_update
         merged.append(parts.n_merged(clock_hz, n_clocks))
         assert merged[-1] == recording.n_merged(clock_hz, n_clocks)
         assert parts.n_merged(clock_hz, n_clocks - 1) == recording.n_merged(clock_hz, n_clocks - 1)
     assert_same(reduce(PinTrace.then, pieces), whole)
-    assert max(piece.n_clocks for piece in pieces) == clock_hz // 500
+    assert max(piece.n_clocks for piece in pieces) == clock_hz // 100
     assert (parts.n_changes, parts.n_together) == (recording.n_changes, recording.n_together)
     assert merged[-1] > 0
     assert parts.n_together > 0

@@ -42,7 +42,7 @@ def test_pieces_are_the_whole(
         write_csv(text, read_capture(saved))
         with monkeypatch.context() as patch:
             patch.setattr(simulation, "PIECE", 7)
-            patch.setattr(crossings, "_CHUNK", 100)
+            patch.setattr(crossings, "_CHUNK", 101)
             patch.setattr(captured, "BLOCK", 5)
             assert outputs(words, tmp_path / "pieces", capsys) == whole
     assert b"PASS" in whole["out"]
