@@ -65,8 +65,8 @@ def find_crossings(shaft: Shaft, disc: Disc) -> tuple[FloatArray, IntArray]:
     return np.concatenate(times), np.concatenate(quarters)
 
 
-def passages(shaft: Shaft, disc: Disc) -> Iterator[tuple[FloatArray, IntArray]]:
-    """Yield what `find_crossings` returns, some at a time."""
+def passages(shaft: Shaft, disc: Disc, share: int = 1) -> Iterator[tuple[FloatArray, IntArray]]:
+    """Yield what `find_crossings` returns, some at a time: fewer as each takes a larger share of memory."""
     length = np.diff(shaft.breakpoints, append=shaft.breakpoints[-1])  # the end is a cell of no length
     with np.errstate(over="ignore"):
         n_cells = np.maximum(np.ceil(length * _CELLS_PER_PERIOD * np.append(shaft.max_frequency, 0)), 1)
@@ -80,7 +80,7 @@ def passages(shaft: Shaft, disc: Disc) -> Iterator[tuple[FloatArray, IntArray]]:
         time = shaft.breakpoints[j] + length[j] * ((cell - first_cell[j]) / n_cells[j])
         time = _split(shaft.acceleration, time)  # now the speed is monotone in each cell and cannot hide two zeros
         time = _split(shaft.speed, time)
-        yield from _crossings_of_cells(shaft, disc, time)
+        yield from _crossings_of_cells(shaft, disc, time, -(-_CHUNK // share))
 
 
 def _split(function: Callable[[FloatArray], FloatArray], time: FloatArray) -> FloatArray:
@@ -91,14 +91,14 @@ def _split(function: Callable[[FloatArray], FloatArray], time: FloatArray) -> Fl
     return np.unique(np.concatenate([time, zeros]))
 
 
-def _crossings_of_cells(shaft: Shaft, disc: Disc, time: FloatArray) -> Iterator[tuple[FloatArray, IntArray]]:
-    """Yield passages between consecutive times, between which the angle is monotone, some at a time."""
+def _crossings_of_cells(shaft: Shaft, disc: Disc, time: FloatArray, most: int) -> Iterator[tuple[FloatArray, IntArray]]:
+    """Yield passages between consecutive times, between which the angle is monotone, at most so many at a time."""
     quarter = disc.quarter(shaft.angle(time))
     steps = np.diff(quarter)
     last = np.cumsum(np.abs(steps))
     first = last - np.abs(steps)
-    for begin in range(0, int(last[-1]), _CHUNK):
-        passage = np.arange(begin, min(begin + _CHUNK, int(last[-1])))
+    for begin in range(0, int(last[-1]), most):
+        passage = np.arange(begin, min(begin + most, int(last[-1])))
         cell = np.searchsorted(last, passage, side="right")
         nth = passage - first[cell]
         forward = steps[cell] > 0

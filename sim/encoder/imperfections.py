@@ -2,7 +2,8 @@
 
 Everything is drawn from raw PCG64 words and evaluated with operations that IEEE 754 rounds exactly: equal inputs give
 equal bits on every machine. Each imperfection has random numbers of its own, as many for each edge of the shaft,
-whether that edge arrives or not: switching one on leaves the others as they were.
+whether that edge arrives or not: switching one on leaves the others as they were. So an edge has its number from the
+start, by which `stream` finds what is drawn for it.
 
 Lines are a change list: row r tells the instant and the levels A + 2 B from then on, row 0 the levels at rest.
 """
@@ -78,20 +79,28 @@ class LineFault:
             raise ParameterError(what, f"must begin at 0 s or later, not at {time}")
         return LineFault(line.lower(), begins)
 
-    def applied(self, time: FloatArray, level: Levels, bit: np.uint8, *, high: bool) -> tuple[FloatArray, Levels]:
-        """Return times and levels with the line of this bit high from then on, as an open input, or as it is then."""
-        begins = int(np.searchsorted(time, self.time_s, side="right"))
-        time = np.insert(time, begins, self.time_s)
-        level = np.insert(level, begins, level[begins - 1])
-        kept = bit if high else level[begins] & bit
-        level[begins:] = level[begins:] & ~bit | kept
+    def applied(
+        self, time: FloatArray, level: Levels, bit: np.uint8, kept: list[np.uint8] | None
+    ) -> tuple[FloatArray, Levels]:
+        """Return times and levels with the line of this bit high from then on, as an open input, or as it is then.
+
+        `kept` holds what it is then for rows that begin later; None for an open input.
+        """
+        if begins := int(np.searchsorted(time, self.time_s, side="right")):
+            time = np.insert(time, begins, self.time_s)
+            level = np.insert(level, begins, level[begins - 1])
+            if kept is not None:
+                kept[:] = [level[begins] & bit]
+        level[begins:] = level[begins:] & ~bit | (bit if kept is None else kept[0])
         changed = np.append(True, level[1:] != level[:-1])
         return time[changed], level[changed]
 
 
-def stream(seed: int, which: int) -> np.random.PCG64:
-    """Return the random numbers of one imperfection."""
-    return np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(which,)))
+def stream(seed: int, which: int, first: int = 0) -> np.random.PCG64:
+    """Return the random numbers of one imperfection, from number `first` on."""
+    random = np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(which,)))
+    random.advance(first)
+    return random
 
 
 def displaced_edges(phase_error_deg: float, duty_error_deg: float) -> FloatArray:
@@ -111,10 +120,10 @@ def jittered(time: FloatArray, ends: tuple[float, float], deviation: float, rand
     return time + shift * np.minimum(gap[:-1], gap[1:])
 
 
-def lose_pulses(level: Levels, probability: float, random: np.random.PCG64) -> tuple[Levels, int]:
-    """Keep a line low where it would have risen and fallen again; also the number of edges that are lost."""
+def lose_pulses(level: Levels, probability: float, random: np.random.PCG64) -> tuple[Levels, Rows]:
+    """Keep a line low where it would have risen and fallen again; also the rows in which lost pulses begin."""
     drawn = uniform(random, len(level) - 1) < probability
-    seen, n_lost = level.copy(), 0
+    seen, begun = level.copy(), [np.empty(0, dtype=np.intp)]
     for line in (np.uint8(1), np.uint8(2)):
         change = np.diff((level & line).astype(np.int8))
         rise = np.flatnonzero(change > 0)
@@ -125,8 +134,8 @@ def lose_pulses(level: Levels, probability: float, random: np.random.PCG64) -> t
         covered[rise[lost] + 1] = 1
         covered[fall[lost] + 1] = -1
         seen[np.cumsum(covered) > 0] &= ~line
-        n_lost += 2 * int(np.count_nonzero(lost))
-    return seen, n_lost
+        begun.append(rise[lost] + 1)
+    return seen, np.concatenate(begun)
 
 
 def late_edges(level: Levels, row: Rows, probability: float, random: np.random.PCG64) -> NDArray[np.bool_]:
@@ -175,7 +184,13 @@ def gated_index(
 
 
 def pulsed(
-    time: FloatArray, step: NDArray[np.int64], duration: float, *, directed: bool, both_edges: bool = False
+    time: FloatArray,
+    step: NDArray[np.int64],
+    duration: float,
+    *,
+    directed: bool,
+    both_edges: bool = False,
+    nth: int = 0,
 ) -> tuple[FloatArray, Levels]:
     """Return times and levels of pulses, each of which lasts for half the time to the next one.
 
@@ -183,11 +198,12 @@ def pulsed(
     - `directed`: Pulses are on line A, and B is high for those forward, from the end of the pulse before; else they are
       on A for those forward and on B for those backward.
     - `both_edges`: Each edge of A is a step, with `directed`; the direction still changes between them.
+    - `nth`: Steps before these.
     """
     begin, end = time[1:], (time[1:] + np.append(time[2:], duration)) / 2
     if directed:
         direction = np.append(np.where(step > 0, 2, 0), 2 * int(len(step) and step[-1] > 0))
-        high = np.arange(1, len(step) + 1) & 1 if both_edges else 1
+        high = np.arange(nth + 1, nth + len(step) + 1) & 1 if both_edges else 1
         rise, fall, first = direction[:-1] | high, direction[1:] | high * both_edges, direction[0]
     else:
         rise, fall, first = np.where(step > 0, 1, 2), np.zeros_like(step), np.int64(0)

@@ -329,3 +329,39 @@ def _read_csv(text: str) -> Motion:
     speed = (series.value * SPEEDS[unit]).tolist()
     rows = zip(np.diff(series.time).tolist(), pairwise(speed), strict=True)
     return Motion._joined(_Segment(time, one, (other - one) / time) for time, (one, other) in rows)
+
+
+@dataclass(frozen=True)
+class VibratingShaft:
+    """A shaft in motion that vibrates."""
+
+    motion: Motion
+    vibration: Vibration | None
+    start_angle_rad: float
+
+    @property
+    def breakpoints(self) -> FloatArray:
+        return self.motion.breakpoints
+
+    @property
+    def max_frequency(self) -> FloatArray:
+        return np.maximum(self.motion.sine_frequency, self.vibration.frequency_hz if self.vibration else 0.0)
+
+    @property
+    def reach(self) -> float:
+        """Start angle and distance travelled to and fro together, rad, or a little more."""
+        vibrated = 4 * self.vibration.amplitude_rad * self.vibration.frequency_hz if self.vibration else 0.0
+        start = abs(self.motion.start_angle[0] + self.start_angle_rad)
+        return float(start + self.motion.max_travel + vibrated * self.motion.duration)
+
+    def angle(self, t: ArrayLike) -> FloatArray:
+        angle = self.motion.angle(t) + self.start_angle_rad
+        return angle + self.vibration.angle(t) if self.vibration else angle
+
+    def speed(self, t: ArrayLike) -> FloatArray:
+        speed = self.motion.speed(t)
+        return speed + self.vibration.speed(t) if self.vibration else speed
+
+    def acceleration(self, t: ArrayLike) -> FloatArray:
+        acceleration = self.motion.acceleration(t)
+        return acceleration + self.vibration.acceleration(t) if self.vibration else acceleration

@@ -22,7 +22,7 @@ from tachometry.spec.language.option import ParameterError
 Ints = NDArray[np.int64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class ReadEncoding(Encoding):
     """Reads of a shaft, and the truth about it: its position is that of the latest read."""
 
@@ -56,7 +56,7 @@ class SampledEncoder(VirtualEncoder):
             clock = start + reads.longest
         clock = clock[clock >= max(age, 1)] if reads is None else clock
         time = clock / timing.clock_hz
-        shaft = Encoding(self, motion, Recording.of_level(np.zeros(1), np.zeros(1, np.uint8), 1.0), 0, 0)
+        shaft = Encoding(self, motion, Recording.of_level(np.zeros(1), np.zeros(1, np.uint8), 1.0))
         angle = shaft.true_angle(np.maximum(clock - age, 0) / timing.clock_hz)
         turn = angle / (2 * math.pi) * float(Fraction(self.ratio or 1))
         place = self._disturbed(-turn if self.reverse else turn, len(clock), 1 << sampled.bits)
@@ -76,7 +76,11 @@ class SampledEncoder(VirtualEncoder):
         recording = Recording(at / timing.clock_hz, none, none, motion.duration, more=more)
         read = (-place if self.reverse else place)[~wrong]
         read = read - (read[:1] & -1 << sampled.width).sum() - (self.core.encoder.zero or 0)
-        return ReadEncoding(self, motion, recording, 0, 0, read_time=time[~wrong], read=read)
+        return ReadEncoding(self, motion, recording, read_time=time[~wrong], read=read)
+
+    def flow(self, motion: Motion) -> tuple[Recording, Encoding]:
+        truth = self.record(motion)
+        return truth.recording, truth
 
     def _disturbed(self, turn: NDArray[np.float64], n: int, counts: int) -> Ints:
         """Return what the encoder reads at these places."""

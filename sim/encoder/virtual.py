@@ -4,12 +4,12 @@ The truth is computed from the shaft's angle, never from the lines, so that it c
 """
 
 import math
-from collections.abc import Generator
-from dataclasses import dataclass
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache, cached_property
-from itertools import chain, pairwise
-from typing import Any
+from itertools import chain
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from tachometry.sim.encoder import imperfections
 from tachometry.sim.encoder.crossings import Disc, IntArray, find_crossings, passages
 from tachometry.sim.encoder.imperfections import BOUNCE, ILLEGAL, JITTER, LOST, NONUNIFORMITY
-from tachometry.sim.encoder.motion import FloatArray, Motion, Vibration, sin2pi
+from tachometry.sim.encoder.motion import FloatArray, Motion, VibratingShaft, sin2pi
 from tachometry.sim.encoder.options import EncoderOptions
 from tachometry.sim.signals.flow import Flow, Part
 from tachometry.sim.signals.memory import EDGE, check_memory
@@ -54,38 +54,26 @@ def _halls() -> NDArray[np.uint8]:
     return halls
 
 
-@dataclass(frozen=True)
-class _VibratingShaft:
-    motion: Motion
-    vibration: Vibration | None
-    start_angle_rad: float
+class _Lines(NamedTuple):
+    """Holds the lines that some edges make. What is before the first of them and after the last is not known."""
 
-    @property
-    def breakpoints(self) -> FloatArray:
-        return self.motion.breakpoints
+    times: FloatArray  # shape (r,): of the recording
+    level: NDArray[np.uint8]  # shape (r,)
+    at: FloatArray  # shape (n,): when the quarters begin
+    row: IntArray  # those quarters that the lines show
+    clean: IntArray  # those before which no pulse has begun that may be lost
+    late: IntArray  # those that come with the next
+    lost: IntArray  # those in which a lost pulse begins
 
-    @property
-    def max_frequency(self) -> FloatArray:
-        return np.maximum(self.motion.sine_frequency, self.vibration.frequency_hz if self.vibration else 0.0)
+    def certain(self, away: float) -> tuple[int, int]:
+        """Return the quarter up to which later edges change nothing, and one that must be held for those after it.
 
-    @property
-    def reach(self) -> float:
-        """Start angle and distance travelled to and fro together, rad, or a little more."""
-        vibrated = 4 * self.vibration.amplitude_rad * self.vibration.frequency_hz if self.vibration else 0.0
-        start = abs(self.motion.start_angle[0] + self.start_angle_rad)
-        return float(start + self.motion.max_travel + vibrated * self.motion.duration)
-
-    def angle(self, t: ArrayLike) -> FloatArray:
-        angle = self.motion.angle(t) + self.start_angle_rad
-        return angle + self.vibration.angle(t) if self.vibration else angle
-
-    def speed(self, t: ArrayLike) -> FloatArray:
-        speed = self.motion.speed(t)
-        return speed + self.vibration.speed(t) if self.vibration else speed
-
-    def acceleration(self, t: ArrayLike) -> FloatArray:
-        acceleration = self.motion.acceleration(t)
-        return acceleration + self.vibration.acceleration(t) if self.vibration else acceleration
+        An index is up to `away` seconds away from its edges.
+        """
+        sure = self.row[self.row <= self.clean[-1]][:-1]
+        sure = np.append(0, sure[self.at[sure] + away <= self.at[-2]])
+        held = np.intersect1d(self.clean, sure[:-2])
+        return int(sure[-1]), int(np.append(0, held[self.at[held] + away <= self.at[sure[-1]]])[-1])
 
 
 @dataclass(frozen=True)
@@ -189,47 +177,41 @@ class VirtualEncoder(EncoderOptions):
 
     def record(self, motion: Motion) -> "Encoding":
         """Let the shaft move; ValueError if that could be more than `MAX_EDGES` edges, with those before the start."""
-        self._check(motion)
-        shaft = self.shaft(motion)
-        time, quarter = find_crossings(shaft, self.disc)
-        if self.jitter:
-            time = imperfections.jittered(time, (0.0, motion.duration), self.jitter, self._stream(JITTER))
-        time = np.append(0.0, time)
-        quarter = np.append(self.disc.quarter(shaft.angle(np.zeros(1))), quarter)
-        recording, n_illegal, n_lost = self._lines(time, quarter, motion.duration)
-        return Encoding(self, motion, recording, n_illegal, n_lost)
+        flow, truth = self.flow(motion)
+        assert isinstance(flow, Flow)
+        return replace(truth, recording=flow.whole())
 
     def flow(self, motion: Motion) -> "tuple[Flow | Recording, Encoding]":
-        """Let the shaft move; return the recording of `record`, in parts if each edge needs only its neighbours, and
-        the truth about it.
+        """Let the shaft move; return the recording of `record`, in parts but for encoders that are read, and the truth
+        about it. Its faults are counted as the parts come.
         """
-        faults = (self.lost, self.illegal, self.bounce, self.broken, self.stuck, self.index)
-        if any(faults) or self.sensor not in ("quadrature", "hall"):
-            found = self.record(motion)
-            return found.recording, found
-        start = self.disc.quarter(self.shaft(motion).angle(np.zeros(1)))
-        rest, *_ = self._lines(np.zeros(1), start, motion.duration)
-        flow = Flow((*rest.wires,), self._parts(motion, rest, start), lambda _: self._check(motion), motion.duration)
-        return flow, Encoding(self, motion, rest, 0, 0)
+        truth = Encoding(self, motion, Recording.of_level(np.zeros(1), np.zeros(1, np.uint8), motion.duration))
+        return Flow(self._wires, self._parts(truth), lambda _: self._check(motion), motion.duration), truth
 
-    def _parts(self, motion: Motion, rest: Recording, quarter: IntArray) -> Generator[Part, None, None]:
-        """Yield the recording of a motion that begins with a row and in a quarter, see `flow`."""
-        yield Part(rest.time, rest.level, 0.0)
-        before, random, end = 0.0, self._stream(JITTER), np.full(1, motion.duration)
-        for (edges, quarters), (following, _) in pairwise(
-            chain(passages(self.shaft(motion), self.disc), [(end, quarter)])
-        ):
-            last = float(edges[-1])
-            if self.jitter:
-                edges = imperfections.jittered(edges, (before, float(following[0])), self.jitter, random)
-            made, *_ = self._lines(np.append(0.0, edges), np.append(quarter, quarters), motion.duration)
-            yield Part(made.time[1:], made.level[1:], float(edges[-1]))
-            before, quarter = last, quarters[-1:]
-        yield Part(rest.time[:0], rest.level[:0], motion.duration)
+    def _parts(self, truth: "Encoding") -> Generator[Part, None, None]:
+        """Yield the recording of a motion: what is certain of the lines each time, from edges that are held."""
+        shaft, duration, stuck = self.shaft(truth.motion), truth.motion.duration, list[np.uint8]()
+        time, quarter = np.zeros(1), self.disc.quarter(shaft.angle(np.zeros(1)))
+        nth, done, begin = 0, 0, 0.0  # numbers of the first edge that is held, and of that at time `begin`
+        share = 2 * self.bounce.count if self.bounce else 1
+        for edges, quarters in chain(passages(shaft, self.disc, share), [(time[:0], quarter[:0])]):
+            time, quarter = np.append(time, edges), np.append(quarter, quarters)
+            lines = self._lines(time, quarter, nth, duration)
+            upto, first = lines.certain(abs(self.index_skew_s)) if len(edges) else (len(time), 0)
+            if (end := float(lines.at[upto]) if len(edges) else math.inf) > begin:
+                times, level = self._at_fault(lines.times, lines.level, duration, stuck)
+                rows = slice(*np.searchsorted(times, (begin, end)))
+                yield Part(times[rows], level[rows], min(end, duration))
+                truth.n_illegal, truth.n_lost = (
+                    before + each * int(np.count_nonzero((faults >= done - nth) & (faults < upto)))
+                    for before, faults, each in ((truth.n_illegal, lines.late, 1), (truth.n_lost, lines.lost, 2))
+                )
+                done, begin = nth + upto, end
+            time, quarter, nth = time[first:], quarter[first:], nth + first
 
-    def shaft(self, motion: Motion) -> _VibratingShaft:
+    def shaft(self, motion: Motion) -> VibratingShaft:
         """Return the shaft in motion."""
-        return _VibratingShaft(motion, self.vibration, self.start_angle_rad)
+        return VibratingShaft(motion, self.vibration, self.start_angle_rad)
 
     def _check(self, motion: Motion) -> None:
         """Check that a motion has not too many edges to be held."""
@@ -242,31 +224,42 @@ class VirtualEncoder(EncoderOptions):
             )
         check_memory(n_edges * EDGE, "--motion", "shorten it, or turn more slowly")
 
-    def _lines(self, time: FloatArray, quarter: IntArray, duration: float) -> tuple[Recording, int, int]:
-        """Return what lines make of quarters that begin at some times, and how many edges met or were lost."""
-        n_lost, n_illegal = 0, 0
-        turned = -quarter if self.reverse else quarter
+    @property
+    def _wires(self) -> tuple[str, ...]:
+        """Names of all lines."""
+        lines = ("a", "b", "c") if self.sensor == "hall" else ("a", "b")
+        return (*lines, *("z",) * self.index, *(f"{line}_n" for line in self.complemented))
+
+    def _lines(self, time: FloatArray, quarter: IntArray, nth: int, duration: float) -> _Lines:
+        """Return what lines make of quarters that begin at some times, the first with edge `nth`."""
+        at, turned = time, -quarter if self.reverse else quarter
+        if self.jitter:
+            random = self._stream(JITTER, 2 * nth)
+            at = np.append(time[0], imperfections.jittered(time[1:], (time[0], duration), self.jitter, random))
+        row = clean = np.arange(len(at))
+        late = lost = row[:0]
         if self.sensor in ("step-dir", "up-down"):
             directed = self.sensor == "step-dir"
             times, level = imperfections.pulsed(
-                time, np.diff(turned), duration, directed=directed, both_edges=self.both_edges
+                at, np.diff(turned), duration, directed=directed, both_edges=self.both_edges, nth=nth
             )
-            return self._indexed(times, level, time, turned, duration), 0, 0
+            return _Lines(*self._indexed(times, level, at, turned, duration), at, row, clean, late, lost)
         level = _halls()[turned % 6] if self.sensor == "hall" else quadrature(turned)
         if self.sensor == "pulses":
             level = self.patterned(level & np.uint8(1), turned)
         if self.lost:
-            level, n_lost = imperfections.lose_pulses(level, self.lost, self._stream(LOST))
+            clean = np.append(0, np.flatnonzero(level[1:] == 0) + 1)
+            level, lost = imperfections.lose_pulses(level, self.lost, self._stream(LOST, nth))
         row = np.flatnonzero(np.append(True, level[1:] != level[:-1]))
         if self.illegal:
-            late = imperfections.late_edges(level, row, self.illegal, self._stream(ILLEGAL))
-            row, n_illegal = row[~late], int(np.count_nonzero(late))
+            is_late = imperfections.late_edges(level, row, self.illegal, self._stream(ILLEGAL, nth))
+            row, late = row[~is_late], row[is_late]
         if self.bounce:
-            random = self._stream(BOUNCE)
-            times, level = imperfections.chattering(time, level, row, duration, self.bounce, random)
+            random = self._stream(BOUNCE, 2 * self.bounce.count * nth)
+            times, level = imperfections.chattering(at, level, row, duration, self.bounce, random)
         else:
-            times, level = time[row], level[row]
-        return self._indexed(times, level, time, turned, duration), n_illegal, n_lost
+            times, level = at[row], level[row]
+        return _Lines(*self._indexed(times, level, at, turned, duration), at, row, clean, late, lost)
 
     def patterned(self, level: NDArray[np.uint8], quarter: IntArray) -> NDArray[np.uint8]:
         """Return the levels of the wheel from those of a full one: some teeth are not there, or the last is two."""
@@ -278,30 +271,36 @@ class VirtualEncoder(EncoderOptions):
 
     def _indexed(
         self, times: FloatArray, level: NDArray[np.uint8], at: FloatArray, quarter: IntArray, duration: float
-    ) -> Recording:
-        """Return the recording of the lines, with the index if there is one; their `quarter` begin at times `at`."""
-        lines = ("a", "b", "c") if self.sensor == "hall" else ("a", "b")
+    ) -> tuple[FloatArray, NDArray[np.uint8]]:
+        """Return all wires of the lines, with the index if there is one; their `quarter` begin at times `at`."""
+        lines = self._wires
         if self.index:
             begin = self.index_state - (self.index_width - 1) // 2
             slot = (quarter - begin) % self.edges_per_rev < self.index_width
             gated = self.sensor == "quadrature" and self.index_width == 1 and not self.index_skew_s
             gate = int(quadrature(np.array(self.index_state))) if gated else None
-            at = np.append(0.0, np.clip(at[1:] + self.index_skew_s, 0, duration))
-            times, level = imperfections.gated_index(times, level, at, slot, np.uint8(1 << len(lines)), gate)
-            lines = (*lines, "z")
+            at = np.append(at[0], np.clip(at[1:] + self.index_skew_s, at[0], duration))
+            times, level = imperfections.gated_index(times, level, at, slot, np.uint8(1 << lines.index("z")), gate)
         inverted = self.invert.split(",") if self.invert else ()
         level = level ^ np.uint8(sum(1 << place for place, line in enumerate(lines) if line in inverted))
         for line in self.complemented:
-            level |= (~level >> np.uint8(lines.index(line)) & np.uint8(1)) << np.uint8(len(lines))
-            lines = (*lines, f"{line}_n")
-        for fault, high in ((self.broken, True), (self.stuck, False)):
+            own, other = (np.uint8(lines.index(name)) for name in (line, f"{line}_n"))
+            level |= (~level >> own & np.uint8(1)) << other
+        return times, level
+
+    def _at_fault(
+        self, times: FloatArray, level: NDArray[np.uint8], duration: float, stuck: list[np.uint8]
+    ) -> tuple[FloatArray, NDArray[np.uint8]]:
+        """Return what wires with line faults do; `stuck` is as of `LineFault.applied`."""
+        lines = self._wires
+        for fault, kept in ((self.broken, None), (self.stuck, stuck)):
             if fault is not None and fault.time_s < duration:
                 bit = np.uint8(1 << lines.index(fault.line)) if fault.line in lines else np.uint8(0)
-                times, level = fault.applied(times, level, bit, high=high)
-        return Recording.of_level(times, level, duration, lines)
+                times, level = fault.applied(times, level, bit, kept)
+        return times, level
 
-    def _stream(self, which: int) -> np.random.PCG64:
-        return imperfections.stream(self.seed, which)
+    def _stream(self, which: int, first: int = 0) -> np.random.PCG64:
+        return imperfections.stream(self.seed, which, first)
 
 
 def _there(pattern: str) -> NDArray[np.bool_]:
@@ -322,7 +321,7 @@ def _placed(pattern: str, there: NDArray[np.bool_], seen: IntArray) -> NDArray[n
     return np.arange(len(there)) > (known[0] if len(known) else len(there))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Encoding:
     """Holds the recording that an encoder made of a motion, and the truth about it.
 
@@ -333,8 +332,8 @@ class Encoding:
     encoder: VirtualEncoder
     motion: Motion
     recording: Recording
-    n_illegal: int
-    n_lost: int
+    n_illegal: int = 0
+    n_lost: int = 0
 
     def true_position(self, t: ArrayLike, decoding: int = 4) -> NDArray[np.int64]:
         """Return counts since time 0 that an ideal decoder of the disc would have at times `t` in seconds.
@@ -345,7 +344,8 @@ class Encoding:
         """
         sign = -1 if self.encoder.reverse else 1
         if self.encoder.sensor == "pulses":
-            return sign * np.searchsorted(self._pulses(decoding), t, side="right")
+            counted = [np.searchsorted(times, t, side="right") for times in self._pulses(decoding)]
+            return sign * np.sum([np.zeros(np.shape(t), dtype=np.int64), *counted], axis=0)
         if self.encoder.sensor == "quadrature" and decoding not in (1, 2, 4):
             raise ParameterError("decoding", f"must be 1, 2 or 4, not {decoding}")
         lead, shift = {2: (1, 1), 1: (3, 2)}.get(decoding, (0, 0))
@@ -354,22 +354,24 @@ class Encoding:
         now, start = (sign * self.encoder.disc.quarter(self._shaft.angle(time)) for time in (t, 0.0))
         return sign * (((now + lead) >> shift) - ((start + lead) >> shift))
 
-    def _pulses(self, decoding: int) -> FloatArray:
-        """Return times at which line A alone counts, on an ideal line."""
-        time, quarter = find_crossings(self._shaft, self.encoder.disc)
-        quarter = np.append(self.encoder.disc.quarter(self._shaft.angle(np.zeros(1))), quarter)
-        turned = -quarter if self.encoder.reverse else quarter
-        change = np.diff((quadrature(turned) & 1).astype(np.int8))
-        rises = change != 0 if decoding == 2 else change > 0
-        counted: FloatArray = time[rises]
-        if (pattern := self.encoder.teeth) is None:
-            return counted
-        level = self.encoder.patterned(quadrature(turned) & np.uint8(1), turned).astype(np.int8)
-        extra = time[~rises & (np.diff(level) > 0)]
-        there = level[1:][rises] > 0
-        seen = np.cumsum(there)
-        early = extra[np.searchsorted(counted, extra) < 4]  # an extra tooth counts until four have been seen
-        return np.sort(np.append(counted[there | _placed(pattern, there, seen)], early))
+    def _pulses(self, decoding: int) -> Iterator[FloatArray]:
+        """Yield times at which line A alone counts, on an ideal line; of a wheel with gaps all at once."""
+        pattern, disc = self.encoder.teeth, self.encoder.disc
+        before = disc.quarter(self._shaft.angle(np.zeros(1)))
+        for time, quarter in [find_crossings(self._shaft, disc)] if pattern else passages(self._shaft, disc):
+            quarter = np.append(before, quarter)
+            before, turned = quarter[-1:], -quarter if self.encoder.reverse else quarter
+            change = np.diff((quadrature(turned) & 1).astype(np.int8))
+            rises = change != 0 if decoding == 2 else change > 0
+            counted = time[rises]
+            if pattern is not None:
+                level = self.encoder.patterned(quadrature(turned) & np.uint8(1), turned).astype(np.int8)
+                extra = time[~rises & (np.diff(level) > 0)]
+                there = level[1:][rises] > 0
+                seen = np.cumsum(there)
+                early = extra[np.searchsorted(counted, extra) < 4]  # an extra tooth counts until four have been seen
+                counted = np.sort(np.append(counted[there | _placed(pattern, there, seen)], early))
+            yield counted
 
     def true_speed(self, t: ArrayLike) -> FloatArray:
         """Return speed of the shaft in rad/s, vibration included, at times `t` in seconds; of pulses, which do not tell
@@ -389,5 +391,5 @@ class Encoding:
         return self.motion.speed(t)
 
     @property
-    def _shaft(self) -> _VibratingShaft:
+    def _shaft(self) -> VibratingShaft:
         return self.encoder.shaft(self.motion)

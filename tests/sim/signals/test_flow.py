@@ -27,13 +27,20 @@ ENCODERS: list[dict[str, Any]] = [
     {"jitter": 0.3, "vibration": Vibration(1e-2, 900.0)},
     {"nonuniformity": 0.3, "reverse": True, "complemented": ("a",), "start_angle_rad": 1.0},
     {"sensor": "hall", "invert": "a,c", "jitter": 0.1},
+    {"lost": 0.2, "illegal": 1.0, "bounce": Bounce(1, 1.0), "vibration": Vibration(0.1, 900.0)},
+    {"lost": 0.3, "illegal": 0.5, "bounce": Bounce(3, 1e-4), "index": True, "broken": LineFault("z", 0.03)},
+    {"index": True, "index_width": 3, "index_skew_s": -1e-3, "lost": 0.1, "stuck": LineFault("b", 0.02)},
+    {"index": True, "index_skew_s": 1e-3, "illegal": 1.0, "jitter": 0.3, "stuck": LineFault("a", 0.006)},
+    {"sensor": "step-dir", "both_edges": True},
+    {"sensor": "pulses", "bounce": Bounce(1, 1.0), "lost": 0.5, "jitter": 0.3},
 ]
 
 
 @pytest.mark.parametrize("values", ENCODERS)
 def test_a_motion_in_parts(values: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     encoder = VirtualEncoder(25, seed=1, **values)
-    whole = encoder.record(MOTION).recording
+    known = encoder.record(MOTION)
+    whole, counts = known.recording, known.true_position(0.03)
     monkeypatch.setattr(crossings, "_CHUNK", 7)
     parts, truth = encoder.flow(MOTION)
     assert isinstance(parts, Flow)
@@ -42,16 +49,8 @@ def test_a_motion_in_parts(values: dict[str, Any], monkeypatch: pytest.MonkeyPat
     np.testing.assert_array_equal(found.time, whole.time)
     np.testing.assert_array_equal(found.level, whole.level)
     assert parts.n_changes == whole.n_changes > 100
-    assert (truth.n_illegal, truth.n_lost) == (0, 0)
-
-
-STUCK = {"stuck": LineFault("b", 0.01)}
-
-
-@pytest.mark.parametrize("values", [{"lost": 0.1}, {"illegal": 0.1}, {"index": True}, {"sensor": "step-dir"}, STUCK])
-def test_a_motion_that_is_made_as_a_whole(values: dict[str, Any]) -> None:
-    parts, truth = VirtualEncoder(25, **values).flow(MOTION)
-    assert parts is truth.recording
+    assert (truth.n_illegal, truth.n_lost) == (known.n_illegal, known.n_lost)
+    assert truth.true_position(0.03) == counts
 
 
 @pytest.mark.parametrize("clock_hz", [2_000, 1_000_000])
@@ -77,13 +76,13 @@ def test_pieces_are_what_the_pins_see(clock_hz: int, monkeypatch: pytest.MonkeyP
     assert parts.n_together > 0
     monkeypatch.setattr(flow, "MOST_IN_PIECES", 5)
     with pytest.raises(ValueError, match="must have at most 5 ticks, 50ms of this tick, not "):
-        [*Flow.of(recording).pieces(spec, 100)]
+        [*Flow.of(recording).pieces(spec, clock_hz // 100)]
 
 
 def test_a_short_recording_is_a_clock() -> None:
     spec = of_texts("m", {"ppr": "25", "clock": "1MHz", "tick": "10ms"}).tachometer
     recording = VirtualEncoder(25).record(parse_motion("stop:100ns")).recording
-    assert [piece.n_clocks for piece in Flow.of(recording).pieces(spec, 100)] == [PinTrace.of(recording, spec).n_clocks]
+    assert [piece.n_clocks for piece in Flow.of(recording).pieces(spec, 10_000)] == [PinTrace.of(recording, spec).n_clocks]
 
 
 @pytest.mark.parametrize("suffix", [".vcd", ".csv", ".sr"])
