@@ -33,7 +33,7 @@ def take_phase(
     half = s >> 1
     times = (half - angles.late, s - half + (angles.tick >> 1), s)
     factors = (of_fine.number, of_bend.number, of_speed.number, *times)
-    factor = _chosen(m, factors, [C(0, 1), *line[clocks - 2 : -1 : clocks]], angles.factor_bits)
+    factor = _chosen(m, factors, [C(0, 1), *line[clocks - 2 : -clocks : clocks]], angles.factor_bits)
     terms = ((place, begins[0]), (bend, begins[1]), (velocity, begins[2]), (kept, _any(begins[3:])))
     whole = _multiply(m, terms, factor)
     phase = Signal(angles.bits + 2 * finer)

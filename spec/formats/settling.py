@@ -1,14 +1,15 @@
 """How a place that waits for a count goes to the middle of its count as the velocity falls, as a part of the program.
 
 A place that is 3/8 count away begins to wait when the velocity has fallen to half of that at the last count. Half a
-count is its limit then; the limit halves each time the velocity halves again. Velocities are compared by logarithms.
+count is its limit then; the limit halves each time the velocity halves again. Velocities are compared by logarithms;
+some LSB are as good as none.
 """
 
 SETTLING = """
 settles {; settle:
     speed log
-    mark + log_half - ~; if neg goto steady
-    mark = mark + log_half
+    mark - ~; if neg goto steady
+    mark = mark + log_half max log_9_4
     reach over 1
     reach = ~
 steady:

@@ -189,7 +189,7 @@ told:
     as product acceleration
     serial t max least min most_std out velocity_std; block w max least min most_std out velocity_std
     ~ out acceleration
-    settles {; if empty goto end; speed log; mark = ~; reach = half
+    settles {; if empty goto end; speed log; mark = ~ + log_half max log_9_4; reach = half
     bar = minus_quarter + minus_sixteenth + minus_sixteenth; }
     after - one; if neg goto fewer
 learn:                                  # nothing below is in a hurry

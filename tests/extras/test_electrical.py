@@ -169,6 +169,12 @@ def test_the_program_settles_places(multiplier: str) -> None:
     assert settles(waiting(multiplier))
 
 
+def test_a_place_without_a_velocity_goes_to_the_middle_of_its_count() -> None:
+    still = np.zeros(30, np.int64)
+    places = Settled().places(still, still.cumsum() == np.arange(30), still - (1 << 19))
+    assert (places[0], places[1], places[-1]) == (-1 << 19, -1 << 18, 0)
+
+
 @nightly
 @pytest.mark.parametrize(
     ("right", "wrong"),
@@ -176,8 +182,8 @@ def test_the_program_settles_places(multiplier: str) -> None:
         ("bar = minus_quarter", "bar = zero - count"),
         ("zero s+ reach", "zero s+ half"),
         ("bar = zero", "bar = bar"),
-        ("mark = mark + log_half", "mark = mark"),
-        ("mark = ~; reach", "reach"),
+        ("mark = mark + log_half max", "mark = mark max"),
+        ("mark = ~ + log_half max log_9_4;", "mark = ~;"),
     ],
 )
 def test_a_wrong_program_is_seen(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,13 +1,17 @@
 """Golden model of a place that waits for a count."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.methods.track_recursion import log2
 from tachometry.sim.golden.sorted_lookup import Ints
-from tachometry.spec.formats.tracking import LOG_BITS, PLACE_BITS
+from tachometry.spec.formats.tracking import PLACE_BITS, fixed_log
 
 _HALF = 1 << PLACE_BITS - 1
+_ONE = fixed_log(1)
+_LEAST = fixed_log(math.log2(9 / 4))  # of a velocity in its LSB that is as good as none
 
 
 class Settled:
@@ -22,9 +26,9 @@ class Settled:
         for velocity, has_count, place in np.column_stack((velocities, counted, places)).tolist():
             size = log2(velocity)
             if has_count:
-                self._waits, self._limit, self._mark = False, _HALF, size
-            elif size <= self._mark - (1 << LOG_BITS):
-                self._limit, self._mark = self._limit >> 1, self._mark - (1 << LOG_BITS)
+                self._waits, self._limit, self._mark = False, _HALF, max(size - _ONE, _LEAST)
+            elif size <= self._mark:
+                self._limit, self._mark = self._limit >> 1, max(self._mark - _ONE, _LEAST)
             self._waits |= self._limit < _HALF and abs(place) >= _HALF - (_HALF >> 2)
             limited = min(abs(place), self._limit) if self._waits else abs(place)
             found.append(limited if place >= 0 else -limited)
