@@ -1,32 +1,35 @@
 """Measures the memory of runs over their ticks, and of replays over the size of their files, and prints it.
 
-The constants of `sim/signals/memory.py` come from here: the last core is one that is held as a whole.
+The constants of `sim/signals/memory.py` come from here: with --age a core is held as a whole.
 """
 
 import argparse
+import os
 import subprocess
-import sys
 import sysconfig
 import tempfile
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 from pages import Rows, markdown
 
+from tachometry.sim.captures.sigrok import write_sr
+from tachometry.sim.captures.text import write_csv
+from tachometry.sim.signals.recording import Recording, quadrature
+
 CORE = "--ppr 500 --clock 1MHz"
-TICKS = {"m": 20, "s": 20, "t": 20, "mt": 20, "track": 300, "m --age": 20}  # clocks; the last is held as a whole
-COLUMNS = ["run", "ticks or changes", "MB of file", "peak, MiB", "s"]
+# clocks of a tick; a lossy encoder whose shaft vibrates has 25,000 edges a second
+TICKS = dict.fromkeys(["m", "s", "t", "mt", "m --lost 0.01 --vibration 100mrad:200Hz", "m --age"], 20) | {"track": 300}
+COLUMNS = ["run", "ticks or changes", "MB of file", "peak, MiB", "CPU s"]
 
 
 def measured(words: Sequence[str]) -> list[str]:
-    """Return the peak memory of a command in MiB, and its seconds; CalledProcessError if it fails."""
-    command = [f"{sysconfig.get_path('scripts')}/tachometry", *words]
-    code = "import subprocess as s, resource as r, sys; s.run(sys.argv[1:], check=True, stdout=s.DEVNULL)"
-    code += "; print(r.getrusage(r.RUSAGE_CHILDREN).ru_maxrss)"
-    begun = time.monotonic()
-    peak = subprocess.run([sys.executable, "-c", code, *command], stdout=subprocess.PIPE, text=True, check=True).stdout
-    return [f"{int(peak) / 1024:.0f}", f"{time.monotonic() - begun:.1f}"]
+    """Return the peak memory of a command in MiB, and the seconds of processor time that it takes."""
+    child = subprocess.Popen([f"{sysconfig.get_path('scripts')}/tachometry", *words], stdout=subprocess.DEVNULL)
+    _, status, used = os.wait4(child.pid, 0)
+    assert not status, words
+    return [f"{used.ru_maxrss / 1024:.0f}", f"{used.ru_utime + used.ru_stime:.1f}"]
 
 
 def over_ticks(name: str, n_ticks: int) -> list[str]:
@@ -37,23 +40,24 @@ def over_ticks(name: str, n_ticks: int) -> list[str]:
 
 def over_size(folder: Path, suffix: str, n: int) -> list[str]:
     """Return the row of a replay of a file with `n` changes, 50 us apart."""
-    path, levels = folder / f"x{suffix}", ((0, 0), (1, 0), (1, 1), (0, 1))
-    with path.open("w", encoding="ascii") as file:
-        if suffix == ".vcd":
-            file.write("$timescale 1 us $end $var wire 1 ! a $end $var wire 1 $ b $end $enddefinitions $end\n")
-            file.write("#0\n0!\n0$\n")
-            file.writelines(f"#{50 * k}\n{levels[k % 4][k + 1 & 1]}{'$!'[k & 1]}\n" for k in range(1, n + 1))
-        else:
-            file.write("time_us,a,b\n")
-            file.writelines(f"{50 * k},{levels[k % 4][0]},{levels[k % 4][1]}\n" for k in range(n + 1))
-    found = measured(["replay", str(path), "--method", "s", *CORE.split(), "--tick", "1ms"])
-    return [f"replay {suffix}", f"{n:.0e}", f"{path.stat().st_size / 1e6:.1f}", *found]
+    path, level, times = folder / f"x{suffix}", quadrature(np.arange(n + 1)), np.arange(n + 1, dtype=np.float64)
+    recording = Recording.of_level(times / 20_000, level, (n + 0.5) / 20_000)
+    if suffix == ".sr":
+        write_sr(path, recording.place(1_000_000), 1_000_000)
+    elif suffix == ".csv":
+        write_csv(path, recording)
+    else:
+        head = "$timescale 1 us $end $var wire 1 ! a $end $var wire 1 $ b $end $enddefinitions $end\n#0\n0!\n0$\n"
+        rows = (f"#{50 * k}\n{level[k] >> (k + 1 & 1) & 1}{'$!'[k & 1]}\n" for k in range(1, n + 1))
+        path.write_text(head + "".join(rows), encoding="ascii")
+    size, words = path.stat().st_size, ["replay", str(path), "--method", "s", *CORE.split(), "--tick", "1ms"]
+    return [f"replay {suffix}", f"{n:.0e}", f"{size / 1e6:.1f}", *measured(words)]
 
 
 def table(ticks: Sequence[int], changes: Sequence[int]) -> Rows:
     """Return all rows."""
     with tempfile.TemporaryDirectory() as folder:
-        files = [over_size(Path(folder), suffix, n) for suffix in (".vcd", ".csv") for n in changes]
+        files = [over_size(Path(folder), suffix, n) for suffix in (".vcd", ".csv", ".sr") for n in changes]
     return [COLUMNS, *(over_ticks(name, n) for name in TICKS for n in ticks), *files]
 
 

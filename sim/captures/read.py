@@ -24,7 +24,7 @@ Held = TypeVar("Held", Recording, Flow)
 class Reader(Protocol):
     """Describes a function that reads one kind of capture."""
 
-    def __call__(self, path: Path, wanted: Channels, samplerate_hz: float | None, /) -> Recording | Flow: ...
+    def __call__(self, path: Path, wanted: Channels, samplerate_hz: float | None, /) -> Flow: ...
 
 
 TEXTS = (".csv", ".txt", ".tsv", ".teeth", ".msl")
@@ -40,7 +40,7 @@ _EXPORTS = {
 }
 
 
-def _reader(path: Path, text: TextOptions) -> Callable[..., Recording | Flow]:
+def _reader(path: Path, text: TextOptions) -> Callable[..., Flow]:
     """Return the reader of a file; it raises CaptureError if there is none, OptionError if it takes no such option."""
     kind = kind_of(path)
     reader = READERS.get(kind) if path.suffix.lower() != ".gz" or kind in PACKED else None
@@ -88,24 +88,20 @@ def read_capture(
 def read_parts(path: Path, wanted: Channels, samplerate_hz: float | None, text: TextOptions) -> Flow:
     """Return a capture in parts, see `read_capture`."""
     reader = _reader(path, text)
-    flow = _flow(reader(path, wanted, samplerate_hz))
+    flow = reader(path, wanted, samplerate_hz)
     if not is_stream(path):
         flow.told = lambda source: _with_moving(source, lambda n: reader(path, Channels(n, SAME), samplerate_hz))
     return flow
 
 
-def _flow(found: Recording | Flow) -> Flow:
-    return found if isinstance(found, Flow) else Flow.of(found)
-
-
-def _with_moving(source: Source, read: Callable[[int], Recording | Flow]) -> Source:
+def _with_moving(source: Source, read: Callable[[int], Flow]) -> Source:
     """Return a source that says which channels change that were not taken, if a line that was taken does not."""
     if not source.still:
         return source
 
     def moves(number: int) -> bool:
         try:
-            return _flow(read(number)).moves()
+            return read(number).moves()
         except CaptureError:  # it is no line of levels
             return False
 

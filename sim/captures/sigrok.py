@@ -1,8 +1,8 @@
-"""sigrok sessions (`.sr`), as sigrok-cli and PulseView save them, are read as a `Recording` and written from a
+"""sigrok sessions (`.sr`), as sigrok-cli and PulseView save them, are read as a recording and written from a
 `PinTrace`.
 
-The format is described at https://sigrok.org/wiki/File_format:Sigrok/v2. Both ways work chunk by chunk: memory grows
-with the edges and with one chunk, never with the length of the capture.
+The format is described at https://sigrok.org/wiki/File_format:Sigrok/v2. Both ways work chunk by chunk, never with
+the whole of a capture.
 """
 
 import io
@@ -13,9 +13,10 @@ import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,16 +25,16 @@ from tachometry.sim.captures.file import (
     ANY,
     CaptureError,
     Channels,
-    check_edges,
     check_regular,
     choose_channels,
+    flow_of,
     reading,
     source_of,
     writing,
 )
 from tachometry.sim.signals.axes import AxesTrace, Trace
-from tachometry.sim.signals.flow import Flow
-from tachometry.sim.signals.recording import Recording
+from tachometry.sim.signals.flow import ROWS, Flow, Part, Parts
+from tachometry.sim.signals.recording import packed
 
 CHUNK = 4 << 20  # bytes, as sigrok cuts its own
 # Limits of a session, which may be packed a thousand times as tightly: bytes of the list of members, of the metadata,
@@ -47,8 +48,12 @@ ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, NotImpleme
 
 
 def read_sr(
-    path: str | os.PathLike[str], wanted: Channels = ANY, samplerate_hz: float | None = None, *, _piece: int = CHUNK
-) -> Recording:
+    path: str | os.PathLike[str],
+    wanted: Channels = ANY,
+    samplerate_hz: float | None = None,
+    *,
+    _piece: int = CHUNK >> 2,
+) -> Flow:
     """Read two to four channels of a sigrok session, version 1 or 2.
 
     Sample k is taken at k / samplerate; a change is dated at the first sample that shows it, and the duration is the
@@ -63,17 +68,32 @@ def read_sr(
     if samplerate_hz is not None and not 0 < samplerate_hz < float("inf"):
         raise CaptureError(f"samplerate must be above 0 Hz and finite, not {samplerate_hz} Hz")
     check_regular(path)
+    return flow_of(path, wanted, _parts(path, wanted, samplerate_hz, _piece))
+
+
+def _parts(path: Path, wanted: Channels, samplerate_hz: float | None, piece: int) -> Parts:
+    """Yield samples that differ from the one before: the first always does."""
     with reading(path), _damage_named(path), _Bounded(path) as file, zipfile.ZipFile(file) as archive:
         session = _read_session(path, archive)
         rate = agreed_samplerate(path, session.samplerate_hz, samplerate_hz)
         lines = choose_channels(path, session.channels, wanted)
-        bits = tuple(line.number for line in lines)
-        sample, level, n_samples = _changes(session, bits, _pieces(path, archive, session, _piece))
-    if n_samples == 0:
-        raise CaptureError(f"{path} must have at least one sample, not 0")
-    duration = float(divide(np.array([n_samples]), rate, up=True)[0])
-    recording = Recording.of_level(divide(sample, rate, up=False), level, duration, wanted.lines)
-    return Flow.of(replace(recording, source=source_of(wanted, session.channels, lines))).whole()
+        before: NDArray[np.integer[Any]] = np.full(1, -1, np.int16)
+        n_samples, time, level = 0, [np.empty(0)], [np.empty(0, np.uint8)]
+        for data in _pieces(path, archive, session, piece):
+            now = packed([data[:, line.number // 8] >> np.uint8(line.number % 8) & np.uint8(1) for line in lines])
+            changed = np.flatnonzero(np.append(before, now[:-1]) != now)
+            time.append(divide(changed + n_samples, rate, up=False))
+            level.append(now[changed])
+            before, n_samples = now[-1:], n_samples + len(now)
+            if sum(map(len, level)) >= ROWS:
+                until = float(divide(np.array([n_samples]), rate, up=False)[0])
+                yield Part(np.concatenate(time), np.concatenate(level), until, file.tell())
+                time, level = time[:1], level[:1]
+        if n_samples == 0:
+            raise CaptureError(f"{path} must have at least one sample, not 0")
+        duration = float(divide(np.array([n_samples]), rate, up=True)[0])
+        yield Part(np.concatenate(time), np.concatenate(level), duration, file.tell())
+        return source_of(wanted, session.channels, lines)
 
 
 def write_sr(path: str | os.PathLike[str], trace: Trace, clock_hz: int, *, _chunk: int = CHUNK) -> None:
@@ -275,30 +295,6 @@ def _pieces(path: Path, archive: zipfile.ZipFile, session: _Session, piece: int)
                         f"not {info.file_size} bytes"
                     )
                 yield np.frombuffer(data, np.uint8).reshape(-1, session.unitsize)
-
-
-def _changes(
-    session: _Session, bits: tuple[int, ...], pieces: Iterator[NDArray[np.uint8]]
-) -> tuple[NDArray[np.int64], NDArray[np.uint8], int]:
-    """Give the samples that differ from the one before (the first always does), their levels, and the sample count."""
-    n_samples, n_changes, before = 0, 0, 255
-    sample, level = [], []
-    for data in pieces:
-        now = np.zeros(len(data), np.uint8)
-        for line, bit in enumerate(bits):
-            now |= (data[:, bit // 8] >> bit % 8 & 1) << line
-        changed = np.flatnonzero(now[1:] != now[:-1]) + 1
-        if now[0] != before:
-            changed = np.append(0, changed)
-        sample.append(changed + n_samples)
-        level.append(now[changed])
-        n_changes += len(changed)
-        check_edges(session.path, n_changes)
-        n_samples += len(now)
-        before = int(now[-1])
-    if not sample:
-        return np.zeros(0, np.int64), np.zeros(0, np.uint8), 0
-    return np.concatenate(sample).astype(np.int64), np.concatenate(level), n_samples
 
 
 def divide(k: NDArray[np.int64], rate: float, *, up: bool) -> NDArray[np.float64]:

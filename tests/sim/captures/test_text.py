@@ -26,7 +26,7 @@ from tachometry.sim.signals.recording import PinTrace, Recording
 def test_sr_round_trip_of_any_chunks(tmp_path: Path, chunk: int, piece: int) -> None:
     trace = random_trace(700, 2000)
     write_sr(tmp_path / "x.sr", trace, 50 * MEGAHERTZ, _chunk=chunk)
-    recording = read_sr(tmp_path / "x.sr", _piece=piece)
+    recording = read_sr(tmp_path / "x.sr", _piece=piece).whole()
     assert recording.duration == pytest.approx(2000 / 50e6)
     assert_same(recording.place(50 * MEGAHERTZ), trace)
 
@@ -113,7 +113,7 @@ def test_all_unit_sizes_and_disabled_probes(tmp_path: Path, unitsize: int) -> No
     make_sr(tmp_path / "x.sr", [data[:split], data[split:]], {first: "SCK", last: "MISO"}, unitsize=str(unitsize))
     bits = np.unpackbits(samples, axis=1, bitorder="little")
     for piece in (1, 24, 1 << 20):
-        trace = read_sr(tmp_path / "x.sr", Channels("MISO", "SCK"), _piece=piece).place(MEGAHERTZ)
+        trace = read_sr(tmp_path / "x.sr", Channels("MISO", "SCK"), _piece=piece).whole().place(MEGAHERTZ)
         row = np.searchsorted(trace.clock, np.arange(500), "right") - 1
         np.testing.assert_array_equal(trace.a[row], bits[:, last - 1])
         np.testing.assert_array_equal(trace.b[row], bits[:, first - 1])
@@ -279,7 +279,7 @@ CHANGES = (0, 2, 4, 6, 8, 10, 12)  # of these samples; the last ends the file
 @pytest.mark.parametrize("block", [1, 7, 1 << 22])
 def test_csv_of_sigrok_is_its_session(tmp_path: Path, text: str, block: int) -> None:
     make_sr(tmp_path / "x.sr", SAMPLES, samplerate="24 MHz")
-    wanted = read_sr(tmp_path / "x.sr")
+    wanted = read_sr(tmp_path / "x.sr").whole()
     recording = read_csv(make_csv(tmp_path / "x.csv", text + "\n"), _block=block).whole()
     assert_same(recording, wanted)
     assert_same(recording.place(48 * MEGAHERTZ), wanted.place(48 * MEGAHERTZ))

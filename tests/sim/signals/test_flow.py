@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.captures import assert_same
 
-from tachometry.sim.captures import text, waveform
+from tachometry.sim.captures import sigrok, text, waveform
 from tachometry.sim.captures.file import Channels
 from tachometry.sim.captures.header import PLAIN
 from tachometry.sim.captures.read import read_parts, with_last_tick
@@ -93,7 +93,7 @@ def test_files_in_parts(suffix: str, end: str, tmp_path: Path, monkeypatch: pyte
     path, motion = tmp_path / f"x{suffix}", parse_motion("constant:90rad/s:50ms")
     recording = VirtualEncoder(25).record(motion).recording
     if suffix == ".sr":
-        write_sr(path, recording.place(20_000), 20_000)
+        write_sr(path, recording.place(20_000), 20_000, _chunk=50)
     else:
         rows = zip(np.rint(recording.time * 1e6).astype(int).tolist(), recording.a, recording.b, strict=True)
         form = "#{0}\n{1}!\n{2}$\n0z\n{2}x\n" if suffix == ".vcd" else "{0},{1},{2},0,{2}\n"
@@ -103,11 +103,12 @@ def test_files_in_parts(suffix: str, end: str, tmp_path: Path, monkeypatch: pyte
         path.write_text(head + "".join(form.format(*row) for row in rows) + last)
     wanted = Channels(others={} if suffix == ".sr" else {"z": "z"})
     capture = with_last_tick(read_parts(path, wanted, None, PLAIN).whole(), spec)
-    monkeypatch.setattr(waveform, "ROWS", 5)
-    monkeypatch.setattr(flow, "ROWS", 5)
+    for module in (flow, sigrok, waveform):
+        monkeypatch.setattr(module, "ROWS", 5)
     monkeypatch.setattr(text, "BLOCK", 5)
     parts = with_last_tick(read_parts(path, wanted, None, PLAIN), spec)
     assert_same(reduce(PinTrace.then, parts.pieces(spec, 1500)), PinTrace.of(capture, spec))
+    assert parts.read > 0
     assert parts.source == capture.source
     assert parts.source is not None
     assert parts.source.n_changes > 50
