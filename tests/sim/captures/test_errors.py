@@ -12,7 +12,8 @@ import pytest
 from support.captures import assert_error, make_csv, make_sr, random_trace
 from support.damage import damaged
 
-from tachometry.sim.captures.file import CaptureError
+from tachometry.sim.captures.file import CaptureError, OptionError
+from tachometry.sim.captures.header import TextOptions
 from tachometry.sim.captures.read import read_capture
 from tachometry.sim.captures.sigrok import write_sr
 from tachometry.sim.captures.text import read_csv
@@ -150,3 +151,20 @@ def test_wrong_row(tmp_path: Path, row: str, message: str, block: int) -> None:
     assert_error(path, message)
     with pytest.raises(CaptureError, match=f"^{re.escape(message.replace('PATH', str(path)))}$"):
         read_csv(path, _block=block).whole()
+
+
+@pytest.mark.parametrize("first", ["10", "00"])
+def test_the_first_edges_show_whether_times_are_seconds(first: str, tmp_path: Path) -> None:
+    """A shaft that rests after some edges is no mistake; before them there are none to ask."""
+    rows = [
+        f"{time},{level},0\n"
+        for time, level in zip((0, 0.1, 0.2, 0.3, 7.5, 14.5, 21.5, 28.5), 2 * first + "0101", strict=True)
+    ]
+    flow = read_csv(
+        make_csv(tmp_path / "x.csv", f"time,a,b\n{''.join(rows)}"), options=TextOptions(slowest_s=1.0), _block=4
+    )
+    if first == "10":
+        assert flow.whole().n_changes == 6
+    else:
+        with pytest.raises(OptionError, match=r"its edges would be 7 s apart"):
+            flow.whole()

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from support.command import run
-from support.nightly import only
 
 from tachometry.sim.encoder.absolute import Answers, answer
 from tachometry.spec import of_texts
@@ -19,7 +18,7 @@ KINDS = {
     "biss": {"sensor": "biss", "bits": "4+13", "encoder-clock": "2MHz"},
     "ssi": {"sensor": "ssi", "bits": "4+13", "encoder-clock": "1MHz", "line-delay": "700ns"},
     "spi": {"sensor": "spi", "chip": "as5047p", "bits": "14"},
-    "amt22": {"sensor": "spi", "chip": "amt22", "bits": "12", "line-delay": "200ns"},
+    "amt22": {"sensor": "spi", "chip": "amt22", "bits": "12", "line-delay": "400ns"},
     "tformat": {"sensor": "tformat", "bits": "4+17", "line-delay": "100ns"},
 }
 KINDS["ssi"] |= {"gray": "yes", "reverse": "yes"}
@@ -50,6 +49,7 @@ def capture(kind: str, folder: Path) -> list[str]:
     flip = np.where((np.arange(N) % 20 == 7) & (kind != "ssi"), 5, -1)
     at, level = answer(reads, start, Answers(place & (1 << reads.width) - 1, reads.delay, flip=flip))
     edges = np.unique(start[:, None] + changes(reads))
+    edges = np.delete(edges, slice(1000, 1002 if kind == "spi" else 1000))  # a frame lacks a clock
     every = np.unique(np.concatenate([[0], at, edges]))
     clock = np.isin(every, edges).cumsum() + (not isinstance(reads, SpiReads)) & 1
     data = level[np.searchsorted(at, every, side="right") - 1]
@@ -60,13 +60,13 @@ def capture(kind: str, folder: Path) -> list[str]:
     return [str(folder / "c.csv"), *words, *core, "--method", "m"]
 
 
-@pytest.mark.parametrize("kind", only(["biss", "ssi", "spi", "tformat"], KINDS))
+@pytest.mark.parametrize("kind", KINDS)
 def test_frames_of_another_master_are_replayed(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("replay", *capture(kind, tmp_path), "--a", "MA", "--b", "SLO", "--counts", tmp_path / "t.csv") == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "from MA, " in told
     assert f"{N} frames; between two the shaft is taken to turn evenly" in told
-    wrong = {"ssi": "", "spi": "7 frames not taken: no answer 1, a wrong check 6"}
+    wrong = {"ssi": "", "spi": "8 frames not taken: no answer 2, a wrong check 6"}
     assert wrong.get(kind, "6 frames not taken: a wrong check 6") in told
     position = np.genfromtxt(tmp_path / "t.csv", delimiter=",", names=True)["position"][1:]
     way, slope = (-1 if "reverse" in KINDS[kind] else 1), SPEED / 1.013 * 200e-6 / (2 * np.pi) * (1 << BITS[kind][-1])
