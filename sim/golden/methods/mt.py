@@ -12,8 +12,8 @@ class Model(TimedModel):
 
     def taken(self, counts: Counts, since: int) -> Measurements:
         spec, n, period = self._spec, len(counts.period), counts.period
-        # The first count after reset or a silence only opens.
-        first = (counts.gap > spec.form.max_periods) | (np.arange(n) < counts.fresh)
+        # The first count after reset or a silence only opens; so does the first that is kept.
+        first = (counts.gap > spec.form.max_periods) | (np.arange(n) == 0)
         closing = not_before(period, period + spec.form.min_periods + 1)
         if spec.whole_cycles:
             closing = self._whole(counts, closing)

@@ -7,7 +7,7 @@ from support.nightly import only
 from tachometry.sim import golden
 from tachometry.sim.encoder.stress import stress_of
 from tachometry.sim.golden.pieces import Golden, in_pieces
-from tachometry.sim.signals.recording import PinTrace
+from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.sim.studies.pairs import core_of
 from tachometry.spec import TachometerSpec
 
@@ -27,13 +27,9 @@ CASES = [
 ]
 
 
-def in_order(spec: TachometerSpec, seed: int, most: int) -> None:
-    """Compare a run in pieces of at most `most` clocks, and the rest as one, with the whole."""
-    rng, trace = np.random.default_rng(seed), stress_of(spec, seed, 12)
-    assert isinstance(trace, PinTrace)
-    whole, model = golden.run(spec, trace).tables, Golden(spec)
-    lengths = 1 + (most * rng.random(50) ** 3).astype(int)  # many are of some clocks only
-    ends = [int(end) for end in np.cumsum(lengths) if end < trace.n_clocks] + [trace.n_clocks]
+def in_order(spec: TachometerSpec, trace: PinTrace, ends: list[int], seed: int = 0) -> None:
+    """Compare a run in pieces that end at some clocks, and the rest as one, with the whole."""
+    whole, model, ends = golden.run(spec, trace).tables, Golden(spec), [*ends, trace.n_clocks]
     runs = [model.run(trace.part(begin, end)).tables for begin, end in zip([0, *ends], ends, strict=False)]
     for name, table in whole.items():
         found = runs[0][name]
@@ -49,7 +45,19 @@ def in_order(spec: TachometerSpec, seed: int, most: int) -> None:
 def test_pieces_of_some_ticks_give_the_whole(case: str, seed: int) -> None:
     spec = core_of(("--method", *case.split()))
     assert isinstance(spec, TachometerSpec)
-    in_order(spec, seed, 28 * spec.timing.tick_cycles)  # 7 ticks in the mean
+    rng, trace = np.random.default_rng(seed), stress_of(spec, seed, 12)
+    assert isinstance(trace, PinTrace)
+    most = 28 * spec.timing.tick_cycles  # 7 ticks in the mean
+    lengths = 1 + (most * rng.random(50) ** 3).astype(int)  # many are of some clocks only
+    in_order(spec, trace, [int(end) for end in np.cumsum(lengths) if end < trace.n_clocks], seed)
+
+
+def test_an_edge_at_the_end_of_a_piece_is_counted_in_the_next() -> None:
+    spec, quarter = core_of(("--method", *CASES[0].split())).tachometer, np.arange(20)
+    level = quadrature(quarter)
+    in_order(
+        spec, PinTrace(np.append(0, 60 + quarter[1:]), level & np.uint8(1), level >> np.uint8(1), 200), [*range(61, 90)]
+    )
 
 
 @pytest.mark.parametrize("more", ["--index", "--external-tick", "--over-speed 3rad/s", "--lowpass 200Hz", "--age"])
