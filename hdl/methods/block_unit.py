@@ -15,9 +15,8 @@ _LOW = CHANCE_BITS - DROPPED  # zeros below a product
 class BlockUnit(Unit):
     """A multiplier for half a word, and a barrel shifter in two stages; `tracking_units.BLOCK` has their times.
 
-    A factor may begin while another operation is under way, but not so that both would be shifted in one clock: not two
-    clocks after a power, or three after a product. It is used two clocks after its begin, or later. The program sees to
-    both.
+    An operation begins in any clock while others are under way, and its result stays until the next one comes. The
+    program sees to it that no two want the same stage in one clock, see `tracking_schedule.clash`.
     """
 
     def __init__(self, program: Program) -> None:
@@ -52,11 +51,7 @@ class BlockUnit(Unit):
 
     def _work(self, m: Module) -> None:
         by_power, by_product, by_shift = self._distances(m)
-        left = Signal(3)
-        latencies = Array(C(max(self._program.times.of(item) - 1, 0), 3) for item in Start)
-        m.d.comb += self.busy.eq(left.any())
-        m.d.sync += [left.eq(Mux(left.any(), left - 1, latencies[self.start])), self.last.eq(self.doing)]
-        m.d.sync += self.last_but_one.eq(self.last)
+        m.d.sync += [self.last.eq(self.doing), self.last_but_one.eq(self.last)]
         self._multiply(m)
         with m.If(self.begins | (self.doing == Start.EXP)):
             m.d.sync += self.distance.eq(Mux(self.doing == Start.EXP, by_power, by_product))

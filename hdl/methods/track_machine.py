@@ -32,7 +32,7 @@ class TrackMachine(Box):
     """Runs the program once for every tick; `spec.formats.tracking_code` defines each instruction.
 
     An instruction is fetched, and executed three clocks later: there is a register in front of the memory of words and
-    one behind it. All wait while one needs the unit, and that is busy.
+    one behind it. All wait while one needs the serial unit, and that is busy.
 
     Where a word is read at a time, cells are saved: the sum is cleared where the next instruction does not take it, and
     inputs are cleared where they are not read, as a reset of registers takes no cell. So the unit and the outputs take
@@ -295,9 +295,10 @@ class TrackMachine(Box):
     def _begin(self, m: Module) -> None:
         """Begin an operation of the unit, or wait for it."""
         unit, now = self.unit, self.now
-        waits = reduce(and_, (now.start != start for start in Start if not self._program.times.of(start)))
+        if not self._two:
+            waits = reduce(and_, (now.start != start for start in Start if not self._program.times.of(start)))
+            m.d.comb += self.hold.eq(self.active & (self.from_unit | waits) & unit.busy)
         m.d.comb += [
-            self.hold.eq(self.active & (self.from_unit | waits) & unit.busy),
             unit.begin.eq(self.begin),
             unit.start.eq(Mux(self.go, now.start, Start.NONE)),
             unit.how.eq(now.how),

@@ -35,11 +35,11 @@ class Unit(Box):
     def __init__(self, program: Program) -> None:
         super().__init__(
             begin=In(1),  # a tick begins: results are rounded to the nearest until the event has a number
-            start=In(Start),  # the operation that begins; none does while the unit is busy
+            start=In(Start),  # the operation that begins; none does while the serial unit is busy
             how=In(HOW_BITS),  # number of the shift, or of the table of gains
             sum=In(signed(WIDTH)),  # the operand; the block unit takes it a clock later
             **only_if(program.times == BLOCK, coming=In(WIDTH // 2)),  # its lower half, a clock earlier
-            busy=Out(1),  # the result is not there yet
+            **only_if(program.times != BLOCK, busy=Out(1)),  # the result is not there yet
             result=Out(signed(WIDTH)),
             up=Out(1),  # the result is to be rounded up, by one
         )

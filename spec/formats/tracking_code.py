@@ -1,10 +1,11 @@
 """How the listing of the tracking method becomes instructions of a machine, and how many clocks these take.
 
 The machine has one adder with an accumulator, the *sum*; a memory of words; and a unit that takes products,
-logarithms, powers and shifts, and whose result is read as `~`. An instruction takes a clock. It waits while the unit
-works and it needs it. A word is read before its use, so none is read right behind its change. A jump tests the sum that
-was before it, and meanwhile adds a term as others do; it stores nothing. The quick machine reads two words at a time,
-so it takes the first two terms of a line at once. It stores a sum on a condition where a jump would pass over that.
+logarithms, powers and shifts, and whose result is read as `~`. An instruction takes a clock. In the small machine it
+waits while the unit works and it needs it. A word is read before its use, so none is read right behind its change. A
+jump tests the sum that was before it, and meanwhile adds a term as others do; it stores nothing. The quick machine
+reads two words at a time, so it takes the first two terms of a line at once. It stores a sum on a condition where a
+jump would pass over that, and waits for nothing, see `tracking_schedule`.
 """
 
 import re
@@ -14,9 +15,10 @@ from functools import cache, cached_property
 
 from tachometry.spec.formats.settling import SETTLING, SHARED
 from tachometry.spec.formats.tracking import Tracking
-from tachometry.spec.formats.tracking_instruction import CHOSEN, EARLY, OFFSETS, Code, Instruction, Jump, Left
+from tachometry.spec.formats.tracking_instruction import CHOSEN, OFFSETS, Code, Instruction, Jump, Left
 from tachometry.spec.formats.tracking_listing import LISTING
-from tachometry.spec.formats.tracking_order import joined, selected, spaced
+from tachometry.spec.formats.tracking_order import doubled, joined, selected, spaced
+from tachometry.spec.formats.tracking_schedule import scheduled, to_next
 from tachometry.spec.formats.tracking_units import STAGES, Start, Times
 
 SMOOTH = ("velocity_smooth", "smooth_delay")
@@ -132,8 +134,8 @@ def assembled(listing: str = LISTING + SETTLING, ports: int = 1, **kind: bool) -
             chain = _chain(words)
             code += _paired(chain) if ports > 1 else chain
     if ports > 1:
-        code, labels = selected(code, labels)
-    return spaced(joined(code, labels), ports)
+        return scheduled(*doubled(*selected(code, labels)))
+    return spaced(joined(code, labels))
 
 
 @cache
@@ -154,7 +156,7 @@ def _longest_of(counts: int, times: Times, output: str, kind: Mapping[str, bool]
         open_.remove(place)
         clock, free = entry[place]
         one = code[place]
-        begun = times.of(one.start)
+        begun = times.of(one.start) if times.ports == 1 else 0
         clock = max(clock, free) if begun or one.word == "~" else clock
         if begun:
             free = clock + begun
@@ -164,7 +166,7 @@ def _longest_of(counts: int, times: Times, output: str, kind: Mapping[str, bool]
             continue
         following = [] if known.get(one.jump) else [(place + 1, clock)]
         if one.target and known.get(one.jump, True):
-            following.append((labels[one.target], clock + (1 if times.ports > 1 and one.jump in EARLY else STAGES)))
+            following.append((labels[one.target], clock - 1 + (to_next(one) if times.ports > 1 else 1 + STAGES)))
         for after, at in following:
             before = entry.get(after, (-1, -1))
             now = max(before[0], at), max(before[1], free)
@@ -215,7 +217,8 @@ class Program:
     @cached_property
     def clocks(self) -> int:
         """Clocks from the tick until the last output holds, by the longest way."""
-        return _longest(self.times, "acceleration", **self._kind) + self.times.fetch_clocks
+        last = max(_longest(self.times, name, **self._kind) for name in self.outputs)
+        return last + self.times.fetch_clocks
 
     @cached_property
     def all_clocks(self) -> int:

@@ -31,7 +31,7 @@ CASES = (
         "position-compare=2:3:0:7clk stream=axi",
     ),
     Case("mt", f"{FAST} position-width=48 index=yes index-reset=yes stream=axi:edge:5"),
-    Case("track", "tick=400clk max-time=1600clk stream=axi:tick:1", clocks=8000),
+    Case("track", "tick=400clk max-time=1600clk stream=axi:update:1", clocks=8000),
 )
 BUS = Case("m", "tick=8clk max-time=32clk stream=axi:tick", edges=40)
 DATA, VALID, LAST = "m_axis_tdata", "m_axis_tvalid", "m_axis_tlast"

@@ -14,6 +14,7 @@ from tachometry.spec import TrackTachometer, of_texts
 from tachometry.spec.formats.tracking import CHANCE_BITS, GAIN_STEPS, GAINS, LOG_BITS, PLACE_BITS, WIDTH
 from tachometry.spec.formats.tracking_code import Program
 from tachometry.spec.formats.tracking_instruction import Instruction, Jump, Left
+from tachometry.spec.formats.tracking_schedule import to_next
 from tachometry.spec.formats.tracking_units import Start
 
 
@@ -55,8 +56,9 @@ class Interpreter:
             chosen[f"o@m{j + 1}"] = (kind + j if down else kind - j) & 3 if number & 3 > j else -1
         unit, code = self._unit, self.program.code.instructions
         unit._chance = 1 << CHANCE_BITS - 1
-        place, sum_, sign, result, by = self.program.code.labels["tick" if self.met else "reset"], 0, 1, 0, 1
+        place, sum_, sign, by = self.program.code.labels["tick" if self.met else "reset"], 0, 1, 1
         shown = {"standstill": 0}
+        unit_times, clock, results = self.program.times, 0, {0: 0}  # by the clock from which on they are read
 
         def name(word: str) -> str:
             return (f"o{chosen[word]}" if chosen[word] >= 0 else "zero") if word in chosen else word
@@ -76,10 +78,13 @@ class Interpreter:
                 Jump.ONE: number == 1,
             }[one.jump]
             selects = bool(one.store and one.jump)
+            now, clock = clock, clock + (to_next(one) if taken else 1)
             if selects and not taken:
                 continue
             place = self.program.code.labels[one.target] if taken and one.target else place
-            terms = {"": 0, "~": result} | {f"${word}": value for word, value in inputs.items()}
+            terms = {"": 0, "~": results[max(at for at in results if at <= now)]} | {
+                f"${word}": value for word, value in inputs.items()
+            }
             terms |= {word: self.words[name(word)] for word in one.reads}
             first, operand = terms[one.first], terms[one.word]
             left = {Left.ZERO: first, Left.SUM: sum_, Left.LEAST: min(sum_, 0), Left.MOST: max(sum_, 0)}[one.left]
@@ -95,20 +100,22 @@ class Interpreter:
                 sum_ = before
             if one.output:
                 shown[one.output] = int(sum_ >= 0) if one.output == "standstill" else sum_
+            ready = now + (unit_times.of(one.start) if unit_times.ports > 1 else 1)
+            assert one.start in (Start.NONE, Start.BY, Start.CHANCE) or ready not in results
             match one.start:
                 case Start.LOG:
-                    result = log2(sum_)
+                    results[ready] = log2(sum_)
                 case Start.EXP:
-                    result = unit._power(sum_, 1)
+                    results[ready] = unit._power(sum_, 1)
                 case Start.OVER:
                     bits = self.program.form.factor_bits
                     shift = max(by.bit_length() - (bits - CHANCE_BITS), 0) if one.how == "by" else int(one.how)
-                    result = unit._round(sum_, shift)
+                    results[ready] = unit._round(sum_, shift)
                 case Start.GAIN:
                     at = ((~sum_ * GAIN_STEPS) >> LOG_BITS) - 2 * GAIN_STEPS
-                    result = self.program.form.gains[int(one.how)][max(0, min(GAINS - 1, at))]
+                    results[ready] = self.program.form.gains[int(one.how)][max(0, min(GAINS - 1, at))]
                 case Start.TIMES:
-                    result = unit._product(sum_, by, one.how)
+                    results[ready] = unit._product(sum_, by, one.how)
                 case Start.BY:
                     by = sum_
                 case Start.CHANCE:

@@ -78,9 +78,9 @@ FAULTS = (
     ("smooth of_v = ~ min most_shown max least_shown;", "smooth of_v = ~;"),
     ("zero\n    smooth sum out smooth_delay", "zero\n    smooth one out smooth_delay"),  # at rest
     ("zero + zero out", "zero + one out"),  # with the second count
-    ("same:\n    smooth since + of_e", "same:\n    smooth tau + of_e"),
-    ("place_64\n    smooth since + of_e", "place_64\n    smooth tau + of_e"),
-    ("moved; smooth since + of_e", "moved; smooth tau + of_e"),
+    ("$moved\n    smooth since + of_e", "$moved\n    smooth tau + of_e"),
+    ("place_64; smooth since + of_e", "place_64; smooth tau + of_e"),
+    ("raw - moved\n    smooth since + of_e", "raw - moved\n    smooth tau + of_e"),
     ("nothing\n    smooth since + of_e", "nothing\n    smooth quiet + of_e"),  # in a silence
 )
 

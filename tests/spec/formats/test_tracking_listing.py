@@ -141,14 +141,17 @@ def test_a_jump_adds_the_term_behind_it(lines: str, word: str) -> None:
     [
         ("a + b; if neg goto there; c = d; there:; e", "c"),
         ("a + b; if pos goto there; c = ~ keep; e = d + a; there:; b", "ce"),
-        ("a + b; if neg goto there; c = d; there:; one + two; if neg goto there; end", "c"),
+        ("a + b; if neg goto there; c = d; there:; one + two; if neg goto last; e; last:; end", "c"),
         ("a + b; if neg goto there; c = d; there:; if one goto back; d; back:; e; end", "c"),
         ("if one goto there; a + b; if neg goto there; c = d; end; there:; end", "c"),  # both ways end
         ("if one goto there; a + b; if neg goto there; c = d; end; there:; a; end", ""),
         ("a + b; if neg goto there; c = d; there:; sum + e; end", ""),  # there the sum is still needed
-        ("a + b; if neg goto there; c = d; there:; if neg goto there; end", ""),
+        ("a + b; if neg goto there; c = d; there:; if neg goto last; e; last:; end", ""),
         ("a + b; if neg goto there; c = d; there:; if one goto back; sum + d; back:; e; end", ""),
-        ("a + b; if neg goto there; c = d; back:; e = f; there:; d; goto back", ""),  # it is gone to as well
+        (
+            "if one goto back; a + b; if neg goto there; c = d; back:; e = f; there:; d; end",
+            "",
+        ),  # it is gone to as well
         ("a + b; if neg goto there; c = d + e + f; there:; end", ""),  # of two instructions
         ("a + b; if neg goto there; c = d log; there:; end", ""),
         ("a + b; if one goto there; c = d; there:; end", ""),  # no sum decides
@@ -194,8 +197,9 @@ def test_two_terms_are_added_at_once(line: str, terms: list[tuple[str, str]]) ->
         ("a exp; b; c; d by", 0),
         ("a product time; goto there; back:; b; end; there:; c by; goto back", 1),  # two clocks behind the jump
         ("a product time; b; goto there; back:; c; end; there:; d by; goto back", 0),
-        ("a = b; c = d + a", 2),  # it is not written yet
-        ("a = b; c = a + d", 2),
+        ("a = b; c = d - a", 2),  # it is not written yet
+        ("a = b; c = d + a", 0),  # but is the sum
+        ("a = b; c = a + d", 0),
         ("a = b; c; d; e = a + c", 0),
     ],
 )
