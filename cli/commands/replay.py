@@ -14,7 +14,6 @@ from tachometry.cli.options.core import core_options
 from tachometry.cli.options.engine import ENGINE_OPTIONS
 from tachometry.cli.options.option import FilePath, command
 from tachometry.cli.options.outputs import OUTPUT_OPTIONS, outputs_of
-from tachometry.sim.captures.file import STDIN
 from tachometry.sim.signals.flow import Flow
 from tachometry.sim.signals.recording import Recording
 from tachometry.sim.studies.simulation import Running
@@ -52,7 +51,6 @@ def replay(
     Equal options and captures give
     equal files. Exit status 1 if hardware and golden model differ.
     """
-    capture = STDIN if str(capture) == "-" else capture
     outputs = outputs_of(spec, targets, [capture])
     recordings = [read(capture, spec, axis, parts=True) for axis in range(spec.axes or 1)]
     return run_core(outputs, running, spec, str(capture), recordings)

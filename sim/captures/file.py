@@ -24,7 +24,7 @@ from tachometry.spec.language.option import ParameterError
 Channel = str | int
 SAME = -(1 << 16)  # as the channel of B: that of A
 _LISTED = 40  # channels in a message
-STDIN = Path("/dev/stdin")
+STDIN = Path("-")
 NO_VECTORS: Mapping[int, str] = {}
 
 

@@ -1,5 +1,6 @@
 """Captures that are small on disk and would be large in memory: they are refused by the limits that are stated."""
 
+import io
 import os
 import threading
 from pathlib import Path
@@ -75,6 +76,9 @@ def test_the_standard_input_is_a_pipe(suffix: str, tmp_path: Path, monkeypatch: 
     with path.open(encoding="utf-8") as stdin:
         monkeypatch.setattr("sys.stdin", stdin)
         assert_same(read_capture(file.STDIN), read_capture(path))
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BufferedReader(io.BytesIO(b"time,a,b\n0,0,x\n"))))
+    with pytest.raises(file.CaptureError, match=r"^- must have at least one row"):
+        read_capture(file.STDIN)
 
 
 def test_a_head_of_too_many_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
