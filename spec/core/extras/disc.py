@@ -56,7 +56,7 @@ def _parse_table(what: str, text: str) -> str:
     many = number.isascii() and number.isdigit() and len(number) < 4 and _LEAST_SECTORS <= int(number) <= _MOST_SECTORS
     if text in ("auto", "edges", "sectors") or (form == "sectors" and many):
         return text
-    form = f"auto, edges or sectors:N, N from {_LEAST_SECTORS} to {_MOST_SECTORS}"
+    form = f"edges or sectors:N, N from {_LEAST_SECTORS} to {_MOST_SECTORS}"
     raise ParameterError(what, f"must be {form}, not {text}")
 
 
