@@ -190,7 +190,7 @@ def _verdict(simulation: Simulation, warned: bool) -> Text:
     if n_mismatches:
         return Text(f"FAIL: hardware and golden model differ in {n_mismatches} values", style="bold red")
     captured = any(axis.truth is None for axis in simulation.axes)
-    of = f" ({plural(tally.n_values, 'value')}); wiring and --ppr are not checked" if captured else ""
+    of = f" ({plural(tally.n_values, 'value')}); wiring and pulses per turn are not checked" if captured else ""
     only = "; neither was compared with the shaft: see the warning" if warned else ""
     verdict, style = ("INTERRUPTED", "bold yellow") if simulation.interrupted else ("PASS", "bold green")
     if not any(axis.recording.n_changes for axis in simulation.axes):

@@ -91,7 +91,7 @@ def test_what_contradicts_itself_is_warned_of(
     if index:
         assert "lines a from a, b from b, z from z captured 0.18 s, 360 changes of the lines speed min " in told
         assert "index 3 times, the last at position 298, 100 counts apart" in told
-        assert re.search(r"PASS: .*[0-9]+ values\); wiring and --ppr are not checked", told)
+        assert re.search(r"PASS: .*[0-9]+ values\); wiring and pulses per turn are not checked", told)
 
 
 @pytest.mark.parametrize(
