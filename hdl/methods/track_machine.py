@@ -289,8 +289,12 @@ class TrackMachine(Box):
             with m.If(self.begin):
                 m.d.sync += self.standstill.eq(0)
         for name, port in by_name(self, self._program.outputs).items():
+            held = port
+            if self._two and name == "velocity":  # it is there a clock before it is held
+                held = Signal.like(port)
+                m.d.comb += port.eq(Mux(shows == OUTPUTS.index(name), self.made, held))
             with m.If(shows == OUTPUTS.index(name)):
-                m.d.sync += port.eq(~self.made[-1] if name == "standstill" else self.made)
+                m.d.sync += held.eq(~self.made[-1] if name == "standstill" else self.made)
 
     def _begin(self, m: Module) -> None:
         """Begin an operation of the unit, or wait for it."""

@@ -208,7 +208,7 @@ class Tracking:
             "most_since": self.most_since, "most_memory": min(int(self.memory_seconds * self.clock_hz) << t, most),
             "max_time": self.max_time << t, "forget": forget << t,
             "most_std": (1 << self.std_bits) - 1,
-            "most": most, "most_shown": shown, "least_shown": -shown,
+            "most": most, "most_shown": shown, "least_shown": -shown, "all_shown": 2 * shown,
             "noises_one": noises, "noises_first": 8 * noises, "noises_least": 16 * noises,
             "noises_offset": 256 * noises, "noises_most": 512 * noises,
         }  # fmt: skip

@@ -210,9 +210,11 @@ class Program:
 
     @cached_property
     def velocity_clocks(self) -> int:
-        """Clocks from the tick until the velocity holds, which the quick machine shows before the rest."""
-        first = self.times.ports > 1
-        return _longest(self.times, "velocity", **self._kind) + self.times.fetch_clocks if first else self.clocks
+        """Clocks from the tick until the velocity is there, which the quick machine shows before the rest."""
+        if self.times.ports == 1:
+            return self.clocks
+        beside = [_longest(self.times, name, **self._kind) for name in ("standstill", *SMOOTH) if name in self.outputs]
+        return max(_longest(self.times, "velocity", **self._kind) - 1, *beside) + self.times.fetch_clocks
 
     @cached_property
     def clocks(self) -> int:
@@ -238,6 +240,7 @@ class Program:
         chosen = (*OFFSETS, "zero")  # which is in the place of no offset
         others = [name for name in names if name not in self.constants and name not in chosen]
         others += [name for name in self.constants if name in names and name not in chosen]
+        assert len(others) + len(chosen) <= FIRST_INPUT
         return {name: self.constants.get(name, 0) for name in (*others[:FIRST_OFFSET], *chosen, *others[FIRST_OFFSET:])}
 
     @cached_property

@@ -117,7 +117,7 @@ placed:
     more = zero s- ~; lag over 1; more = more + ~; }
     block {
     reads lagless:; reads tick by; reads velocity product shown
-    least_shown + ~ lo+ most_shown + most_shown hi+ least_shown out velocity; settles speed = sum
+    least_shown + ~ lo+ all_shown hi+ least_shown out velocity; settles speed = sum
 made:
     edges w = doubt + log_X - slips hi+ slips; reads w = doubt + log_X; limit + w over 1
     edges quiet = $last; velocity_std - log_T + ~ exp; after - one; if neg goto same_place
@@ -159,7 +159,8 @@ short:
 ready:                                  # growth of the memory and noise, for the next event
     smooth a keep log; smooth log_T - of_slope + ~ exp  # in the middle of the memory
     smooth of_v = v s- ~; smooth tick by; smooth of_v product shown
-    smooth of_v = ~ min most_shown max least_shown; smooth T over 1
+    serial smooth of_v = ~ min most_shown max least_shown
+    block smooth of_v = least_shown + ~ lo+ all_shown hi+ least_shown; smooth T over 1
     smooth of_e = ahead + ~             # of_v and of_e hold its velocity and age for the next tick
     D log; minus_Ds = zero - D; growth = zero; after = minus_one; limit = order + ~ + ~
     lag log; serial w = order_lag - log_X - limit; edges slack = half
@@ -246,7 +247,7 @@ begin:
     edges log_T = log_dt - log_64 - log_half exp   # means of many counts are by logarithms: they are forgotten
     edges T = ~; serial goto show
     block P = zero; block tick by; block velocity = v product shown
-    block least_shown + ~ lo+ most_shown + most_shown hi+ least_shown out velocity; block settles speed = sum
+    block least_shown + ~ lo+ all_shown hi+ least_shown out velocity; block settles speed = sum
     block edges if one goto begun; block goto made
     block edges begun:; block edges T = dt; block edges log_T = log_dt; block edges goto made
 edges {; same:; block moved = $moved
@@ -264,7 +265,7 @@ show:
     since + ahead by; as product velocity; block tick by; block P = zero
     serial velocity = vs + ~; block velocity = vs + ~ product shown
     block edges if empty goto place
-    block least_shown + ~ lo+ most_shown + most_shown hi+ least_shown out velocity
+    block least_shown + ~ lo+ all_shown hi+ least_shown out velocity
     block settles speed = sum; block goto made; serial goto place
 edges {; seen:
     P = p + ~ keep; if neg goto below; plain sum + o@up; map t = $places; map P + o@up - t
@@ -296,7 +297,7 @@ quiet:
     as = zero; serial goto shown
     block {; shown:; tick by; velocity product shown
     edges w = doubt + log_X - slips hi+ slips; reads w = doubt + log_X
-    least_shown + ~ lo+ most_shown + most_shown hi+ least_shown out velocity; settles speed = sum
+    least_shown + ~ lo+ all_shown hi+ least_shown out velocity; settles speed = sum
     limit + w over 1; velocity_std - log_T + ~ exp; w = ~; slope by
     settles if empty goto settle; goto told
 same_place:; w = ~; goto place; }

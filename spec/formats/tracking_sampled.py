@@ -89,4 +89,5 @@ class SampledTracking(Tracking):
             "carried": (_CARRIED + 1) << t,
             "most_shown": shown,
             "least_shown": -shown,
+            "all_shown": 2 * shown,
         }

@@ -51,7 +51,7 @@ def _replaced(one: Instruction) -> set[str]:
 
 def _later(one: Instruction, name: str) -> int:
     """Return the clocks until what it changes may be read."""
-    return {"~": BLOCK.of(one.start), "factor": FACTOR, "sign": 1, "chance": 1}.get(name, APART)
+    return {"~": BLOCK.of(one.start), "factor": FACTOR + 3, "sign": 1, "chance": 1}.get(name, APART)
 
 
 def to_next(one: Instruction) -> int:

@@ -102,7 +102,7 @@ def test_what_it_is_for_decides() -> None:
 
 TICKS = [
     ({"clock": "48MHz"}, "track", 960),
-    ({"clock": "12MHz"}, "track", 300),  # 25 µs: 270 clocks with multipliers
+    ({"clock": "12MHz"}, "track", 300),  # 25 µs: 269 clocks with multipliers
     ({"clock": "12.288MHz"}, "track", 1536),  # of 20 µs no whole number
     ({"clock": "1.2MHz"}, "track", 300),  # 250 µs
     ({"clock": "200kHz"}, "s", 4),  # track would need 2 ms
