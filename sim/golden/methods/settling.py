@@ -1,7 +1,5 @@
 """Golden model of a place that waits for a count."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +9,7 @@ from tachometry.spec.formats.tracking import PLACE_BITS, fixed_log
 
 _HALF = 1 << PLACE_BITS - 1
 _ONE = fixed_log(1)
-_LEAST = fixed_log(math.log2(9 / 4))  # of a velocity in its LSB that is as good as none
+_LEAST = fixed_log(np.log2(9 / 4))  # of a velocity in its LSB that is as good as none
 
 
 class Settled:
