@@ -12,12 +12,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from pages import Rows, markdown
+from pages import markdown
 
 from tachometry.sim.captures.sigrok import write_sr
 from tachometry.sim.captures.text import write_csv
 from tachometry.sim.signals.recording import Recording, quadrature
 
+CORE = "--ppr 500 --clock 1MHz"
 CORE = "--ppr 500 --clock 1MHz"
 # clocks of a tick; a lossy encoder whose shaft vibrates has 25,000 edges a second
 TICKS = dict.fromkeys(["m", "s", "t", "mt", "m --lost 0.01 --vibration 100mrad:200Hz", "m --age"], 20) | {"track": 300}
@@ -54,16 +55,11 @@ def over_size(folder: Path, suffix: str, n: int) -> list[str]:
     return [f"replay {suffix}", f"{n:.0e}", f"{size / 1e6:.1f}", *measured(words)]
 
 
-def table(ticks: Sequence[int], changes: Sequence[int]) -> Rows:
-    """Return all rows."""
-    with tempfile.TemporaryDirectory() as folder:
-        files = [over_size(Path(folder), suffix, n) for suffix in (".vcd", ".csv", ".sr") for n in changes]
-    return [COLUMNS, *(over_ticks(name, n) for name in TICKS for n in ticks), *files]
-
-
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--most", type=int, default=10_000_000, help="ticks and changes of the longest runs")
     most = parser.parse_args().most
-    heads, *body = table([most // 100, most // 10, most], [most // 100, most // 10])
-    print(markdown(heads, body))
+    runs = [over_ticks(name, n) for name in TICKS for n in (most // 100, most // 10, most)]
+    with tempfile.TemporaryDirectory() as folder:
+        runs += [over_size(Path(folder), f".{end}", most // n) for end in ("vcd", "csv", "sr") for n in (100, 10)]
+    print(markdown(COLUMNS, runs))

@@ -127,7 +127,8 @@ class Scope:
                     part(name, place + shift, 1 + len(more), width) if width else self.made(value[place].cell)
                 )
         counted = [(text, len([*equal])) for text, equal in groupby(pieces)]
-        return _joined([text if count == 1 else f"{{{count}{{{text}}}}}" for text, count in counted])
+        pieces = [text if count == 1 else f"{{{count}{{{text}}}}}" for text, count in counted]
+        return _joined(pieces) if pieces else "1'd0"  # the address in a memory of one word
 
     def _source(self, placed: tuple[int, Any]) -> tuple[Any, int, int]:
         """Return what the bits of a value have in common that are written together: name, shift and width."""

@@ -62,6 +62,12 @@ def lanes(m: Module, box: Box) -> None:
     m.d.comb += [read.addr.eq(box.a[4:]), read.en.eq(box.b[11]), box.o.eq(read.data)]
 
 
+def one_word(m: Module, box: Box) -> None:
+    m.submodules.words = words = CommentedMemory([], shape=12, depth=1, init=[9])
+    write_port, read = words.write_port(), words.read_port()
+    m.d.comb += [write_port.data.eq(box.b), write_port.en.eq(box.a[1]), read.en.eq(box.a[0]), box.o.eq(read.data)]
+
+
 def selected(m: Module, box: Box) -> None:
     m.d.sync += box.o.eq(box.a.word_select(box.b[:3], 4) + box.a.as_signed().bit_select(box.b[3:6], 5))
 
@@ -143,6 +149,7 @@ def test_comments_and_names_are_written() -> None:
     assert port_comment(replace(count, help="A flag. It also changes between ticks.")) == "A flag; signed; in counts"
     assert "MODE_RUN: begin" in write(Box(enumeration), "box").text
     assert write(Box(choice), "box").text.count("{12{") == 5
+    assert write(Box(one_word), "box").text.count("words[1'd0]") == 2
 
 
 def test_equal_modules_are_written_once() -> None:
