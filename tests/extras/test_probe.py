@@ -62,6 +62,7 @@ def test_fine_position_and_velocity_say_where_an_even_shaft_was() -> None:
     shown = latched.probe_fine_0 / 64 + 3 * 100 * latched.probe_age_0 / 10e6
     assert np.ptp(shown - 3 * 100 * rises / 10e6) < 0.03
     assert np.ptp(latched.probe_age_0) > 500
+    assert latched.probe_age_0.max() < 1 << next(port.width for port in spec.ports if port.name == "probe_age_0")
 
 
 def test_a_capture_has_the_wires_of_a_core_with_probes(tmp_path: Path) -> None:

@@ -75,7 +75,7 @@ FAULTS = (
     ("smooth T over 1", "smooth T over 2"),
     ("of_e = ahead + ~ ", "of_e = zero + ~ "),
     ("smooth tick by", "smooth since by"),
-    ("smooth of_v = ~ min most_shown max least_shown;", "smooth of_v = ~;"),
+    ("smooth of_v = ~ min most_shown max least_shown\n", "smooth of_v = ~\n"),
     ("zero\n    smooth sum out smooth_delay", "zero\n    smooth one out smooth_delay"),  # at rest
     ("zero + zero out", "zero + one out"),  # with the second count
     ("$moved\n    smooth since + of_e", "$moved\n    smooth tau + of_e"),
