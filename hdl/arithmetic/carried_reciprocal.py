@@ -37,7 +37,7 @@ class CarriedReciprocal(Box):
 
     def build(self, m: Module) -> None:
         spec = self._reciprocal
-        m.submodules.table = memory = Memory(shape=spec.width, depth=max(spec.depth, 2), init=spec.table)
+        m.submodules.table = memory = Memory(shape=spec.width, depth=spec.depth, init=spec.table)
         read = memory.read_port()
         address_bits = (spec.depth - 1).bit_length()
         m.d.comb += [read.addr.eq(self.m[:address_bits]), read.en.eq(self.moves)]

@@ -141,7 +141,8 @@ def _run(script: str, folder: Path, yosys: str) -> str:
 
 def _paired(gold: _Side, gate: _Side, names: Mapping[str, str]) -> Iterator[str]:
     """Make gates of both sides with the same ports; yield what is different of registers and memories."""
-    both = [(gold.bits(old), gate.bits(new)) for old, new in names.items()]
+    # A memory of one word is a register to Yosys.
+    both = [(gold.bits(old + at), gate.bits(new + at)) for old, new in names.items() for at in ("", "[0]")]
     pairs: dict[Any, Any] = {}  # bits of registers of `gate` with those of `gold`
     for olds, news in both:
         pairs |= {

@@ -113,7 +113,7 @@ def repeated(m: Module, box: Box) -> None:
     choice(m, box, (0, 1, 2, 3, 1))
 
 
-FORMS = [memory, lanes, selected, odd_words, enumeration, falling, signs, choice, repeated]
+FORMS = [memory, lanes, one_word, selected, odd_words, enumeration, falling, signs, choice, repeated]
 LINT = "".join(f"/* verilator lint_off {warning} */\n" for warning in ("DECLFILENAME", "PROCASSINIT", "UNUSEDSIGNAL"))
 
 
@@ -149,7 +149,6 @@ def test_comments_and_names_are_written() -> None:
     assert port_comment(replace(count, help="A flag. It also changes between ticks.")) == "A flag; signed; in counts"
     assert "MODE_RUN: begin" in write(Box(enumeration), "box").text
     assert write(Box(choice), "box").text.count("{12{") == 5
-    assert write(Box(one_word), "box").text.count("words[1'd0]") == 2
 
 
 def test_equal_modules_are_written_once() -> None:
