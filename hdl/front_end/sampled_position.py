@@ -61,16 +61,14 @@ class SampledPosition(Box):
     def build(self, m: Module) -> None:
         sampled = self._sampled
         age = by_name(self, ("sample_age",))["sample_age"] if sampled.age is None else sampled.age
-        usable = Signal()
         good = Signal()
         open_age = Signal.like(self.times, init=0)  # added late: a load of `open_times` would cost many cells
         read = Signal(sampled.width)
         young = 1 if sampled.age is not None else age <= self._most_age
         m.d.comb += [
             read.eq(-self.sample if self._spec.encoder.reverse else self.sample),
-            usable.eq(self.sample_ok & young),
-            good.eq(self.sample_valid & usable & ~self.checks.any()),
-            self.decode_error.eq((self.sample_valid & ~usable) | self.jump),
+            good.eq(self.sample_valid & self.sample_ok & young & ~self.checks.any()),
+            self.decode_error.eq((self.sample_valid & ~good) | self.jump),
             self.coming.eq(*delay(m, self.last, clocks=self._spec.latency.tick - 1)),
         ]
         m.d.sync += [self.tick.eq(self.coming), self.open_times.eq(self.open_times + 1)]

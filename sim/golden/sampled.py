@@ -62,7 +62,6 @@ class Reads:
         sampled = spec.encoder.sampled
         assert sampled is not None
         good = (reason == 0) & (age <= sampled.most_age(spec.tick.longest))
-        bad = ~good
         if spec.encoder.reverse:
             sample = -sample & (1 << sampled.width) - 1
         anew, jumps, late = np.zeros(len(clock), dtype=bool), np.zeros(len(clock), dtype=bool), 0
@@ -71,9 +70,9 @@ class Reads:
             good, jumps, anew = _jumps(spec.reach, clock, sample, good)
         taken = good & ~jumps
         found = dict.fromkeys((clock[taken & warning] + late).tolist(), WARNING)
-        found |= zip(clock[bad].tolist(), np.where(reason == 0, NO_ANSWER, reason)[bad].tolist(), strict=True)
+        found |= zip(clock[~good].tolist(), np.where(reason == 0, NO_ANSWER, reason)[~good].tolist(), strict=True)
         found |= dict.fromkeys((clock[jumps] + late).tolist(), JUMP)
-        errors = np.union1d(clock[bad], clock[jumps] + late)
+        errors = np.union1d(clock[~good], clock[jumps] + late)
         zero = np.array([spec.encoder.zero or 0])
         at, what = np.array(sorted(found.items()), dtype=np.int64).reshape(-1, 2).T
         return cls(clock[taken], sample[taken], age[taken], errors, anew[taken], at, what, zero)

@@ -30,6 +30,7 @@ CASES = {
     "t": "--method t --bounds",
     "mt": "--method mt --index --age --external-tick --max-tick-period 12us",
     "rairan": "--method rairan --bounds --filter 1",
+    "reads": "--method m --sensor sampled --bits 9 --ppr 512 --max-speed 3000rpm",
     "axes": "--axes 3 --tick 64us --max-time 640us --filter 5 --index --unit rpm",
     "axes, held": "--axes 2 --parallel --tick 64us --max-time 640us --external-tick --index --index-reset",
 }
@@ -83,8 +84,8 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     return made
 
 
-# It has most options; a core of another method is played with a motion of its own below.
-@pytest.mark.parametrize("case", only(["s"], CASES))
+# S has most options, and reads have faults; a core of another method is played with a motion of its own below.
+@pytest.mark.parametrize("case", only(["s", "reads"], CASES))
 def test_passes_in_icarus(case: str, bench: Callable[[str], Path]) -> None:
     assert play(bench(case)) == ""
 
