@@ -174,6 +174,11 @@ class Tracking:
         """Seconds, beyond which memory does not grow."""
         return Fraction(MOST_MEMORY) if self.max_memory is None else self.max_memory
 
+    @property
+    def most_shown(self) -> int:
+        """The greatest velocity that is shown."""
+        return self.max_count << self.velocity_out
+
     @cached_property
     def constants(self) -> dict[str, int]:
         """Constants of the listing, ahead aside."""
@@ -182,7 +187,7 @@ class Tracking:
         order = fixed_log(12 - 2 * PLACE_BITS + 2 * a + 4 * t)
         forget = max(math.ceil(FORGET * self.clock_hz), self.max_time)
         most = (1 << (WIDTH - 2)) - 16
-        shown = self.max_count << self.velocity_out
+        shown = self.most_shown
         noises = 1 << (self.factor_bits - CHANCE_BITS - 1)  # one event among those that the noise is learned from
         of_std = math.log2(self.velocity_std) - a - t - 6 - 3 / 2  # over the roots of the order and of log_8
         logs = {

@@ -75,10 +75,13 @@ class SampledTracking(Tracking):
     def tables(self) -> tuple[int, ...]:
         return (*super().tables, *[0] * (5 * GAINS), *self._turned(3))
 
+    @property
+    def most_shown(self) -> int:
+        return self.most_moved << self.velocity_out - self.shift
+
     @cached_property
     def constants(self) -> dict[str, int]:
         lsb, t = 1 << self.moved_shift, self.time_bits
-        shown = self.most_moved << self.velocity_out - self.shift
         return super().constants | {
             "least_noise": round(lsb / 3),  # that of rounding alone
             "minus_change": -3 * lsb // 2,
@@ -87,7 +90,4 @@ class SampledTracking(Tracking):
             "most_silent": self.max_ticks << t,
             "of_period": fixed_log(self.period_bits + 2 + self.moved_shift + self.shifts["place"]),
             "carried": (_CARRIED + 1) << t,
-            "most_shown": shown,
-            "least_shown": -shown,
-            "all_shown": 2 * shown,
         }

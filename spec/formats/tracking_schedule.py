@@ -50,7 +50,7 @@ def _replaced(one: Instruction) -> set[str]:
 
 
 def _later(one: Instruction, name: str) -> int:
-    """Return the clocks until what it changes may be read."""
+    """Return the clocks until what it changes may be read; more of a factor, which else begins behind all else."""
     return {"~": BLOCK.of(one.start), "factor": FACTOR + 3, "sign": 1, "chance": 1}.get(name, APART)
 
 
