@@ -116,7 +116,7 @@ class Scope:
         return f"{self.called[whole][0]}{re.sub('[^0-9]+', '_', bits).rstrip('_')}"
 
     def text(self, value: Any) -> str:
-        """Return a value as an expression of its width."""
+        """Return a value as an expression of its width; none has the address in a memory of one word."""
         pieces = []
         for (name, shift, width), placed in groupby(enumerate(value), self._source):
             place, *more = (place for place, _ in placed)
@@ -127,8 +127,7 @@ class Scope:
                     part(name, place + shift, 1 + len(more), width) if width else self.made(value[place].cell)
                 )
         counted = [(text, len([*equal])) for text, equal in groupby(pieces)]
-        pieces = [text if count == 1 else f"{{{count}{{{text}}}}}" for text, count in counted]
-        return _joined(pieces) if pieces else "1'd0"  # the address in a memory of one word
+        return _joined([text if count == 1 else f"{{{count}{{{text}}}}}" for text, count in counted] or ["1'd0"])
 
     def _source(self, placed: tuple[int, Any]) -> tuple[Any, int, int]:
         """Return what the bits of a value have in common that are written together: name, shift and width."""

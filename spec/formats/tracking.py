@@ -187,7 +187,6 @@ class Tracking:
         order = fixed_log(12 - 2 * PLACE_BITS + 2 * a + 4 * t)
         forget = max(math.ceil(FORGET * self.clock_hz), self.max_time)
         most = (1 << (WIDTH - 2)) - 16
-        shown = self.most_shown
         noises = 1 << (self.factor_bits - CHANCE_BITS - 1)  # one event among those that the noise is learned from
         of_std = math.log2(self.velocity_std) - a - t - 6 - 3 / 2  # over the roots of the order and of log_8
         logs = {
@@ -213,7 +212,7 @@ class Tracking:
             "most_since": self.most_since, "most_memory": min(int(self.memory_seconds * self.clock_hz) << t, most),
             "max_time": self.max_time << t, "forget": forget << t,
             "most_std": (1 << self.std_bits) - 1,
-            "most": most, "most_shown": shown, "least_shown": -shown, "all_shown": 2 * shown,
+            "most": most, "most_shown": (shown := self.most_shown), "least_shown": -shown, "all_shown": 2 * shown,
             "noises_one": noises, "noises_first": 8 * noises, "noises_least": 16 * noises,
             "noises_offset": 256 * noises, "noises_most": 512 * noises,
         }  # fmt: skip

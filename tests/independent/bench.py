@@ -159,18 +159,8 @@ def in_icarus(folder: Path, manifest: Manifest, play: Play) -> list[Row]:
     name = manifest["module"]
     (folder / "bench.v").write_text(shell(manifest) + filled(_ICARUS, NAME=name))
     _write(folder, manifest, play)
-    command = [
-        "iverilog",
-        "-g2001",
-        "-Wall",
-        "-Wno-timescale",
-        "-s",
-        "bench",
-        "-o",
-        "bench.vvp",
-        f"{name}.v",
-        "bench.v",
-    ]
+    options = "-g2001 -Wall -Wno-timescale -s bench -o bench.vvp"
+    command = ["iverilog", *options.split(), f"{name}.v", "bench.v"]
     said = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
     assert said.stdout + said.stderr == ""
     subprocess.run(["vvp", "-n", "bench.vvp"], cwd=folder, check=True, capture_output=True)

@@ -102,25 +102,28 @@ class Interpreter:
                 shown[one.output] = int(sum_ >= 0) if one.output == "standstill" else sum_
             ready = now + (unit_times.of(one.start) if unit_times.ports > 1 else 1)
             assert one.start in (Start.NONE, Start.BY, Start.CHANCE) or ready not in results
-            match one.start:
-                case Start.LOG:
-                    results[ready] = log2(sum_)
-                case Start.EXP:
-                    results[ready] = unit._power(sum_, 1)
-                case Start.OVER:
-                    bits = self.program.form.factor_bits
-                    shift = max(by.bit_length() - (bits - CHANCE_BITS), 0) if one.how == "by" else int(one.how)
-                    results[ready] = unit._round(sum_, shift)
-                case Start.GAIN:
-                    at = ((~sum_ * GAIN_STEPS) >> LOG_BITS) - 2 * GAIN_STEPS
-                    results[ready] = self.program.form.gains[int(one.how)][max(0, min(GAINS - 1, at))]
-                case Start.TIMES:
-                    results[ready] = unit._product(sum_, by, one.how)
-                case Start.BY:
-                    by = sum_
-                case Start.CHANCE:
-                    low = sum_ & ((1 << CHANCE_BITS) - 1)
-                    unit._chance = int(f"{low:0{CHANCE_BITS}b}"[::-1], 2)
+            if one.start == Start.BY:
+                by = sum_
+            elif one.start == Start.CHANCE:
+                unit._chance = int(f"{sum_ & (1 << CHANCE_BITS) - 1:0{CHANCE_BITS}b}"[::-1], 2)
+            elif one.start:
+                results[ready] = self.result(one, sum_, by)
+
+    def result(self, one: Instruction, operand: int, by: int) -> int:
+        """Return what an operation of the unit makes of an operand; `by` is the factor."""
+        form = self.program.form
+        match one.start:
+            case Start.LOG:
+                return log2(operand)
+            case Start.EXP:
+                return self._unit._power(operand, 1)
+            case Start.OVER:
+                shift = max(by.bit_length() - (form.factor_bits - CHANCE_BITS), 0) if one.how == "by" else int(one.how)
+                return self._unit._round(operand, shift)
+            case Start.GAIN:
+                at = ((~operand * GAIN_STEPS) >> LOG_BITS) - 2 * GAIN_STEPS
+                return form.gains[int(one.how)][max(0, min(GAINS - 1, at))]
+        return self._unit._product(operand, by, one.how)
 
 
 def core(**options: str) -> TrackTachometer:

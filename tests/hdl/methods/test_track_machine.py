@@ -112,8 +112,8 @@ def test_a_reset_forgets_all_words(name: str) -> None:
 def test_operations_are_under_way_together() -> None:
     """Of all kinds, in any order, each as soon after those before as it may be."""
     program, rng = CORES["block"].program, np.random.default_rng(1)
-    right, factor, clock = Recursion(program.form, program.ahead), 0, 0
-    right._chance = 0
+    machine, factor, clock = Interpreter(program), 0, 0
+    machine._unit._chance = 0
     begun: list[tuple[Instruction, int]] = []
     rows: list[dict[str, int]] = [{"start": 0, "sum": 0, "coming": 0} for _ in range(2000)]
     results: dict[int, int] = {}
@@ -125,18 +125,10 @@ def test_operations_are_under_way_together() -> None:
         begun.append((one, clock))
         rows[clock] |= {"start": start, "how": program.number(one), "coming": operand % (1 << WIDTH // 2)}
         rows[clock + 1]["sum"] = operand
-        ready = clock + program.times.of(one.start)
-        match one.start:
-            case Start.LOG:
-                results[ready] = log2(operand)
-            case Start.EXP:
-                results[ready] = right._power(operand, 1)
-            case Start.OVER:
-                results[ready] = right._round(operand, 2)
-            case Start.TIMES:
-                results[ready] = right._product(operand, factor, "mean")
-            case _:
-                factor = operand
+        if one.start == Start.BY:
+            factor = operand
+        else:
+            results[clock + program.times.of(one.start)] = machine.result(one, operand, factor)
         clock += 1
     seen = clock_by_clock(track_machine.TrackMachine(program).unit, rows[: clock + 8], ["result"])
     assert len(results) > 200
