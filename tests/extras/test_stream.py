@@ -20,6 +20,7 @@ from tachometry.sim import build, golden
 from tachometry.sim.encoder.stress import stress
 from tachometry.sim.golden.extras.stream import records
 from tachometry.sim.golden.front_end import decoded
+from tachometry.sim.signals.recording import PinTrace, quadrature
 from tachometry.spec import AxesSpec, ParameterError, STachometer, of_manifest
 from tachometry.spec.registers.demo import DemoMap
 
@@ -49,19 +50,23 @@ LAYOUTS = {
 }
 
 
-def rule(case: Case) -> None:
-    """Each record comes in its clock, holds until it is taken, has the ports of its event, and ends its packet."""
-    spec, trace = case.spec, case.trace().until(4000)
-    form, (names, flags) = LAYOUTS[case.method][0], (words.split() for words in LAYOUTS[case.method][1:])
+def played(spec: Any, trace: PinTrace, shown: list[str]) -> tuple[dict[int, Any], Any]:
+    """Return the golden records by their clocks, and what gates show in each clock."""
     rows: list[dict[str, int]] = [{} for _ in range(trace.n_clocks)]
     for number, clock in enumerate(trace.clock.tolist()):
         rows[clock] = {pin.name: int(trace.lines[pin.name][number]) for pin in spec.ports.pins}
     steps = decoded(spec, trace)
-    packet = int(([*case.texts["stream"].split(":"), "256"][2:] or ["256"])[0])
     clocks, golden_records = records(spec, trace, steps, golden.tables(spec, trace, steps))
-    seen = clock_by_clock(Tachometer(spec), rows, [DATA, VALID, LAST, *names[2:], *flags])
+    return dict(zip(clocks.tolist(), golden_records, strict=True)), clock_by_clock(Tachometer(spec), rows, shown)
+
+
+def rule(case: Case) -> None:
+    """Each record comes in its clock, holds until it is taken, has the ports of its event, and ends its packet."""
+    spec, trace = case.spec, case.trace().until(4000)
+    form, (names, flags) = LAYOUTS[case.method][0], (words.split() for words in LAYOUTS[case.method][1:])
+    packet = int(([*case.texts["stream"].split(":"), "256"][2:] or ["256"])[0])
+    words, seen = played(spec, trace, [DATA, VALID, LAST, *names[2:], *flags])
     known = golden.run(spec, trace).updates.clock[0]
-    words = dict(zip(clocks.tolist(), golden_records, strict=True))
     held, sent, lost, ready = None, 0, 0, case.level("m_axis_tready")
     for clock, row in enumerate(seen):
         out = [row[name] for name in (DATA, LAST)]
@@ -84,6 +89,16 @@ def rule(case: Case) -> None:
         held = None if ready[clock] else held
     assert sent > 4
     assert lost or case.method == "track"
+
+
+def test_an_edge_between_the_velocity_and_the_rest_has_the_update_before() -> None:
+    spec, clock = Case("track", "tick=400clk max-time=1600clk stream=axi:edge").spec, np.arange(0, 6000, 250)
+    level, one = quadrature(np.arange(len(clock))), np.uint8(1)
+    lines = {"a": level & one, "b": level >> one, "m_axis_tready": np.full_like(level, 1)}
+    words, seen = played(spec, PinTrace.of_lines(clock, 6200, lines).completed(spec), [DATA, "velocity"])
+    found = {at: seen[at][DATA] >> 160 & (1 << 32) - 1 for at in words}
+    assert found == {at: int(record["velocity"]) for at, record in words.items()}
+    assert any(found[at] != seen[at - 1]["velocity"] for at in words)
 
 
 test_cores = agreeing(CASES, rule)
