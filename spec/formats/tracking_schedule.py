@@ -65,12 +65,16 @@ class Listing:
     def __init__(self, code: list[Instruction], labels: dict[str, int]) -> None:
         self.code, self.labels = code, labels
         self.live = [set[str]() for _ in code]
+        read = [
+            {name for name in _read(one) if name != "sign" or one.by_sign} | {one.word}.intersection("~")
+            for one in code
+        ]
+        gone = [_replaced(one) - taken for one, taken in zip(code, read, strict=True)]
         changed = True
         while changed:
             changed = False
-            for place, one in reversed([*enumerate(code)]):
-                read = {name for name in _read(one) if name != "sign" or one.by_sign} | {one.word}.intersection("~")
-                live = read.union(*(self.live[at] for at in self.following(place))) - (_replaced(one) - read)
+            for place in reversed(range(len(code))):
+                live = read[place].union(*(self.live[at] for at in self.following(place))) - gone[place]
                 changed |= live != self.live[place]
                 self.live[place] = live
 
@@ -205,7 +209,8 @@ class Region:
         self.needs = dict(behind.needs) if behind else {}
         for number in reversed(range(len(chains))):
             for at, place in reversed([*enumerate(chains[number])]):
-                self.needs = {name: clock for name, clock in self.needs.items() if name not in _replaced(code[place])}
+                replaced = _replaced(code[place])
+                self.needs = {name: clock for name, clock in self.needs.items() if name not in replaced}
                 for name in (*_read(code[place]), code[place].word):
                     self.needs[name] = max(self.needs.get(name, 0), self._weights[number] - at)
 
@@ -242,8 +247,9 @@ class Region:
 
     def _is_early(self, number: int, left: set[int]) -> bool:
         """Return whether what reads the result of a chain, or that of such a one, has to wait for another result."""
+        numbers = self._numbers[number]
         readers = [
-            at for at in left if any(self._taken.get(place) in self._numbers[number] for place in self._chains[at])
+            at for at in left if numbers and any(self._taken.get(place) in numbers for place in self._chains[at])
         ]
         awaited, open_ = set[int](), set[int]().union(*(self._before[reader] & left for reader in readers))
         while open_:
@@ -296,12 +302,10 @@ class Region:
 
     def _waits(self, one: Instruction, place: int, clock: int, placed: list[Placed]) -> bool:
         """Return whether an instruction is too early."""
-        under_way = [*self.entry, *placed]
-        if any(clash(before.one, one, clock - before.clock) for before in under_way if clock - before.clock < PAST):
+        near = [each for each in (*self.entry, *placed[-PAST:]) if clock - each.clock < PAST]
+        if any(clash(before.one, one, clock - before.clock) for before in near):
             return True
-        arrivals = [
-            (_arrival(before.one, before.clock), before.number) for before in under_way if is_result(before.one)
-        ]
+        arrivals = [(_arrival(before.one, before.clock), before.number) for before in near if is_result(before.one)]
         if any(at > clock and number == self._taken.get(place) for at, number in arrivals):
             return True
         last = self._begun.get(place) in self._lasting
