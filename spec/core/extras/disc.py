@@ -127,7 +127,8 @@ class DiscMap(Extra):
         return lines.entries if lines else self._entries(spec, self.displacement(spec))
 
     def _entries(self, spec: Numbers, form: Displacement) -> tuple[int, ...]:
-        return tuple(round(each / float(form.unit)) for each in self._known(spec))
+        unit = float(form.unit)
+        return tuple(round(each / unit) for each in self._known(spec))
 
     def _known(self, spec: Numbers) -> tuple[float, ...]:
         return self.file.disc.displacement if self.file else (0.0,) * spec.encoder.encoder_counts
