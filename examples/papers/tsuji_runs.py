@@ -108,7 +108,7 @@ def fig09(lab: Lab) -> Result:
     encoding = lab.turn(m, "ramp:12.3rad/s:12.9rad/s:1s", vibration="0.5mrad:170Hz", nonuniformity=0.2)
     runs = [lab.golden(spec, encoding) for spec in (m, plain, cancelled)]
     instants = np.arange(0.05, 1, TICK)
-    truth = encoding.motion_speed(instants)
+    truth = encoding.motion.speed(instants)
     errors = [_rms(_held(run, spec, instants) - truth) for run, spec in zip(runs, (m, plain, cancelled), strict=True)]
 
     m_e = runs[0].ticks.pulse_count[int(0.05 / TICK) :]

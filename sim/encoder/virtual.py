@@ -386,10 +386,6 @@ class Encoding:
         """Return angle of the shaft in rad, vibration included, at times `t` in seconds."""
         return self._shaft.angle(t)
 
-    def motion_speed(self, t: ArrayLike) -> FloatArray:
-        """Return speed of the motion in rad/s, without vibration, at times `t` in seconds."""
-        return self.motion.speed(t)
-
     @property
     def _shaft(self) -> VibratingShaft:
         return self.encoder.shaft(self.motion)

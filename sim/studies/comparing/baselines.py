@@ -53,11 +53,6 @@ class Steps:
             raise ValueError(f"counts_per_rev must be at least 1, not {self.counts_per_rev}")
 
     @staticmethod
-    def of_recording(recording: Recording, counts_per_rev: int, decoding: int = 4) -> "Steps":
-        """Return what an ideal decoder counts; a change of both lines at once counts as none."""
-        return Steps.of_sensor(recording, Encoder(counts_per_rev // decoding, decoding))
-
-    @staticmethod
     def of_sensor(recording: Recording, encoder: Encoder) -> "Steps":
         """Return what an ideal decoder of a sensor counts."""
         step, _ = counted(encoder, recording.lines)

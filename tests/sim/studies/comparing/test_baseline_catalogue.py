@@ -9,15 +9,15 @@ from support.lines import record
 from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES, baseline_model, settings, steps_curve
 from tachometry.sim.studies.comparing.baselines import Steps, low_pass, mixed_method, tracking_loop
 from tachometry.sim.studies.comparing.estimators import kalman
+from tachometry.spec import Encoder
 
-RECORDING = record("ramp:0:100rad/s:60ms", pulses_per_rev=100).recording
-STEPS = Steps.of_recording(RECORDING, 400)
+STEPS = Steps.of_sensor(record("ramp:0:100rad/s:60ms", pulses_per_rev=100).recording, Encoder(100))
 READ = replace(STEPS, reads=np.arange(1e-3, 60e-3, 1e-3))
 
 
 def test_options_are_those_of_the_model() -> None:
     def speed(name: str) -> np.ndarray:
-        return steps_curve(name, Steps.of_recording(RECORDING, 400)).estimate.velocity
+        return steps_curve(name, STEPS).estimate.velocity
 
     np.testing.assert_array_equal(
         speed("kalman:order=3:process-noise=1e5:period=1ms"), kalman(STEPS, 1e-3, 1e5, 3).velocity
@@ -29,10 +29,7 @@ def test_options_are_those_of_the_model() -> None:
         speed("simplefoc:filter=2ms"), low_pass(mixed_method(STEPS, 1e-3).velocity, 1e-3, 2e-3)
     )
     assert len(speed("foaw:best-fit=no:longest=7:noise-bound=1.5")) == 600
-    assert (
-        steps_curve("hostmot2:period=2ms", Steps.of_recording(RECORDING, 400)).what
-        == "LinuxCNC: timestamps: period 2ms"
-    )
+    assert steps_curve("hostmot2:period=2ms", STEPS).what == "LinuxCNC: timestamps: period 2ms"
 
 
 @pytest.mark.parametrize("method", BASELINES)
@@ -71,5 +68,5 @@ def test_what_is_swept_makes_a_difference(method: str) -> None:
 )
 def test_refusals(name: str, message: str) -> None:
     with pytest.raises(ValueError, match="must") as error:
-        steps_curve(name, Steps.of_recording(RECORDING, 400))
+        steps_curve(name, STEPS)
     assert str(error.value).startswith(message)

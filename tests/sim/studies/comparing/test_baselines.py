@@ -20,6 +20,7 @@ from tachometry.sim.studies.comparing.baselines import (
     timestamp_method,
     tracking_loop,
 )
+from tachometry.spec import Encoder
 
 PERIOD = 1e-3
 CPR = 400
@@ -41,7 +42,7 @@ RAW: list[Method] = [raw_difference, timestamp_method, mixed_method, slow_loop]
 
 
 def steps_of(motion: str, **parameters: object) -> Steps:
-    return Steps.of_recording(record(motion, pulses_per_rev=CPR // 4, **parameters).recording, CPR)
+    return Steps.of_sensor(record(motion, pulses_per_rev=CPR // 4, **parameters).recording, Encoder(CPR // 4))
 
 
 def steps_at(*times: float, signs: str = "", duration: float = 1.0) -> Steps:
@@ -172,7 +173,7 @@ def test_every_method_is_its_description(seed: int) -> None:
 def test_steps_are_those_of_the_decoder() -> None:
     recording = record("sine:30rad/s:20Hz:200ms", pulses_per_rev=CPR // 4, illegal=0.05, index=True).recording
     for decoding in (1, 2, 4):
-        steps = Steps.of_recording(recording, CPR, decoding)
+        steps = Steps.of_sensor(recording, Encoder(CPR // decoding, decoding))
         position, _ = decode(recording, decoding)
         counted = np.append(0, np.cumsum(steps.step))
         at = np.searchsorted(steps.time, recording.time, side="right")
@@ -265,7 +266,7 @@ def test_delay_of_each_method(method: Method, period: float, delay_ms: float) ->
     motion = "ramp:0:200rad/s:100ms+ramp:200rad/s:50rad/s:60ms+ramp:50rad/s:300rad/s:150ms"
     motion += "+ramp:300rad/s:-100rad/s:120ms+ramp:-100rad/s:120rad/s:90ms"
     encoding = record(motion, pulses_per_rev=2000)
-    estimate = method(Steps.of_recording(encoding.recording, 8000), period)
+    estimate = method(Steps.of_sensor(encoding.recording, Encoder(2000)), period)
     delay = delay_seconds(estimate.time, estimate.velocity, encoding.true_speed(estimate.time))
     assert 1e3 * delay == pytest.approx(delay_ms, abs=0.04)
 

@@ -88,7 +88,7 @@ def test_every_method_follows_a_constant_speed(tmp_path: Path) -> None:
 
 def test_too_short_for_a_control_period() -> None:
     with pytest.raises(ValueError, match=r"^motion must last at least two control periods of hostmot2, not 1ms$"):
-        steps_curve("hostmot2", Steps.of_recording(record("stop:1ms").recording, 400))
+        steps_curve("hostmot2", Steps.of_sensor(record("stop:1ms").recording, Encoder(100)))
 
 
 # --- when a value is read

@@ -12,6 +12,7 @@ from tachometry.sim.encoder.motion import FloatArray
 from tachometry.sim.studies.comparing.baseline_catalogue import BASELINES
 from tachometry.sim.studies.comparing.baselines import Steps
 from tachometry.sim.studies.comparing.edge_filters import edge_kalman
+from tachometry.spec import Encoder
 
 CPR = 400
 COUNT = 2 * math.pi / CPR
@@ -20,7 +21,7 @@ COUNT = 2 * math.pi / CPR
 def edges_of(motion: str) -> tuple[Steps, FloatArray, FloatArray]:
     """Return the steps, and stamps (s) and places of the edges."""
     recording = record(motion, pulses_per_rev=CPR // 4, jitter=0.05, seed=3).recording
-    steps = Steps.of_recording(recording, CPR)
+    steps = Steps.of_sensor(recording, Encoder(CPR // 4))
     stamp, place = np.floor(steps.time * 1e6 + 1e-6) * 1e-6, np.cumsum(steps.step) - steps.step / 2
     return replace(steps, reads=np.arange(2e-3, recording.duration, 2e-3), clock_s=1e-6), stamp, place
 

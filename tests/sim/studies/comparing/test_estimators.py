@@ -16,6 +16,7 @@ from tachometry.sim.studies.comparing.estimators import (
     kalman_gains,
     least_squares,
 )
+from tachometry.spec import Encoder
 
 PERIOD = 1e-3
 CPR = 400
@@ -29,7 +30,7 @@ def random_steps(seed: int) -> Steps:
     recording = record(
         f"{motion}+stop:150ms+sine:{speed[0]:.3f}rad/s:20Hz:90ms", pulses_per_rev=CPR // 4, jitter=0.05, seed=seed
     ).recording
-    return Steps.of_recording(recording, CPR)
+    return Steps.of_sensor(recording, Encoder(CPR // 4))
 
 
 def counts_of(*per_period: int) -> Steps:
