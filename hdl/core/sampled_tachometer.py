@@ -4,7 +4,9 @@ from amaranth import Module, Mux, Signal, Value
 from amaranth.lib import wiring
 
 from tachometry.hdl.core.tachometer import Tachometer
+from tachometry.hdl.front_end.conditioner import InputConditioner
 from tachometry.hdl.front_end.encoder_master import EncoderMaster
+from tachometry.hdl.front_end.pin_rise import PinRise
 from tachometry.hdl.front_end.sampled_position import SampledPosition
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.front_end.serial_encoder import SerialEncoder
@@ -27,7 +29,11 @@ class SampledTachometer(Tachometer):
         self.reader = SampledPosition(spec)
         self.master = None if spec.reads is None else master_of(spec.reads)
         self.read_fault = Signal(READ_FAULT_BITS)
-        self.controls, self.modulo_counter, self.index_capture = {}, None, None
+        self.modulo_counter, self.index_capture = None, None
+        self.position_counter, self.controls = self.reader, {}
+        if lines := spec.front_end.lines:  # the preset alone
+            self.conditioner = InputConditioner(lines=lines)
+            self.controls = {name: PinRise(spec.latency.tick) for name in lines}
 
     @property
     def settable(self) -> tuple[wiring.Component, ...]:
@@ -35,6 +41,8 @@ class SampledTachometer(Tachometer):
 
     def _place_front(self, m: Module) -> None:
         m.submodules.reader = self.reader
+        if self.controls:
+            m.submodules.conditioner = self.conditioner
 
     def _count(self, m: Module) -> dict[str, Value]:
         reader, sampled = self.reader, self._spec.encoder.sampled
@@ -51,7 +59,7 @@ class SampledTachometer(Tachometer):
         m.d.comb += self.read_fault.eq(Mux(reader.jump, JUMP, fault))
         drive(m, reader, {"last": self.sampling_clock.last})
         if self._spec.front_end.modulus is not None:
-            m.d.comb += self.position_modulo.eq(reader.position)
+            m.d.comb += self.position_modulo.eq(reader.place)
         shown = ("tick", "pulse_count", "overflow", "position", "position_valid", "decode_error")
         follow(m, self, reader, shown)
         names = ("coming", "next_count", "number", "times", "phase", "forgets", "silent", "elapsed", "length")

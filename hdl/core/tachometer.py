@@ -80,7 +80,7 @@ class Tachometer(Box):
             stretched=spec.facts.own_ticks,
             staged=latency - spec.latency.registers_steps > 2,
         )
-        self.position_counter = PositionCounter(spec.position_width, latency, spec.preset)
+        self.position_counter: Box = PositionCounter(spec.position_width, latency, spec.preset)
         self.controls = {name: PinRise(latency) for name in front.controls}
         self.modulo_counter = None if front.modulus is None else ModuloCounter(front.modulus, latency)
         self.index_capture = None

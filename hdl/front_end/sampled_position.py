@@ -14,29 +14,30 @@ class SampledPosition(Box):
     """Takes the last good read of each tick: gives the position, and its difference from the read before as m_e.
 
     Latency: `tick` is high `spec.latency.tick` clocks after the window's last clock; a read in that last clock still
-    belongs to the window. All outputs but `coming`, `next_count`, `decode_error` and `jump` change with `tick` alone.
+    belongs to the window. All outputs but `coming`, `next_count`, `decode_error` and `jump` change with `tick`.
 
-    The lower bits of the position are the read; the upper ones count how often that wraps. `zero` is subtracted.
+    The lower bits of the position are the read; the upper ones count how often that wraps. `zero` is subtracted. `load`
+    makes the position `value` in the next clock; while no read is known, it is left out.
     """
 
     def __init__(self, spec: TachometerSpec) -> None:
         sampled = spec.encoder.sampled
         assert sampled is not None
         longest = spec.tick.longest
-        self._spec, self._sampled = spec, sampled
-        self._most_age = sampled.most_age(longest)
-        count = signed(spec.widths.count)
-        self._zeroed = spec.encoder.zero is not None
+        self._spec, self._sampled, self._most_age = spec, sampled, sampled.most_age(longest)
+        count, place = signed(spec.widths.count), signed(spec.position_width)
+        self._zeroed, self._loads = spec.encoder.zero is not None, spec.preset is not None
         super().__init__(
             **{port.name: In(port.width) for port in sampled.ports(longest)},
             last=In(1),  # high in the last clock of a window
-            **only_if(self._zeroed, zero=In(signed(spec.position_width), init=spec.encoder.zero or 0)),
+            **only_if(self._zeroed, zero=In(place, init=spec.encoder.zero or 0)),
+            **only_if(self._loads, load=In(1), value=In(place, init=spec.preset or 0)),
             tick=Out(1),
             pulse_count=Out(count),  # counts since the read before; 0 without a read, or without one before
             overflow=Out(1),  # it was saturated
             coming=Out(1),  # `tick` is high in the next clock
             next_count=Out(count),  # what `pulse_count` is then
-            position=Out(signed(spec.position_width)),
+            position=Out(place),
             position_valid=Out(1),
             decode_error=Out(1),  # a read is not taken
             number=Out(1),  # of reads that were taken in the tick: the last one, or none
@@ -48,6 +49,7 @@ class SampledPosition(Box):
             jump=Out(1),  # a read is not taken, as it is too far from the one before
             elapsed=Out(range(spec.timing.max_ticks + 1), init=spec.timing.max_ticks),  # from the read before
         )
+        self.place = Signal(place) if self._loads else self.position  # which no load changes
         # Of the window that has not ended.
         self.open_number = Signal()
         self.open_sample = Signal(sampled.width)
@@ -134,13 +136,7 @@ class SampledPosition(Box):
             self.position_valid.eq(self.silent != most_ticks),
             self.phase.eq(self.sample_before),
         ]
-        whole = Cat(self.sample_before, self.turns)
-        if self._zeroed:
-            zero = Signal.like(self.zero, name="zero_before")
-            with m.If(self.coming):
-                m.d.sync += zero.eq(self.zero)
-            whole -= zero
-        m.d.comb += self.position.eq(whole)
+        self._place(m)
         held, overflow = saturate(m, moved, self._spec.widths.max_pulse_count)
         m.d.comb += self.next_count.eq(Mux(known, held, 0))
         waited = self.silent + self.position_valid
@@ -162,3 +158,18 @@ class SampledPosition(Box):
                     self.sample_before.eq(self.open_sample),
                     self.turns.eq(Mux(known, self.turns + turn, 0)),
                 ]
+
+    def _place(self, m: Module) -> None:
+        """Drive the position: the read, with its turns, less what is subtracted from it."""
+        whole = Cat(self.sample_before, self.turns)
+        if self._zeroed:
+            zero = Signal.like(self.zero, name="zero_before")
+            with m.If(self.coming):
+                m.d.sync += zero.eq(self.zero)
+            whole -= zero
+        m.d.comb += self.place.eq(whole)
+        if self._loads:
+            ahead = Signal.like(self.place)
+            with m.If(self.load & self.position_valid):
+                m.d.sync += ahead.eq(self.place - self.value)
+            m.d.comb += self.position.eq(self.place - ahead)

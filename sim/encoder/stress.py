@@ -24,7 +24,7 @@ def stress(spec: TachometerSpec, seed: int, n_edges: int = 300) -> PinTrace:
     rng, sensor = np.random.default_rng(seed), spec.encoder.kind
     if spec.encoder.sampled is not None:
         trace = stress_reads(spec, seed, n_edges)
-        return trace.completed(spec) if spec.reads else _ticked(spec, trace, rng)
+        return _controlled(spec, trace.completed(spec) if spec.reads else _ticked(spec, trace, rng), rng)
     cycles, longest = spec.timing.tick_cycles, spec.timing.tick_cycles * spec.timing.max_ticks
     gaps, turns = [], []
     steps = not sensor.cycle  # each is a pulse

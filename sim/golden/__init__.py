@@ -10,7 +10,7 @@ from tachometry.sim.golden.front_end import Steps, count, decoded
 from tachometry.sim.golden.low_pass import filtered
 from tachometry.sim.golden.methods import MODELS
 from tachometry.sim.golden.output import in_unit, with_age, with_whole
-from tachometry.sim.golden.sampled import ticks_of
+from tachometry.sim.golden.sampled import ticks_of, with_presets
 from tachometry.sim.golden.sampling import windows
 from tachometry.sim.golden.standstill import with_standstill
 from tachometry.sim.signals.axes import AxesTrace, Trace
@@ -51,7 +51,8 @@ def tables(spec: TachometerSpec, trace: PinTrace, steps: Steps | None = None) ->
         ticks, index = count(spec, steps, last, beyond)
     else:
         none = np.empty(0, dtype=np.int64)
-        ticks, index = ticks_of(spec, steps.reads, last), Table(none, {"index_position": none})
+        ticks = with_presets(spec, ticks_of(spec, steps.reads, last), steps.presets, steps.values)
+        index = Table(none, {"index_position": none})
     del last  # as long as all ticks
     if spec.facts.rests_with == TICK:
         ticks = with_standstill(spec, ticks, nominal)

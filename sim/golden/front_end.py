@@ -3,6 +3,7 @@
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from tachometry.sim.golden.tooth_wheel import Teeth, filled
 from tachometry.sim.signals.recording import PinTrace, merged, packed
 from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, TachometerSpec
+from tachometry.spec.core.reads import SYNCHRONISER
 from tachometry.spec.core.sensors import changes as changes_of
 from tachometry.spec.core.sensors import packed_levels
 
@@ -209,11 +211,11 @@ def _indices(
 
 def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     """Return conditioned and decoded lines; of an encoder that is read, the clocks of wrong reads."""
-    if spec.encoder.sampled is not None:
-        none, reads = _none(), Reads.of(spec, trace)
-        return Steps(none, none, reads.errors, none, none, reads=reads)
-    returned = [np.empty(0, dtype=np.int64)]
-    encoder = spec.encoder
+    returned, none, encoder = [_none()], _none(), spec.encoder
+    if encoder.sampled is not None:
+        reads = Reads.of(spec, trace)
+        found = Steps(none, none, reads.errors, none, none, reads=reads)
+        return _asked(spec, found, partial(changes, trace), SYNCHRONISER)
 
     def conditioned(name: str) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
         clock, level = changes(trace, name)
@@ -238,14 +240,24 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     rises, wide, missed = at[:0], at[:0], at[:0]
     if spec.index:
         rises, wide, missed = _indices(spec, clock, levels, step, conditioned("z"))
-    asked = {"preset": at[:0], "home": at[:0]}
-    for name in spec.front_end.controls:
-        at_pin, level = conditioned(name)
-        asked[name] = at_pin[1:][level[1:] > level[:-1]] + spec.latency.pin_to_count
     swallowed = np.sort(np.concatenate(returned)) + 3
     read = (at, packed([level ^ np.uint8(name in encoder.inverted) for name, level in lines.items()]).astype(np.int64))
     found = Steps(at[1:], step[1:], at[wrong], rises, swallowed, changed, wide, missed, rises, pins=pins, levels=read)
-    return found.asked(spec, asked["preset"], np.full(len(asked["preset"]), spec.preset or 0), asked["home"])
+    return _asked(spec, found, conditioned, spec.latency.pin_to_count)
+
+
+def _asked(
+    spec: TachometerSpec,
+    steps: Steps,
+    conditioned: Callable[[str], tuple[NDArray[np.int64], NDArray[np.uint8]]],
+    delay: int,
+) -> Steps:
+    """Return the same steps with the presets and the homing of the pins, whose steps come `delay` clocks later."""
+    asked = {"preset": _none(), "home": _none()}
+    for name in spec.front_end.controls:
+        at, level = conditioned(name)
+        asked[name] = at[1:][level[1:] > level[:-1]] + delay
+    return steps.asked(spec, asked["preset"], np.full(len(asked["preset"]), spec.preset or 0), asked["home"])
 
 
 def _without_gaps(spec: TachometerSpec, steps: Steps, trace: PinTrace) -> Steps:

@@ -126,18 +126,17 @@ class GoldenBank:
         if not spec.front_end.controls and spec.front_end.modulus is None and spec.encoder.zero is None:
             return
         written_at = self._written(accesses)
-        if (reads := self._pins.reads) is not None:
+        pins = self._pins
+        if pins.reads is not None:
             zero = self._held("zero", spec.encoder.zero or 0, self._tables[TICK].clock - 1)
-            self._steps = replace(self._pins, reads=replace(reads, zero=zero))
-            self._tables = golden.tables(spec, self._trace, self._steps)
-            return
+            pins = replace(pins, reads=replace(pins.reads, zero=zero))
         ahead = spec.latency.tick - 1
         clocks = {
-            name: np.union1d(pins, np.array([at for at, _ in written_at[f"{name}_now"]], dtype=np.int64) - ahead)
-            for name, pins in (("preset", self._pins.presets), ("home", self._pins.arms))
+            name: np.union1d(of_pins, np.array([at for at, _ in written_at[f"{name}_now"]], dtype=np.int64) - ahead)
+            for name, of_pins in (("preset", pins.presets), ("home", pins.arms))
         }
         values = self._held("preset_value", spec.preset or 0, clocks["preset"] + ahead)
-        self._steps = self._pins.asked(spec, clocks["preset"], values, clocks["home"])
+        self._steps = pins.asked(spec, clocks["preset"], values, clocks["home"])
         self._tables = golden.tables(spec, self._trace, self._steps)
         if (modulus := spec.front_end.shifted_modulus) is not None:
             ticks = self._tables[TICK]

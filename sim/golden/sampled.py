@@ -149,3 +149,13 @@ def ticks_of(spec: TachometerSpec, reads: Reads, last: NDArray[np.int64]) -> Tab
     if spec.front_end.modulus is not None:
         columns["position_modulo"] = position % int(spec.front_end.modulus)
     return Table(last + spec.latency.tick, columns)
+
+
+def with_presets(spec: TachometerSpec, ticks: Table, clock: NDArray[np.int64], values: NDArray[np.int64]) -> Table:
+    """Return ticks whose position is set in these clocks: that of the tick before becomes the value, if it is valid."""
+    shown = np.searchsorted(ticks.clock - spec.latency.tick, clock)  # from these ticks on
+    valid = np.append(False, ticks.position_valid)[shown]
+    shown, wrap = shown[valid], 1 << spec.position_width - 1
+    ahead = np.append(0, ticks.position[shown - 1] - values[valid])
+    position = ticks.position - ahead[np.searchsorted(shown, np.arange(len(ticks)), side="right")]
+    return ticks.having(position=(position + wrap & 2 * wrap - 1) - wrap)

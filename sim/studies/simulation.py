@@ -269,8 +269,10 @@ def _axis(
         sampled = _sampled(max(clock, 0), spec.timing.clock_hz)
         counts_in = int(truth.true_position(sampled, spec.encoder.decoding))
     # What sets the position does not undo what has been counted.
-    moves = spec.front_end.moves_position and spec.encoder.sampled is None
-    counts_out = int(run.ticks.pulse_count.sum() if moves else run.ticks.position[-1])
+    reads, ticks = spec.encoder.sampled is not None, run.ticks
+    moves = spec.front_end.moves_position and (not reads or spec.preset is not None)
+    first = ticks.position[ticks.position_valid.argmax()] if reads else 0
+    counts_out = int(first + ticks.pulse_count.sum() if moves else ticks.position[-1])
     n_merged = recording.n_merged(spec.timing.clock_hz, run.n_clocks)
     error = None if truth is None else tally.error
     return Axis(spec, run, tally, recording, truth, n_merged, counts_in, counts_out, held, error)

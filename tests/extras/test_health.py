@@ -40,7 +40,8 @@ CASES = (
 )
 READ = Case(
     "m",
-    "sensor=sampled ppr=512 bits=9 tick=8clk max-time=80clk max-speed=3000rpm health=yes zero=5 position-modulo=64",
+    "sensor=sampled ppr=512 bits=9 tick=8clk max-time=80clk max-speed=3000rpm health=yes zero=5 preset=-9 "
+    "position-modulo=64",
     edges=60,
 )
 BUS = Case("m", "ppr=2 health=yes health-edges=3 health-errors=0 differential=3 index=yes index-at=edge", swings=True)
