@@ -298,7 +298,7 @@ quiet:
     block {; shown:; tick by; velocity product shown
     edges w = doubt + log_X - slips hi+ slips; reads w = doubt + log_X
     least_shown + ~ lo+ all_shown hi+ least_shown out velocity; settles speed = sum
-    limit + w over 1; velocity_std - log_T + ~ exp; w = ~; slope by
-    settles if empty goto settle; goto told
+    limit + w over 1; velocity_std - log_T + ~ exp; w = ~; slope by; settles if empty goto settle; settles goto told
+    as product acceleration; w max least min most_std out velocity_std; ~ out acceleration; end
 same_place:; w = ~; goto place; }
 """

@@ -72,7 +72,7 @@ def doubled(code: list[Instruction], labels: dict[str, int]) -> tuple[list[Instr
 
     It is that of several counts where it was, so no jump there is for one count; elsewhere all are.
     """
-    often = {labels[name] for name in ("known", "lone", "heard", "sized") if name in labels}
+    often = {labels[name] for name in ("known", "lone", "heard", "sized", "ready", "five") if name in labels}
     entered = {labels[one.target]: one.target for one in code if one.target and labels[one.target] not in often}
     made: list[Instruction] = []
     places: list[int] = []

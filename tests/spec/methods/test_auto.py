@@ -38,7 +38,7 @@ CHOICES = [
     ({"axes": "4", "tick": FOUR}, "track", f"as the turns of 4 axes fit the tick of {clocks(FOUR)} clocks"),
     ({"axes": "32"}, "track", "as the turns of 32 axes fit the tick of 4800 clocks"),
     ({"axes": "4", "tick": "5us"}, "s", f"as track needs --tick {LEAST} and mt is of one axis"),
-    ({"axes": "64", "clock": "12MHz"}, "s", "as track needs 11 machines or --tick 736us and mt is of one axis"),
+    ({"axes": "64", "clock": "12MHz"}, "s", "as track needs 10 machines or --tick 704us and mt is of one axis"),
     ({"bounds": "yes"}, "mt", "as it has --bounds"),
     ({"bounds": "yes", "tick": "250ns"}, "s", "as mt needs a tick of 23 clocks"),
     ({"max-memory": "5ms"}, "track", "as it has --max-memory"),
@@ -102,7 +102,7 @@ def test_what_it_is_for_decides() -> None:
 
 TICKS = [
     ({"clock": "48MHz"}, "track", 960),
-    ({"clock": "12MHz"}, "track", 300),  # 25 µs: 269 clocks with multipliers
+    ({"clock": "12MHz"}, "track", 300),  # 25 µs: 260 clocks with multipliers
     ({"clock": "12.288MHz"}, "track", 1536),  # of 20 µs no whole number
     ({"clock": "1.2MHz"}, "track", 300),  # 250 µs
     ({"clock": "200kHz"}, "s", 4),  # track would need 2 ms

@@ -40,7 +40,7 @@ def test_the_shortest_tick_is_that_of_the_program(multiplier: str) -> None:
     """The update comes earlier, and the velocity of the quick machine before the rest of it."""
     spec = core(multiplier=multiplier)
     shortest = spec.times.min_tick_cycles
-    assert shortest == spec.program.all_clocks == spec.latency.busy
+    assert shortest == spec.program.all_clocks == spec.latency.busy <= {"serial": 870, "block": 260}[multiplier]
     assert spec.latency.datapath == spec.program.velocity_clocks <= spec.latency.native_update == spec.program.clocks
     assert spec.program.clocks < shortest
     assert ("tick_to_update" in spec.latency_entries) == (multiplier == "block")
