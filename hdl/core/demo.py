@@ -6,6 +6,7 @@ from amaranth.lib import wiring
 from tachometry.hdl.bus.telemetry import TelemetrySender
 from tachometry.hdl.bus.uart import UartBridge
 from tachometry.hdl.core.bus_tachometer import bridge_on
+from tachometry.hdl.core.emulated_reads import EmulatedReads
 from tachometry.hdl.core.emulator import EncoderEmulator
 from tachometry.hdl.core.register_core import RegisterCore
 from tachometry.hdl.wires.ports import Box, by_name, drive, follow, hand_through, members
@@ -31,6 +32,7 @@ class Demo(Box):
         self.core = RegisterCore(registers)
         self._lines = [pin.name for pin in spec.ports.pins if pin.name in ENCODER_LINES]
         self.emulator = EncoderEmulator(*emulated(spec))
+        self.reads = EmulatedReads(spec) if registers.reads else None
         self.bridge = bridge_on(registers, bus)
         self.telemetry: TelemetrySender | None = None
         if isinstance(self.bridge, UartBridge):
@@ -86,6 +88,11 @@ class Demo(Box):
             if name in lines:
                 drive(m, self, {f"emulated_{name}": emulated})
             drive(m, core, {name: Mux(bank.emulated, emulated, pin)})
+        if (reads := self.reads) is not None:
+            m.submodules.reads = ResetInserter(bank.restart)(reads)
+            follow(m, reads, emulator, ("a", "b"))
+            given = by_name(reads, self._map.reads)
+            drive(m, core, given | {"sample_valid": reads.sample_valid & bank.emulated})
 
     def _enable(self, m: Module) -> None:
         """Give the loop its enable, which comes from a pin, and which many flip-flops follow."""

@@ -56,7 +56,7 @@ class SampledTachometer(Tachometer):
             warning = self.master.sample_valid & self.master.sample_warning & ~reader.decode_error
             (warned,) = delay(m, warning, clocks=reader.spent)  # unless it is a jump
         fault = Mux(reader.decode_error, Mux(reader.sample_ok, NO_ANSWER, wrong), Mux(warned, WARNING, 0))
-        m.d.comb += self.read_fault.eq(Mux(reader.jump, JUMP, fault))
+        m.d.comb += self.read_fault.eq(Mux(reader.refused, JUMP, fault))
         drive(m, reader, {"last": self.sampling_clock.last})
         if self._spec.front_end.modulus is not None:
             m.d.comb += self.position_modulo.eq(reader.place)

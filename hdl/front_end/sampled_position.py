@@ -14,7 +14,7 @@ class SampledPosition(Box):
     """Takes the last good read of each tick: gives the position, and its difference from the read before as m_e.
 
     Latency: `tick` is high `spec.latency.tick` clocks after the window's last clock; a read in that last clock still
-    belongs to the window. All outputs but `coming`, `next_count`, `decode_error` and `jump` change with `tick`.
+    belongs to the window. All outputs but `coming`, `next_count`, `decode_error` and `refused` change with `tick`.
 
     The lower bits of the position are the read; the upper ones count how often that wraps. `zero` is subtracted. `load`
     makes the position `value` in the next clock; while no read is known, it is left out.
@@ -46,7 +46,7 @@ class SampledPosition(Box):
             phase=Out(sampled.width),  # the read
             silent=Out(range(spec.timing.max_ticks + 1), init=spec.timing.max_ticks),  # ticks since a read
             forgets=Out(1),  # tracking begins anew after the tick
-            jump=Out(1),  # a read is not taken, as it is too far from the one before
+            refused=Out(1),  # a read is not taken, as it is too far from the one before
             elapsed=Out(range(spec.timing.max_ticks + 1), init=spec.timing.max_ticks),  # from the read before
         )
         self.place = Signal(place) if self._loads else self.position  # which no load changes
@@ -70,7 +70,7 @@ class SampledPosition(Box):
         m.d.comb += [
             read.eq(-self.sample if self._spec.encoder.reverse else self.sample),
             good.eq(self.sample_valid & self.sample_ok & young & ~self.checks.any()),
-            self.decode_error.eq((self.sample_valid & ~good) | self.jump),
+            self.decode_error.eq((self.sample_valid & ~good) | self.refused),
             self.coming.eq(*delay(m, self.last, clocks=self._spec.latency.tick - 1)),
         ]
         m.d.sync += [self.tick.eq(self.coming), self.open_times.eq(self.open_times + 1)]
@@ -107,8 +107,8 @@ class SampledPosition(Box):
         size = Cat(way[-1], (way ^ way[-1].replicate(reach.width))[:-1])
         m.d.comb += [
             way.eq(read - Mux(self.checks[0], self.open_sample, before)),
-            self.jump.eq(self.checks[-1] & held & far.all()),
-            taken.eq(self.checks[-1] & ~self.jump),
+            self.refused.eq(self.checks[-1] & held & far.all()),
+            taken.eq(self.checks[-1] & ~self.refused),
         ]
         m.d.sync += [
             self.checks.eq(Cat(good, self.checks)),

@@ -309,8 +309,8 @@ class Encoder:
 
     @property
     def plain(self) -> bool:
-        """Whether it is quadrature, whose lines are as they come."""
-        return self.sensor == "quadrature" and not self.reverse and not self.invert
+        """Whether it is quadrature, whose lines are as they come, or sampled: what demos emulate."""
+        return self.sensor in ("quadrature", "sampled") and not self.reverse and not self.invert
 
     @property
     def encoder_counts(self) -> int:

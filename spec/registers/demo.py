@@ -48,7 +48,7 @@ class DemoMap(RegisterMap):
 
     def __post_init__(self) -> None:
         if not self.spec.encoder.plain:
-            raise ParameterError("sensor", "must be quadrature with a demo, its lines as they come: it emulates these")
+            raise ParameterError("sensor", "must be quadrature or sampled with a demo, as it comes: it emulates these")
         refuse(self.spec.extras, "demo")
 
     @cached_property
@@ -59,9 +59,15 @@ class DemoMap(RegisterMap):
 
     @property
     def inputs(self) -> list[Port]:
-        """Inputs, but for complements, which a demo makes of the lines, as boards have no pins for them."""
-        made = {f"{line}_n" for line in self.spec.front_end.complemented}
+        """Inputs, but for complements and reads, which a demo makes of the lines, as boards have no pins for them."""
+        made = {f"{line}_n" for line in self.spec.front_end.complemented} | {*self.reads}
         return [port for port in self.core_ports if port.direction == "input" and port.name not in made]
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """Inputs of an encoder that is read."""
+        sampled = self.spec.encoder.sampled
+        return tuple(port.name for port in sampled.ports(self.spec.tick.longest)) if sampled else ()
 
     @property
     def emulated(self) -> tuple[Field, ...]:

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from fractions import Fraction
 
 from tachometry.spec.core.tachometer import TachometerSpec
 
@@ -25,6 +26,7 @@ NOISE_BIT = 7  # there is noise while this one and more are below the setting, w
 
 # Clocks after which the emulated lines follow the phase.
 LATENCY = 3
+READ_AGE = 1  # clocks from the lines to a read of them
 
 
 @dataclass(frozen=True)
@@ -67,5 +69,6 @@ def fastest(spec: TachometerSpec) -> float:
 
 
 def _periods(spec: TachometerSpec, radians: float) -> float:
-    """Return periods of a line in an angle of the shaft."""
-    return radians / (2 * math.pi) * spec.encoder.pulses_per_rev * spec.encoder.turns
+    """Return periods of a line in an angle of the shaft; of an encoder that is read, an edge is an LSB."""
+    periods = Fraction(spec.encoder.pulses_per_rev, 4 if spec.encoder.sampled else 1)
+    return radians / (2 * math.pi) * float(periods * spec.encoder.turns)

@@ -21,6 +21,7 @@ CORES = {
         "s", {**_COMMON, "max-time": "2ms", "index": "yes", "age": "yes", "filter": "2"} | WATCHED
     ),
     "external tick, bounds": of_texts("m", {**_COMMON, "max-time": "1ms", "external-tick": "yes", "bounds": "yes"}),
+    "reads": of_texts("m", {"sensor": "sampled", "bits": "2+6", "clock": "8MHz", "tick": "20us", "health": "yes"}),
     "index that resets": of_texts("rairan", {**_COMMON, "max-time": "2ms", "index": "yes", "index-reset": "yes"}),
 }
 
@@ -54,7 +55,7 @@ def random_steps(registers: DemoMap, seed: int) -> list[Step]:
     ]
 
 
-@pytest.mark.parametrize("name", only([*CORES][:1], [*CORES]))
+@pytest.mark.parametrize("name", only([*[*CORES][:1], "reads"], [*CORES]))
 def test_every_frame_is_that_of_the_golden_models(name: str) -> None:
     spec = CORES[name]
     registers = DemoMap(spec)
