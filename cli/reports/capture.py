@@ -95,15 +95,14 @@ def _index_place(axis: Axis) -> list[str]:
     """Return whether the index is at other counts forward than backward, as where it is wide or low."""
     near = np.abs(axis.index_distances)
     near = near[(near > 0) & (near <= 2 * axis.spec.encoder.decoding) & (near < axis.spec.encoder.encoder_counts / 2)]
-    recording = axis.recording
-    if not len(near) or isinstance(recording, Flow) or recording.z is None:
+    if not len(near) or (lasts := axis.index_lasts) is None:
         return []
     if axis.spec.front_end.index_state is not None:
         return [
             f"to and fro, the index is found {int(near.max())} counts apart: z is high for longer than a period of A, "
             "and meets its state twice; find it in one direction alone"
         ]
-    high = float(np.diff(recording.time, append=recording.duration) @ recording.z) / recording.duration
+    high = lasts.sum() / axis.recording.lasting.sum()
     why = (
         f"z is high {100 * high:.3g} % of the time, so it may be low at the index, and must be inverted"
         if high > 0.5
@@ -114,8 +113,9 @@ def _index_place(axis: Axis) -> list[str]:
 
 def _index_missed(axis: Axis) -> list[str]:
     """Return whether Z comes without the state in which the index is taken, and in which state it mostly is."""
-    if not (times := len(axis.run.tables.get(MISSED, ()))) or (usual := axis.state_of_index) is None:
+    if not (times := axis.tally.rows[MISSED]) or (lasts := axis.index_lasts) is None:
         return []
+    usual = f"A={lasts.argmax() & 1},B={lasts.argmax() >> 1}"
     return [
         f"{plural(times, 'time')} z came and went without the state in which the index is taken; "
         f"it is mostly high in {usual}: type --index-at {usual}, or edge"

@@ -95,12 +95,11 @@ def _of_capture(axis: Axis) -> list[str]:
 
 def _index(axis: Axis) -> str:
     """Return how often the index came, where, and what was wrong with it."""
-    run = axis.run
-    last = f", the last at position {run.index.index_position[-1]}" if len(run.index.clock) else ""
+    rows, places = axis.tally.rows, np.concatenate(axis.tally.places)
+    last = f", the last at position {places[-1]}" if len(places) else ""
     wrong = {WIDE: "wider than a period", MISSED: "passed by without the state of --index-at"}
-    found = {text: len(run.tables.get(name, ())) for name, text in wrong.items()}
-    more = "".join(f"; {text} {number} times" for text, number in found.items() if number)
-    return f"{len(run.index.clock)} times{last}{index_distance(axis)}{more}"
+    more = "".join(f"; {text} {rows[name]} times" for name, text in wrong.items() if rows[name])
+    return f"{len(places)} times{last}{index_distance(axis)}{more}"
 
 
 def _rows(axis: Axis) -> list[tuple[str, str]]:

@@ -122,6 +122,12 @@ def _none() -> NDArray[np.int64]:
     return np.empty(0, dtype=np.int64)
 
 
+# clocks of `Steps`, and what it has for each
+_EVENTS = {"clock": ("step", "displaced", "mapped"), "presets": ("values",)} | dict.fromkeys(
+    ("errors", "index", "swallowed", "wide", "missed", "z", "arms"), ()
+)
+
+
 @dataclass(frozen=True)
 class Steps:
     """Holds the steps that the decoder sees, on the core's clock."""
@@ -142,6 +148,8 @@ class Steps:
     presets: NDArray[np.int64] = field(default_factory=_none)
     values: NDArray[np.int64] = field(default_factory=_none)
     arms: NDArray[np.int64] = field(default_factory=_none)  # clocks in which the next index is let through
+    turned: int = 0  # counts since the zero of `position_modulo`, before the first step
+    homed: bool = False  # before the first of `arms`
     wheel: Teeth | None = None  # of a wheel with missing teeth, the teeth
     reads: Reads | None = None  # of an encoder that is read
     # clocks from which levels of the lines of the sensor are seen, and these; only the last of a clock lasts
@@ -156,17 +164,18 @@ class Steps:
     pins: Mapping[str, tuple[NDArray[np.int64], NDArray[np.uint8]]] = field(default_factory=dict)
 
     def then(self, more: "Steps") -> "Steps":
-        """Return the steps of both, as `since` has them."""
-        names = ("clock", "step", "errors", "swallowed", "displaced", "mapped")
+        """Return the steps of both, as `part` has them."""
+        names = [name for at, others in _EVENTS.items() for name in (at, *others)]
         columns: dict[str, Any] = {name: np.append(getattr(self, name), getattr(more, name)) for name in names}
         return replace(self, **columns)
 
-    def since(self, clock: int) -> "Steps":
-        """Return the steps from a clock on, of which extras and the index are left out."""
-        step, error, glitch = (np.searchsorted(at, clock) for at in (self.clock, self.errors, self.swallowed))
-        none, map_ = self.index[:0], {name: getattr(self, name)[step:] for name in ("displaced", "mapped")}
-        rest = Steps(self.clock[step:], self.step[step:], self.errors[error:], none, self.swallowed[glitch:])
-        return replace(rest, **map_, fine_bits=self.fine_bits)
+    def part(self, begin: int, end: int = 1 << 62, later: int = 0) -> "Steps":
+        """Return what happens from a clock on and before another, put `later`; what only extras need is left out."""
+        columns: dict[str, Any] = {}
+        for at, others in _EVENTS.items():
+            rows = slice(*np.searchsorted(getattr(self, at), (begin, end)))
+            columns |= {name: getattr(self, name)[rows] for name in others} | {at: getattr(self, at)[rows] + later}
+        return Steps(**columns, fine_bits=self.fine_bits)
 
     def asked(
         self, spec: TachometerSpec, presets: NDArray[np.int64], values: NDArray[np.int64], arms: NDArray[np.int64]
@@ -336,7 +345,7 @@ def homed(spec: TachometerSpec, steps: Steps, clock: NDArray[np.int64]) -> NDArr
     """Return the clocks in which `homed` is high: the index was taken since it was let through."""
     known = np.searchsorted(steps.index + spec.latency.tick, clock, side="right")
     armed = np.searchsorted(steps.arms + spec.latency.tick, clock, side="right")
-    return np.append(-1, steps.index)[known] > np.append(-1, steps.arms)[armed]
+    return np.append(steps.homed - 1, steps.index)[known] > np.append(-1, steps.arms)[armed]
 
 
 def count(
@@ -366,10 +375,10 @@ def count(
     if spec.front_end.index_once:
         columns["homed"] = homed(spec, steps, strobe)
     if spec.front_end.modulus is not None:
-        zeros = np.append(0, origins.captured * spec.front_end.index_resets)
+        zeros = np.append(0, (origins.captured + steps.turned) * spec.front_end.index_resets) - steps.turned
         counts, parts = spec.front_end.modulus.as_integer_ratio()
-        shaft = (reached - zeros[places(steps.index, last, "right")]) % counts
-        columns["position_modulo"] = shaft * parts % counts // parts
+        columns["turned"] = reached - zeros[places(steps.index, last, "right")]
+        columns["position_modulo"] = columns["turned"] % counts * parts % counts // parts
     if spec.filter_clocks:
         columns["filtered_edges"] = 2 * np.minimum(places(steps.swallowed, strobe, "right"), (1 << 15) - 1)
     if steps.wheel is not None:

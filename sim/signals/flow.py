@@ -1,7 +1,7 @@
 """A recording that comes in parts, as a motion makes it or a file is read, and of which one part is held at a time."""
 
 from collections.abc import Callable, Generator, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -33,7 +33,7 @@ class Flow:
     What it says of itself is, before its end, of the parts that have come.
     """
 
-    lines: tuple[str, ...]
+    wires: tuple[str, ...]  # as of `Recording`, by name
     parts: Parts  # returns the source, if it is a capture, without what is counted here
     check: Callable[[int], object] = lambda _: None  # raises ValueError if so many rows are too many to be held
     duration: float | None = None  # seconds, if it is known
@@ -45,6 +45,7 @@ class Flow:
     # as of `Recording`
     n_changes: int = -1
     n_together: int = 0
+    lasting: NDArray[np.float64] = field(default_factory=lambda: np.zeros(256))
     _n_merged: int = 0
     _held: Recording | None = None  # rows of the piece that has come last, and of later ones
 
@@ -69,7 +70,7 @@ class Flow:
             held.append(part)
             self.check(self.n_changes + 1)
         time, level = np.concatenate([part.time for part in held]), np.concatenate([part.level for part in held])
-        return replace(Recording.of_level(time, level, held[-1].until, self.lines), source=self.source)
+        return replace(Recording.of_level(time, level, held[-1].until, self.wires), source=self.source)
 
     def moves(self) -> bool:
         """Return whether a line changes."""
@@ -96,7 +97,7 @@ class Flow:
             while begin < n_clocks:
                 self._n_merged = self.n_merged(clock_hz, begin)
                 end = cut(begin + size) if begin + size < n_clocks else n_clocks
-                self._held = Recording.of_level(held.time, held.level, until, self.lines)
+                self._held = Recording.of_level(held.time, held.level, until, self.wires)
                 yield self._held.place(clock_hz).completed(spec).part(begin, end)
                 first = int(np.searchsorted(self._held.clock(clock_hz), end)) - 1
                 held = Part(np.append(0.0, held.time[first + 1 :]), held.level[first:], until)
@@ -109,21 +110,23 @@ class Flow:
     def _counted(self) -> Iterator[Part]:
         """Yield the parts, and count what is in them; duration and source are known with the last one."""
         part: Part | None = next(self.parts)
-        last, at, moved = np.empty(0, dtype=np.uint8), 0.0, 0
+        last, at, moved = np.empty(0, dtype=np.uint8), np.empty(0), 0
         while part is not None:
-            level, at = np.append(last, part.level), float(np.append(at, part.time)[-1])
+            level, times = np.append(last, part.level), np.append(at, part.time)
+            self.lasting += np.bincount(level[:-1], np.diff(times), 256)
             self.n_changes += len(part.time)
-            self.n_together += Recording.of_level(np.zeros(len(level)), level, 0.0, self.lines).n_together
+            self.n_together += Recording.of_level(np.zeros(len(level)), level, 0.0, self.wires).n_together
             moved |= int(np.bitwise_or.reduce(level[1:] ^ level[:-1]))
             try:
                 following = next(self.parts)
             except StopIteration as end:
                 following, source = None, end.value
                 if source is not None and source.n_changes < 0:
-                    still = tuple(line for bit, line in enumerate(self.lines) if not moved >> bit & 1)
+                    still = tuple(line for bit, line in enumerate(self.wires) if not moved >> bit & 1)
                     source = replace(source, duration=part.until, n_changes=self.n_changes, still=still)
                 self.source = source and self.told(source)
-                part = part._replace(until=part.until + self.tail_s * (part.until <= at))
+                part = part._replace(until=part.until + self.tail_s * (part.until <= times[-1]))
                 self.duration = part.until
+                self.lasting[level[-1]] += part.until - times[-1]
             yield part
-            part, last = following, level[-1:]
+            part, last, at = following, level[-1:], times[-1:]

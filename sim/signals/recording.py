@@ -164,6 +164,11 @@ class Recording(_Lines):
         return int(np.count_nonzero(np.diff(clock[clock < n_clocks]) == 0))
 
     @property
+    def lasting(self) -> NDArray[np.float64]:
+        """Seconds for which each number of `level` holds."""
+        return np.bincount(self.level, np.diff(self.time, append=self.duration), 256).astype(np.float64)
+
+    @property
     def n_changes(self) -> int:
         """Rows but the first."""
         return len(self.time) - 1
@@ -264,7 +269,7 @@ class PinTrace(_Lines):
         line, _, bit = name.partition("_") if name[-1].isdecimal() else (name, "", "0")
         rises = rises[rises < self.n_clocks]
         clock = merged(self.clock, rises, rises + width)
-        clock = clock[clock < self.n_clocks]
+        clock = clock[(clock >= 0) & (clock < self.n_clocks)]
         lines = self.at(clock)
         ends = np.searchsorted(rises + width, clock, side="right")
         high = (np.searchsorted(rises, clock, side="right") > ends).astype(np.uint8) << np.uint8(bit)

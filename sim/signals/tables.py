@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tachometry.sim.signals.arrays import Ints
 from tachometry.sim.signals.axes import of_axis
 from tachometry.sim.signals.files import rows_of, write_csv
 from tachometry.sim.signals.run import Run, Table
@@ -53,6 +54,7 @@ class Tally:
         self.not_zero = Counter[tuple[str, str]]()  # rows of a strobe in which a column is not 0
         self.begin = self.n_values = self.n_ticks_before = 0  # clock of the last piece; ticks before those of `window`
         self.window: Run | None = None  # the last piece, and some rows before it
+        self.n_counts, self.places = 0, list[Ints]()  # sum of what ticks counted; positions at the index
         self.n_held = 0
         self.least, self.most, self.total = math.inf, -math.inf, 0.0  # rad/s, of the held velocity
         self._squares = self._errors = self._worst = 0.0
@@ -80,7 +82,9 @@ class Tally:
             self._worst = float(np.max(np.abs(error), initial=self._worst))
 
     def count(self, run: Run) -> None:
-        """Count rows, and what is not 0 in them."""
+        """Count rows, and what is not 0 in them; take counts, and positions at the index."""
+        self.n_counts += int(run.ticks.get("pulse_count").sum())
+        self.places.append(run.index.get("index_position"))
         for strobe, table in run.tables.items():
             self.rows[strobe] += len(table)
             self.n_values += len(table) * (1 + len(table.columns))

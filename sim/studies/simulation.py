@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tachometry.sim.encoder.virtual import Encoding
 from tachometry.sim.engines.engine import Interrupted, Watch
@@ -20,7 +21,7 @@ from tachometry.sim.signals.arrays import Ints
 from tachometry.sim.signals.axes import AxesTrace, Trace, of_axis
 from tachometry.sim.signals.flow import Flow
 from tachometry.sim.signals.progress import Bar, no_bar
-from tachometry.sim.signals.recording import PinTrace, Recording, packed
+from tachometry.sim.signals.recording import PinTrace, Recording
 from tachometry.sim.signals.run import Comparison, Run
 from tachometry.sim.signals.tables import HeldVelocity, Tally, VelocityError, held_from, held_velocity, velocity_error
 from tachometry.sim.signals.temporary import held_back
@@ -74,21 +75,21 @@ class Axis:
     @property
     def index_distances(self) -> Ints:
         """Counts from each index to the next; the position may have wrapped, or each index resets it."""
+        position, half = np.concatenate(self.tally.places), 1 << (self.spec.position_width - 1)
         if self.spec.front_end.index_once or self.spec.preset is not None:
-            return self.run.index.clock[:0]  # they tell of no turn
-        position, half = self.run.index.index_position, 1 << (self.spec.position_width - 1)
+            return position[:0]  # they tell of no turn
         distance = position[1:] if self.spec.front_end.index_resets else np.diff(position)
         return (distance + half) % (2 * half) - half
 
     @property
-    def state_of_index(self) -> str | None:
-        """State of the lines in which Z of quadrature is high for the longest time; None without Z."""
-        recording, inverted = self.recording, self.spec.encoder.inverted
-        if isinstance(recording, Flow) or recording.z is None or self.spec.encoder.sensor != "quadrature":
+    def index_lasts(self) -> NDArray[np.float64] | None:
+        """Seconds in which Z is high, in each state of A and B, A lowest; None without Z of quadrature."""
+        wires, lasts = [*self.recording.wires], self.recording.lasting
+        if "z" not in wires or self.spec.encoder.sensor != "quadrature":
             return None
-        a, b, z = (getattr(recording, name) ^ np.uint8(name in inverted) for name in "abz")
-        usual = np.bincount(packed([a, b]), np.diff(recording.time, append=recording.duration) * z).argmax()
-        return f"A={usual & 1},B={usual >> 1}"
+        bits = (np.arange(len(lasts)) >> wires.index(name) & 1 ^ (name in self.spec.encoder.inverted) for name in "abz")
+        a, b, z = bits
+        return np.bincount(a + 2 * b, lasts * z).astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -108,14 +109,12 @@ class Simulation:
         return self.wanted is None or self.lockstep.actual.n_clocks < self.wanted
 
 
-def _pulsed(spec: CoreSpec, source: str, trace: PinTrace, pulses: Pulses) -> PinTrace:
-    """Return the trace with pulses of other inputs; it raises ParameterError if one is before or after it."""
-    for name, rises in pulses(spec.tachometer).items():
-        if len(rises) and not 0 < rises[0] <= rises[-1] < trace.n_clocks:  # in clock 0 it would be high, not rise
-            end = format_time(spec.tick.seconds(trace.n_clocks))
+def _check_pulses(spec: CoreSpec, source: str, pulses: dict[str, Ints], n_clocks: int | None) -> None:
+    """Check that pulses of other inputs are within so many clocks, if they are known; ParameterError if not."""
+    for rises in pulses.values():
+        if n_clocks is not None and not 0 < rises[0] <= rises[-1] < n_clocks:  # in clock 0 it would be high, not rise
+            end = format_time(spec.tick.seconds(n_clocks))
             raise ParameterError("pulse", f"must have times after 0 and before the end of {source}, at {end}")
-        trace = trace.with_pulses(name, rises, spec.tachometer.filter_clocks + 1)
-    return trace
 
 
 def _fewest(spec: CoreSpec) -> int:
@@ -132,15 +131,19 @@ def _held(recording: Recording | Flow, *, whole: bool) -> Recording | Flow:
 
 def _placed(spec: CoreSpec, source: str, held: Sequence[Recording | Flow], pulses: Pulses) -> Iterator[Trace]:
     """Yield what the pins of a core see, as a whole or in pieces; ValueError if it has too many ticks."""
-    wholes = [one for one in held if isinstance(one, Recording)]
-    if isinstance(held[0], Flow):
-        pulses(spec.tachometer)
-        yield from held[0].pieces(spec.tachometer, PIECE * spec.timing.tick_cycles)
-        _lasts(spec, source, held)
-    elif spec.axes is not None:
-        yield AxesTrace.placed(wholes, spec)
-    else:
-        yield _pulsed(spec, source, PinTrace.of(wholes[0], spec), pulses)
+    if spec.axes is not None:
+        yield AxesTrace.placed([one for one in held if isinstance(one, Recording)], spec)
+        return
+    (one,), given, begin = held, pulses(spec), 0
+    _check_pulses(spec, source, given, _lasts(spec, source, held))
+    size = PIECE * spec.timing.tick_cycles
+    for piece in one.pieces(spec, size) if isinstance(one, Flow) else [PinTrace.of(one, spec)]:
+        pins = piece
+        for name, rises in given.items():
+            pins = pins.with_pulses(name, rises - begin, spec.filter_clocks + 1)
+        yield pins
+        begin += pins.n_clocks
+    _check_pulses(spec, source, given, _lasts(spec, source, held))
 
 
 def _lasts(spec: CoreSpec, source: str, held: Sequence[Recording | Flow]) -> int | None:
@@ -272,7 +275,7 @@ def _axis(
     reads, ticks = spec.encoder.sampled is not None, run.ticks
     moves = spec.front_end.moves_position and (not reads or spec.preset is not None)
     first = ticks.position[ticks.position_valid.argmax()] if reads else 0
-    counts_out = int(first + ticks.pulse_count.sum() if moves else ticks.position[-1])
+    counts_out = int(first + tally.n_counts if moves else ticks.position[-1])
     n_merged = recording.n_merged(spec.timing.clock_hz, run.n_clocks)
     error = None if truth is None else tally.error
     return Axis(spec, run, tally, recording, truth, n_merged, counts_in, counts_out, held, error)
@@ -302,6 +305,6 @@ def _axis_of_many(spec: AxesSpec, run: Run, axis: int, recording: Recording | Fl
         error = velocity_error(held, truth.true_speed)
     counts_out = 0
     if len(own.ticks):
-        counts_out = int(own.ticks.pulse_count.sum() if alone.front_end.index_resets else own.ticks.position[-1])
+        counts_out = tally.n_counts if alone.front_end.index_resets else int(own.ticks.position[-1])
     n_merged = recording.n_merged(spec.timing.clock_hz // spec.slots, run.n_clocks // spec.slots)
     return Axis(alone, own, tally, recording, truth, n_merged, counts_in, counts_out, held, error)

@@ -275,7 +275,7 @@ class TimedModel:
         """
         spec, begin = self._spec, self._n_clocks
         if self._kept is not None:
-            ticks, steps = self._kept[0].then(ticks), self._kept[1].then(steps.since(self._known + 1))
+            ticks, steps = self._kept[0].then(ticks), self._kept[1].then(steps.part(self._known + 1))
         self._known = int(np.append(self._known, steps.clock)[-1])
         counts = replace(Counts.of(spec, ticks, steps, n_clocks), before=self._before, fresh=self._fresh)
         taken = self.taken(counts, self._since)
@@ -297,5 +297,5 @@ class TimedModel:
                 self._before, begin = int(np.append(self._before, counts.period)[row]), int(counts.period[row])
             if spec.form.on_lattice:
                 self._before, first = self._before - begin, begin
-            ticks, steps = ticks.rows(slice(first, None)), steps.since(begin - spec.latency.tick)
+            ticks, steps = ticks.rows(slice(first, None)), steps.part(begin - spec.latency.tick)
         self._kept = ticks, steps

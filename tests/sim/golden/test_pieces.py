@@ -24,6 +24,13 @@ CASES = [
     f"track {SLOW} --smooth --sensor step-dir",
     f"m {BASE} --tick 40us --sensor hall",
     f"m {BASE} --tick 40us --decoding 2 --blanking 30us",
+    f"t {FAST} --index",
+    f"s {FAST} --decoding 1 --index --filter 4us --position-modulo 7",
+    f"mt {FAST} --index --index-at edge --index-reset --preset 5 --position-modulo rev/7",
+    f"m {BASE} --tick 40us --index --index-once --index-reset --preset -300 --filter 3us",
+    f"track {SLOW} --index --decoding 2",
+    f"m {BASE} --tick 40us --index --index-reset --invert z --preset 7",
+    f"m {BASE} --tick 40us --sensor hall --index --invert a,z",
 ]
 
 
@@ -52,15 +59,32 @@ def test_pieces_of_some_ticks_give_the_whole(case: str, seed: int) -> None:
     in_order(spec, trace, [int(end) for end in np.cumsum(lengths) if end < trace.n_clocks], seed)
 
 
-def test_an_edge_at_the_end_of_a_piece_is_counted_in_the_next() -> None:
-    spec, quarter = core_of(("--method", *CASES[0].split())).tachometer, np.arange(20)
-    level = quadrature(quarter)
-    in_order(
-        spec, PinTrace(np.append(0, 60 + quarter[1:]), level & np.uint8(1), level >> np.uint8(1), 200), [*range(61, 90)]
-    )
+@pytest.mark.parametrize("case", [0, 11, 12, 13])
+def test_pieces_of_a_clock_give_the_whole(case: int) -> None:
+    """The index comes twice, as does an input that moves the position or arms it, if there is one."""
+    spec, place = core_of(("--method", *CASES[case].split())).tachometer, np.arange(60)
+    level, z = quadrature(place), place % 30 // 3 == 2
+    trace = PinTrace(5 * place, level & np.uint8(1), level >> np.uint8(1), 330, z.astype(np.uint8)).completed(spec)
+    for name in spec.front_end.controls:
+        trace = trace.with_pulses(name, np.array([7, 120, 201, 290]), 4)
+    in_order(spec, trace, [*range(1, 330)])
 
 
-@pytest.mark.parametrize("more", ["--index", "--external-tick", "--over-speed 3rad/s", "--lowpass 200Hz", "--age"])
+@pytest.mark.parametrize("more", ["--external-tick", "--over-speed 3rad/s", "--lowpass 200Hz", "--age"])
 def test_cores_that_need_the_whole(more: str) -> None:
     assert not in_pieces(core_of(("--method", *CASES[1].split(), *more.split())).tachometer)
     assert in_pieces(core_of(("--method", *CASES[1].split())).tachometer)
+
+
+@pytest.mark.parametrize("apart", [1, 100, 2000])  # steps between clocks in which Z is high; 1: it always is
+def test_what_is_known_of_the_pins_does_not_grow_with_them(apart: int) -> None:
+    spec, place = core_of(("--method", *CASES[10].split())).tachometer, np.arange(4000)
+    level, z = quadrature(place), (place % apart == 0).astype(np.uint8)
+    trace, model = (
+        PinTrace(10 * place, level & np.uint8(1), level >> np.uint8(1), 40_000, z).completed(spec),
+        Golden(spec),
+    )
+    for begin in range(0, 40_000, 4_000):
+        model.run(trace.part(begin, begin + 4000))
+        assert model._pins is not None
+        assert len(model._pins.clock) < 20

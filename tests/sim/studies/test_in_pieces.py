@@ -19,6 +19,9 @@ METHODS = {
     "t": f"{CORE} 100us --max-time 2ms --decoding 1",
     "mt": f"{CORE} 100us --max-time 2ms --bounds",
     "track": f"{CORE} 300us --max-time 3ms",
+    "s --index --invert z": f"{CORE} 100us --max-time 2ms",
+    "m --index": f"{CORE} 100us --index-at edge --index-reset --position-modulo rev/7 --preset 9 --pulse preset:20ms",
+    "t --index --index-once": f"{CORE} 100us --max-time 2ms --pulse home:1ms,25ms",
 }
 MOTION = "--jitter 0.1 --motion ramp:0:90rad/s:20ms+stop:9ms+constant:-40rad/s:9.99ms"
 
@@ -32,14 +35,14 @@ def outputs(words: str, folder: Path, capsys: pytest.CaptureFixture[str], *more:
     return {path.name: path.read_bytes() for path in folder.glob("*.csv")} | {"out": capsys.readouterr().out.encode()}
 
 
-@pytest.mark.parametrize("method", only(["s", "t"], METHODS))
+@pytest.mark.parametrize("method", only(["s", "t", "m --index"], METHODS))
 def test_pieces_are_the_whole(
     method: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     core, saved, text = f"--method {method} {METHODS[method]} --engine cxxrtl", tmp_path / "x.sr", tmp_path / "x.csv"
     for words in (f"simulate {core} {MOTION} --illegal 0.01", f"simulate {core} {MOTION}", f"replay {text} {core}"):
         whole = outputs(words, tmp_path / "whole", capsys, f"--save-capture={saved}")
-        write_csv(text, read_capture(saved))
+        write_csv(text, read_capture(saved, z="z" if "index" in core else None))
         with monkeypatch.context() as patch:
             patch.setattr(simulation, "PIECE", 7)
             patch.setattr(crossings, "_CHUNK", 101)
