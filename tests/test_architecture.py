@@ -70,7 +70,7 @@ ALLOWED = {
     "boards": set[str](),
     "boards/fpga": {"hdl", "sim/signals", "spec"},
     "boards/host": {"spec"},
-    "boards/monitor": {"boards/host", "sim/golden", "spec"},
+    "boards/monitor": {"boards/host", "sim/encoder", "sim/golden", "sim/signals", "spec"},
     "boards/simulated": set[str](),
     "cli": {"cli", "boards", "sim", "hdl", "spec"},
     "cli/explore": {"cli", "boards", "sim", "hdl", "spec"},

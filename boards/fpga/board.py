@@ -7,10 +7,14 @@ from typing import Any
 
 from tachometry.boards.fpga.flow import Flow
 
+# Lines of an encoder that the core reads are on the pins of others.
+_READ = {"encoder_data": "a", "encoder_clock": "b", "emulated_encoder_data": "emulated_a"}
+
 
 def pins(text: str) -> dict[str, str]:
     """Return pins by the ports that are on them, of words such as `a:25`."""
-    return {port: pin for port, pin in (word.split(":") for word in text.split())}
+    found = {port: pin for port, pin in (word.split(":") for word in text.split())}
+    return found | {port: found[other] for port, other in _READ.items() if other in found}
 
 
 def platform(name: str, **options: str) -> Callable[[], Any]:

@@ -11,7 +11,8 @@ import numpy as np
 
 from tachometry.boards.host.demo import DemoBoard
 from tachometry.boards.host.link import NoAnswer
-from tachometry.sim.golden.emulator import Change, GoldenEmulator, read_of
+from tachometry.boards.monitor.emulated_reads import with_reads
+from tachometry.sim.golden.emulator import Change, GoldenEmulator
 from tachometry.sim.golden.registers import Access, GoldenBank
 from tachometry.spec.registers.demo import DemoMap, emulated
 from tachometry.spec.registers.emulator import EmulatorSettings, fastest, rate_of, speed_of
@@ -163,8 +164,8 @@ def _compared(
     errors, until = counted
     played = GoldenEmulator(*emulated(spec)).trace(changes, max(n_clocks, until + 1))
     ticks = np.arange(1, played.n_clocks, spec.timing.tick_cycles)
-    trace = read_of(spec, played) if spec.encoder.sampled else played
-    trace = trace.with_tick_in(ticks) if spec.external_tick else trace
+    trace = played.with_tick_in(ticks) if spec.external_tick else played
+    trace = with_reads(spec, trace) if spec.encoder.sampled else trace
     bank = GoldenBank(registers, trace)
     before = sum(words[at] < cleared for words in seen) * len(captured)
     reads = [Access(words[at], number) for words in seen for number, _ in captured]

@@ -13,7 +13,7 @@ from tachometry.hdl.wires.ports import Box, by_name, drive, follow, hand_through
 from tachometry.hdl.wires.synchronizer import Synchronizer
 from tachometry.spec.language.field import WORD
 from tachometry.spec.registers.buses import CAPTURE, Bus
-from tachometry.spec.registers.demo import ENCODER_LINES, PERIOD_WIDTH, DemoMap, demo_ports, emulated
+from tachometry.spec.registers.demo import DATA, ENCODER_LINES, PERIOD_WIDTH, DemoMap, demo_ports, emulated
 
 
 class Demo(Box):
@@ -32,7 +32,7 @@ class Demo(Box):
         self.core = RegisterCore(registers)
         self._lines = [pin.name for pin in spec.ports.pins if pin.name in ENCODER_LINES]
         self.emulator = EncoderEmulator(*emulated(spec))
-        self.reads = EmulatedReads(spec) if registers.reads else None
+        self.reads = EmulatedReads(spec) if spec.encoder.sampled else None
         self.bridge = bridge_on(registers, bus)
         self.telemetry: TelemetrySender | None = None
         if isinstance(self.bridge, UartBridge):
@@ -81,6 +81,8 @@ class Demo(Box):
         front = self._map.spec.front_end
         pins = by_name(self, (pin.name for pin in self._map.spec.ports.pins if pin.name in self.signature.members))
         lines = by_name(emulator, self._lines)
+        if self.reads is not None:
+            lines = self._read(m, self.reads)
         for line, whole in by_name(emulator, front.complemented, "{}_n").items():
             drive(m, core, {f"{line}_n": Mux(bank.emulated, whole, ~pins[line])})
         for name, pin in pins.items():
@@ -88,11 +90,19 @@ class Demo(Box):
             if name in lines:
                 drive(m, self, {f"emulated_{name}": emulated})
             drive(m, core, {name: Mux(bank.emulated, emulated, pin)})
-        if (reads := self.reads) is not None:
-            m.submodules.reads = ResetInserter(bank.restart)(reads)
-            follow(m, reads, emulator, ("a", "b"))
+
+    def _read(self, m: Module, reads: EmulatedReads) -> dict[str, Signal]:
+        """Read the emulated encoder; return the line of one that the core reads itself."""
+        core, bank = self.core, self.core.bank
+        m.submodules.reads = ResetInserter(bank.restart)(reads)
+        follow(m, reads, self.emulator, ("a", "b"))
+        if self._map.reads:
             given = by_name(reads, self._map.reads)
             drive(m, core, given | {"sample_valid": reads.sample_valid & bank.emulated})
+            return {}
+        follow(m, reads, core, ["encoder_clock"])
+        follow(m, self, core, ["encoder_clock"])
+        return by_name(reads, [DATA])
 
     def _enable(self, m: Module) -> None:
         """Give the loop its enable, which comes from a pin, and which many flip-flops follow."""

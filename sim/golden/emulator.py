@@ -6,9 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tachometry.sim.golden.front_end import decode
 from tachometry.sim.signals.recording import PinTrace
-from tachometry.spec import TachometerSpec
 from tachometry.spec.registers.emulator import (
     BOUNCE_BITS,
     DROP_BITS,
@@ -21,7 +19,6 @@ from tachometry.spec.registers.emulator import (
     RANDOM_TAP,
     RANDOM_WIDTH,
     RATE_SHIFT,
-    READ_AGE,
     START,
     EmulatorSettings,
 )
@@ -199,20 +196,3 @@ class GoldenEmulator:
         for bit, name in enumerate(self._complemented, 3):
             level |= (whole[name] ^ np.uint8(1)) << np.uint8(bit)
         return level
-
-
-def read_of(spec: TachometerSpec, lines: PinTrace) -> PinTrace:
-    """Return emulated lines with reads of their edges, one in the last clock of each nominal tick."""
-    assert spec.encoder.sampled is not None
-    step, wrong = decode(lines.a, lines.b, 4)
-    clock = np.arange(spec.timing.tick_cycles - 1, lines.n_clocks, spec.timing.tick_cycles)
-    edges = np.searchsorted(lines.clock[1:], clock - READ_AGE, side="right")
-    place, errors = (np.append(0, np.cumsum(each))[np.append(0, edges)] for each in (step, wrong))
-    trace = lines.with_pulses("sample_valid", clock)
-    row = np.searchsorted(clock, trace.clock, side="right")
-    read = {
-        "sample": (place & (1 << spec.encoder.sampled.width) - 1)[row],
-        "sample_ok": np.append(True, np.diff(errors) == 0)[row],
-        "sample_age": np.full(len(row), READ_AGE),
-    }
-    return PinTrace.of_lines(trace.clock, trace.n_clocks, trace.lines | read)

@@ -45,10 +45,9 @@ class Reads:
         sampled = spec.encoder.sampled
         assert sampled is not None
         if spec.reads is not None:
-            begin = windows(spec, trace)[0] if spec.external_tick else np.array(spec.read_starts(trace.n_clocks))
             level = trace.lines[spec.reads.line]
             changed = np.append(True, level[1:] != level[:-1])
-            found = records(spec.reads, begin, Line(trace.clock[changed], level[changed]))
+            found = records(spec.reads, begins(spec, trace), Line(trace.clock[changed], level[changed]))
             return cls.those(spec, found)
         clock = trace.high("sample_valid")
         sample, right = (trace.line_at(name, clock) for name in ("sample", "sample_ok"))
@@ -76,6 +75,11 @@ class Reads:
         zero = np.array([spec.encoder.zero or 0])
         at, what = np.array(sorted(found.items()), dtype=np.int64).reshape(-1, 2).T
         return cls(clock[taken], sample[taken], age[taken], errors, anew[taken], at, what, zero)
+
+
+def begins(spec: TachometerSpec, trace: PinTrace) -> NDArray[np.int64]:
+    """Return the clocks in which reads begin."""
+    return windows(spec, trace)[0] if spec.external_tick else np.array(spec.read_starts(trace.n_clocks))
 
 
 def _jumps(

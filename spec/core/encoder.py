@@ -309,8 +309,9 @@ class Encoder:
 
     @property
     def plain(self) -> bool:
-        """Whether it is quadrature, whose lines are as they come, or sampled: what demos emulate."""
-        return self.sensor in ("quadrature", "sampled") and not self.reverse and not self.invert
+        """Whether demos emulate it: quadrature whose lines are as they come, or positions that are read."""
+        emulated = ("quadrature", "sampled", *_SERIAL)
+        return self.sensor in emulated and not self.reverse and not self.invert
 
     @property
     def encoder_counts(self) -> int:

@@ -26,7 +26,8 @@ from tachometry.spec.registers.manifest import described_port
 from tachometry.spec.registers.map import RegisterMap
 
 ENCODER_LINES = ("a", "b", "z")
-DRIVE = "current_pdm"  # the current of a loop, as a stream of bits
+DATA = "encoder_data"  # the line of an encoder that the core reads
+DRIVEN = ("current_pdm", "encoder_clock")  # the current of a loop, as a stream of bits; the clock of such an encoder
 LEDS = 4
 PERIOD_WIDTH = 16  # bits of the telemetry's period
 
@@ -48,7 +49,7 @@ class DemoMap(RegisterMap):
 
     def __post_init__(self) -> None:
         if not self.spec.encoder.plain:
-            raise ParameterError("sensor", "must be quadrature or sampled with a demo, as it comes: it emulates these")
+            raise ParameterError("sensor", "must be quadrature, sampled, ssi or biss on boards, as it comes")
         refuse(self.spec.extras, "demo")
 
     @cached_property
@@ -65,8 +66,8 @@ class DemoMap(RegisterMap):
 
     @property
     def reads(self) -> tuple[str, ...]:
-        """Inputs of an encoder that is read."""
-        sampled = self.spec.encoder.sampled
+        """Inputs with positions that something else than the core reads."""
+        sampled = self.spec.reads is None and self.spec.encoder.sampled
         return tuple(port.name for port in sampled.ports(self.spec.tick.longest)) if sampled else ()
 
     @property
@@ -137,14 +138,14 @@ def demo_map(spec: TachometerSpec | LoopSpec) -> DemoMap:
 def demo_ports(registers: DemoMap, bus: Bus) -> tuple[Port, ...]:
     """Return all ports of a demo on a bus."""
     inputs = registers.inputs
-    of_loop = [port for port in registers.core_ports if port.name == DRIVE]
+    driven = [port for port in registers.core_ports if port.name in DRIVEN]
     emulated = [
         Port(f"emulated_{pin.name}", "output", help=f"Line {pin.name.upper()} of the emulated encoder.")
         for pin in inputs
-        if pin.name in ENCODER_LINES
+        if pin.name in (*ENCODER_LINES, DATA)
     ]
     lights = "The shaft turns; it turned backward at the last update; something went wrong; the clock runs."
-    return (*inputs, *bus.ports(registers), *emulated, *of_loop, Port("leds", "output", LEDS, help=lights))
+    return (*inputs, *bus.ports(registers), *emulated, *driven, Port("leds", "output", LEDS, help=lights))
 
 
 def demo_manifest(registers: DemoMap, bus: Bus, name: str = "tachometer") -> dict[str, Any]:

@@ -169,6 +169,16 @@ def test_every_board_has_pins_for_every_port(name: str, bus: str) -> None:
     assert not any("/site-packages/" in str(content) for content in plan.files.values())
 
 
+def test_the_lines_of_an_encoder_that_is_read_have_pins() -> None:
+    board, on = BOARDS["icebreaker"], bus_of("uart")
+    assert on is not None
+    texts = {"sensor": "ssi", "bits": "9", "clock": str(board.clock_hz), "tick": "1ms"}
+    lines = [*lines_of(prepared(component(of_texts("m", texts), on), board).files)]
+    for port, other in {"encoder_data": "a", "encoder_clock": "b", "emulated_encoder_data": "emulated_a"}.items():
+        assert board.pins[port] == board.pins[other]
+        assert any(f"tachometer_0__{port}__io" in line for line in lines)
+
+
 @pytest.mark.parametrize("name", BOARDS)
 def test_pins_are_no_others(name: str) -> None:
     """No pin of a header is used twice, or is one of the UART, the clock or an LED."""
