@@ -3,10 +3,12 @@
 from collections.abc import Mapping
 from typing import Any
 
-from amaranth import Cat, Const, Module, Mux, Signal, signed
+from amaranth import C, Module, Mux, Signal, signed
 from amaranth.lib import data
 
 from tachometry.hdl.axes.axis_counters import AxisCounters
+from tachometry.hdl.methods.tick_counts import TickCounts, sums
+from tachometry.hdl.wires.delay import delay
 from tachometry.spec.formats.tracking import Tracking
 
 # Of a memory of wide words, none of which is read in the clock in which it is written.
@@ -42,23 +44,29 @@ class AxisTickCounts(AxisCounters):
 
     def _add(self, m: Module, before: Any, first: Signal, ready: Signal, step: Signal) -> None:
         counts, backward, new = step.any(), step[-1], self.count
-        number, places, way, times = (Mux(first, 0, before[name]) for name in ("number", "places", "moved", "times"))
-        place = Signal(2)
-        m.d.comb += place.eq(Mux(ready, before.end, 0))  # the memory is not that of a reset
+        earlier_first, earlier_ready = delay(m, self.first, self.ready)
+        # As a reset of registers, which takes no cells.
+        with m.If(earlier_first):
+            m.d.sync += [before[name].eq(0) for name in ("number", "places", "moved", "times")]
+        with m.If(~earlier_ready):  # the memory is not that of a reset
+            m.d.sync += before.end.eq(0)
+        number, moved = before.number, before.moved
+        takes = Signal()
+        m.d.comb += takes.eq(counts & (number != self._form.most_number))
+        place = TickCounts.place(moved[: self._form.number_bits + 1], backward, takes)
+        last, times, next_moved, places = sums(
+            (before.last, C(0, 1), C(1, 1)),
+            (before.times, number & ~1, number[0]),
+            (moved, backward.replicate(len(moved)), counts & ~backward),
+            (before.places, place, takes),
+        )
         m.d.sync += [
-            new.end.eq(place + step),
-            new.last.eq(Mux(counts | ~number.any(), 0, before.last + 1)),  # an axis that stands changes nothing
-            new.moved.eq(way + step),
-            new.times.eq(times + number),
-            new.number.eq(number),
+            new.end.eq(before.end + step),
+            new.last.eq(Mux(counts | ~number.any(), 0, last)),  # an axis that stands changes nothing
+            new.moved.eq(next_moved),
+            new.times.eq(times),
+            new.number.eq(number + takes),
             new.places.eq(places),
-            new.kind.eq(before.kind),
-            new.down.eq(before.down),
+            new.kind.eq(Mux(takes, before.end - backward, before.kind)),
+            new.down.eq(Mux(takes, backward, before.down)),
         ]
-        with m.If(counts & (number != self._form.most_number)):
-            m.d.sync += [
-                new.number.eq(number + 1),
-                new.places.eq(places + (Cat(Const(0, 1), way).as_signed() + step)),
-                new.kind.eq((place - backward)[:2]),
-                new.down.eq(backward),
-            ]

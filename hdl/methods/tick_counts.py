@@ -11,7 +11,7 @@ from tachometry.spec.formats.displacement import DISPLACED
 from tachometry.spec.formats.tracking import Tracking
 
 
-def _sums(*sums: tuple[Value, Value, Value]) -> list[Value]:
+def sums(*sums: tuple[Value, Value, Value]) -> list[Value]:
     """Return left + right + carry of each, modulo the width of left, out of one adder.
 
     Both ends of a carry chain take cells. Between two sums there is a bit that is the carry in both terms: so it comes
@@ -56,6 +56,13 @@ class TickCounts(Box):
         self.open_moved = Signal.like(self.moved)
 
     @staticmethod
+    def place(moved: Value, backward: Value, takes: Value) -> Value:
+        """Return twice the place of a count that is taken, less one, behind counts that moved so far; else 0."""
+        # A count backward has its place one below that of a count forward.
+        lower = Cat(bit ^ (backward & ~moved[:at].any()) for at, bit in enumerate(moved))
+        return Cat(C(0, 1), lower & takes.replicate(len(lower))).as_signed()
+
+    @staticmethod
     def _mapped(form: Tracking, displacement: Shape) -> dict[str, Member]:
         """Return `DISPLACED`, the sum over the counts, and the displacements of the edges about the end."""
         shown = {"displacements": Out(signed(form.number_bits + displacement.width))}
@@ -74,10 +81,8 @@ class TickCounts(Box):
         counts, backward = self.step.any(), self.step[-1]
         takes = Signal()
         m.d.comb += takes.eq(counts & (number != self._form.most_number))
-        # A count backward has its place one below that of a count forward.
-        lower = Cat(bit ^ (backward & ~moved[:at].any()) for at, bit in enumerate(moved[: self._form.number_bits + 1]))
-        place = Cat(C(0, 1), lower & takes.replicate(len(lower))).as_signed()  # and one more
-        last, times, next_moved, next_places, waited = _sums(
+        place = self.place(moved[: self._form.number_bits + 1], backward, takes)
+        last, times, next_moved, next_places, waited = sums(
             (self.open_last, C(0, 1), C(1, 1)),
             (self.open_times, number & ~1, number[0]),
             (moved, backward.replicate(len(moved)), counts & ~backward),
