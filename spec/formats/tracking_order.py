@@ -46,7 +46,11 @@ def spaced(code: Code) -> Code:
     places: list[int] = []
     for one in code.instructions:
         reads, backs = one.reads, range(1, min(APART, len(made) + 1))
-        near = (back for back in backs if any(same(made[-back].store, word) for word in reads))
+        near = (
+            back
+            for back in backs
+            if any(same(made[-back].store, word) for word in reads) or (made[-back].keep and one.first == "$places")
+        )
         made += [Instruction()] * (APART - next(near, APART))
         places.append(len(made))
         made.append(one)

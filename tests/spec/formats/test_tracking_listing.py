@@ -206,3 +206,7 @@ def test_two_terms_are_added_at_once(line: str, terms: list[tuple[str, str]]) ->
 def test_what_comes_too_early_waits(listing: str, idle: int) -> None:
     made = assembled(listing, ports=2).instructions
     assert made.count(Instruction()) == idle
+
+
+def test_an_edge_that_a_sign_chooses_waits_for_the_sign() -> None:
+    assert assembled("a keep; b; c = $places").instructions.count(Instruction()) == 1
