@@ -9,6 +9,7 @@ from tachometry.hdl.axes.axis_tick_counts import BLOCK, counts_layout
 from tachometry.hdl.methods.track import delay_of
 from tachometry.hdl.methods.track_machine import TrackMachine
 from tachometry.hdl.output.update import update_layout
+from tachometry.hdl.wires.delay import delay
 from tachometry.hdl.wires.ports import Box, by_name, drive, only_if
 from tachometry.spec.formats.tracking import PLACE_BITS, WIDTH
 from tachometry.spec.formats.tracking_code import SMOOTH
@@ -72,14 +73,16 @@ class TrackTurns(Box):
         running = Signal()
         first = Signal(init=1)  # the memory is not that of a reset
         turn = Signal(range(max(n, 2)))
-        begins, reads, ends = (running & (clock == place) for place in (0, 1, plan.cycles - 1))
+        begins, ends = (running & (clock == place) for place in (0, plan.cycles - 1))
+        (reads,) = delay(m, begins)
         m.d.sync += clock.eq(clock + 1)
         with m.If(ends):
-            m.d.sync += [clock.eq(0), turn.eq(turn + 1), self.axis.eq(self.axis + plan.machines)]
+            m.d.sync += [clock.eq(0), turn.eq(turn + 1)]
             with m.If(turn == n - 1):
                 m.d.sync += [running.eq(0), first.eq(0)]
         with m.If(self.complete & (self.slot == 0)):
-            m.d.sync += [running.eq(1), clock.eq(-self._number * plan.apart), turn.eq(0), self.axis.eq(self._number)]
+            m.d.sync += [running.eq(1), clock.eq(-self._number * plan.apart), turn.eq(0)]
+        m.d.comb += self.axis.eq(turn * plan.machines + self._number)
         counts, position = self._handed(m, reads)
         names = ("number", "times", "places", "last", "moved", "kind", "end", "down")
         drive(m, machine, {name: counts[name] for name in names})
