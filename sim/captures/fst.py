@@ -16,12 +16,12 @@ from typing import IO, Any, cast
 from tachometry.sim.captures.file import ANY, CaptureError, Channels, OptionError, check_regular, flow_of, reading
 from tachometry.sim.captures.waveform import Changes, Names, Variable
 from tachometry.sim.signals.flow import Flow, Parts
-from tachometry.sim.signals.temporary import running
+from tachometry.sim.signals.temporary import running, scratch
 
 _HEADER = struct.Struct(">BQQQ")  # type of the first block, its length, time of the beginning and of the end
 _PLAIN, _PACKED = 0, 254  # types of it
 # Limits of the process that reads a file, which may be packed a thousand times as tightly: seconds, bytes of its memory
-# (its list of times has 8 for each), and characters of all names and of one change that it prints, and of its errors.
+# (some 20 for each change of a block), and characters of all names and of one change that it prints, and of its errors.
 _LONGEST, _MOST_MEMORY, _MOST_NAMES, _MOST_CHANGE, _MOST_ERRORS = 600.0, 2 << 30, 1 << 24, 1 << 16, 1 << 16
 _TOO_MUCH = 3  # exit status of one that would print more
 _CHILD = [sys.executable, "-P", "-m", "tachometry.sim.captures.fst_child"]
@@ -85,8 +85,8 @@ def _parts(path: Path, wanted: Channels, head: bytes) -> Parts:
 def _printed(path: Path, *codes: int) -> Iterator[str]:
     """Yield the lines that another process prints, which reads the file, see `fst_child`."""
     most = _MOST_CHANGE if codes else _MOST_NAMES
-    words = [*_CHILD, str(_LONGEST), str(path), str(most), *map(str, codes)]
-    with tempfile.TemporaryFile() as errors:
+    with tempfile.TemporaryFile() as errors, scratch() as folder:
+        words = [*_CHILD, str(_LONGEST), str(path), str(folder), str(most), *map(str, codes)]
         try:
             with running(words, seconds=_LONGEST, memory=_MOST_MEMORY, errors=errors) as child:
                 cast(IO[str], child.stdin).close()

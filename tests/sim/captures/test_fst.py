@@ -12,6 +12,7 @@ from support.captures import assert_same
 
 from tachometry.sim.captures import file, fst, waveform
 from tachometry.sim.captures.file import CaptureError
+from tachometry.sim.captures.fst_child import pieces
 from tachometry.sim.captures.read import read_capture
 from tachometry.sim.signals import temporary
 
@@ -30,6 +31,7 @@ module tb;
     for (k = 0; k < 40; k = k + 1) begin
       #250 if (k % 2) b = !b; else a = !a;
       enc = {b, a};
+      if (k % 10 == 9) $dumpflush;
     end
     #100 a = 1'bx;
     #100 a = 0;
@@ -61,6 +63,13 @@ def test_it_is_read_as_the_plain_one(a: str | None, b: str | None, folder: Path)
     assert set(compressed.source.notes) - set(plain.source.notes) == (
         {"bit 0 of tb.enc is its last one"} if a == "tb.enc[0]" else set()
     )
+
+
+def test_a_block_is_read_at_a_time(folder: Path, tmp_path: Path) -> None:
+    """The reader takes some 20 bytes for each change of a file, and a simulator begins a new block after many."""
+    sizes = [piece.stat().st_size for piece in pieces(folder / "w.fst", tmp_path)]
+    assert len(sizes) == 5  # four are flushed
+    assert max(sizes) < (folder / "w.fst").stat().st_size - 4 * 100
 
 
 @pytest.mark.parametrize(
@@ -126,7 +135,7 @@ def test_a_reader_that_takes_too_much_is_ended(
 ENDLESS = """\
 import itertools, sys
 sys.stdin.read()
-if len(sys.argv) < 5:
+if len(sys.argv) < 6:
     sys.exit(print('{"unit": [1, -9], "variables": [["a", 1], ["b", 1]]}'))
 for k in itertools.count():
     print(k, k & 1, k >> 1 & 1)
