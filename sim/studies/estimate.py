@@ -95,7 +95,7 @@ def features(core: Mapped, family: str) -> Sequence[int]:
     """Return what takes cells: tables, carries, chains, small memories, products, lone flip-flops; and 1."""
     about, logic = FAMILIES[family], core.logic
     tables = sum(about.fabric.cells[len(cut)] for cut in core.tables.values())
-    small = sum(-(-words // 16) * bits for words, bits in logic.small)
+    small = sum(words * bits for words, bits in logic.small)
     products = sum(a * b - min(a, about.factor) * min(b, about.factor) for a, b in logic.products)
     lone = about.packs * sum(not core.feeds_alone(data) for data, _ in logic.flip_flops)
     return tables, sum(width + width % 2 for width in logic.chains), len(logic.chains), small, products, lone, 1
@@ -103,9 +103,7 @@ def features(core: Mapped, family: str) -> Sequence[int]:
 
 def flip_flops(core: Mapped) -> int:
     """Return flip-flops of a core, with those that read lookup tables."""
-    fabric, small = core.logic.fabric, core.logic.small
-    read = sum(bits + round(-(-words // 16) * bits * fabric.bypass) for words, bits in small if fabric.writes)
-    return len(core.logic.flip_flops) + read
+    return len(core.logic.flip_flops) + sum(round(n * (1 + rows * core.fabric.bypass)) for rows, n in core.logic.small)
 
 
 @dataclass(frozen=True)

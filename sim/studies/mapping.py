@@ -36,15 +36,16 @@ class Fabric:
     product: int = 3300
     short: int = 4  # bits of sums that lookup tables make
     writes: bool = True  # lookup tables can be memories
-    bypass: float = 0  # flip-flops for each bit of 16 words of these, by which a read sees the write at the same time
+    bypass: float = 0  # flip-flops for each bit of 16 words of these, to read what is being written; else of 1 word
     block: int = 128  # what a block RAM counts beside 16 bits of constants in tables
+    widest: int = 36  # bits of a word of it
 
 
 _LUT4 = (), (141,), (141, 275), (141, 275, 379), (141, 275, 379, 379)
 _WIDE = (151, 239, 373, 477, 477), (148, 292, 380, 514, 618, 618), (148, 289, 433, 521, 655, 759, 759)
 ECP5 = Fabric(300, (*_LUT4, *_WIDE), (0, 1, 1, 1, 1, 2, 4, 8), 516, 21.5, 257, 379)
 _PINS = (), (316,), (316, 379), (316, 379, 400), (316, 379, 400, 449)
-ICE40 = Fabric(250, _PINS, (0, 1, 1, 1, 1), 259, 126, 316, 400, short=1, writes=False, block=64)
+ICE40 = Fabric(250, _PINS, (0, 1, 1, 1, 1), 259, 126, 316, 400, short=1, writes=False, bypass=1, block=64, widest=16)
 _GOWIN = (), (902,), (902, 1184), (902, 1184, 1486), (902, 1184, 1486, 1583), (680, 1116, 1371, 1638, 1638)
 GOWIN = Fabric(500, _GOWIN, (0, 1, 1, 1, 1, 2), 1505, 82, 811, 1432, short=2, bypass=1.5)
 
@@ -59,7 +60,7 @@ class Logic:
         self.flip_flops: list[tuple[int, int]] = []  # their data and their output
         self.chains: list[int] = []  # bits of each chain of carries
         self.products: list[tuple[int, int]] = []  # bits of both factors
-        self.small: list[tuple[int, int]] = []  # words and bits of small memories that are written
+        self.small: list[tuple[int, int]] = []  # words, or sixteens of them, and bits of memories without blocks
         self.late: set[int] = set()  # bits that a block RAM has read
         for port in module["ports"].values():
             self.ends += _nets(port["bits"]) if port["direction"] == "output" else ()
@@ -160,7 +161,8 @@ class Logic:
         words, width = int(parameters["SIZE"], 2), int(parameters["WIDTH"], 2)
         self.ends += _nets([bit for name, bits in pins.items() if name != "RD_DATA" for bit in bits])
         written, clocked = bool(pins["WR_DATA"]), "1" in parameters["RD_CLK_ENABLE"]
-        if not written and (not clocked or words * width < 16 * self.fabric.block):
+        blocks = self.fabric.block * ports * -(-width // self.fabric.widest)
+        if not written and (not clocked or words * width <= 16 * blocks):
             size = len(address) // ports
             for at, bit in enumerate(read):
                 data = self._constant(words, address[at // width * size :][:size], None if clocked else bit)
@@ -168,9 +170,9 @@ class Logic:
                     self.flip_flops.append((data, bit))
                     self.ends.append(data)
             return
-        if small := written and words <= _FEW and not block:
-            self.small.append((words, len(read)))
-        if not small or (not self.fabric.writes and words * width > self.fabric.block):
+        if written and words <= _FEW and not block and (self.fabric.writes or words * width <= blocks):
+            self.small.append((-(-words // 16) if self.fabric.writes else words, len(read)))
+        else:
             self.late |= {*_nets(read)}
 
     def _constant(self, words: int, address: Bits, output: int | None) -> int:

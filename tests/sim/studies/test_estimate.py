@@ -10,7 +10,7 @@ from cores import CONFIGURATIONS
 from support.nightly import nightly
 
 from tachometry.sim.studies import estimate
-from tachometry.sim.studies.estimate import FAMILIES, SPREAD, Estimate, Timing
+from tachometry.sim.studies.estimate import FAMILIES, SPREAD, Estimate, Timing, flip_flops
 from tachometry.sim.studies.mapping import ECP5, ICE40, Fabric, Logic, Mapped
 from tachometry.sim.studies.size import TARGETS
 from tachometry.spec import AxesSpec, STachometer, of_options, of_texts
@@ -87,9 +87,13 @@ def test_memories_are_blocks_tables_or_constants() -> None:
     constants = mapped(ECP5, [memory(16, 5)], [*range(100, 105)])
     assert (len(constants.tables), len(constants.logic.flip_flops), constants.logic.late) == (5, 5, set())
     written = mapped(ECP5, [memory(16, 5, WR_DATA=[90])], [*range(100, 105)])
-    assert (written.logic.small, written.logic.late) == ([(16, 5)], set())
+    assert (written.logic.small, written.logic.late) == ([(1, 5)], set())
     block = mapped(ECP5, [memory(1024, 18)], [*range(100, 118)])
     assert (len(block.logic.late), LEVELS.period(block)) == (18, 100)
+    assert mapped(ECP5, [memory(64, 32)], [*range(100, 132)]).logic.late == set()  # as many bits as a block counts
+    narrow, wide = (mapped(ICE40, [memory(*size, WR_DATA=[90])], [100]) for size in ((5, 16), (2, 82)))
+    assert (len(narrow.logic.late), narrow.logic.small) == (16, [])
+    assert (wide.logic.late, wide.logic.small, flip_flops(wide)) == (set(), [(2, 82)], 246)  # six blocks would be more
 
 
 def test_what_is_not_known_is_not_left_out() -> None:
