@@ -87,14 +87,15 @@ def drawn(
 ) -> Iterator[tuple[AnySpec, Bus | None, str, Mapping[str, float]]]:
     """Yield the random cores of a family that are compared, or that have a part in its fit, with their figures."""
     target, numbers = FAMILIES[family].target, DRAWN[family]
-    tools, first = versions(target.route[0]), 0 if part == "cores" else numbers["cores"]
-    for at, (spec, bus, text) in enumerate(random_cores(first + numbers.get(part, 0))):
-        if at >= first and only is not None and at not in only:
-            yield spec, bus, text, stays[text]
-        elif at >= first:
-            verilog = export(spec, CORE, bus.name if bus else "none")[f"{CORE}.v"]
-            seeds = range(1, 4) if at < numbers["routed"] else ()
-            yield spec, bus, text, measure_core(spec, target, verilog, tools, ports_on(spec, bus), [*seeds]).figures
+    chosen = {at for ends in numbers.get(part, []) for at in range(*ends)}
+    seeds = [1, 2, 3][: min(numbers.get("seeds", 3), 3 if part == "compared" else 1)]  # one shows what to fit to
+    for at, (spec, bus, text) in enumerate(random_cores(max(chosen, default=-1) + 1)):
+        if only is not None and at in chosen - {*only}:
+            if text in stays:  # else it has not been measured yet
+                yield spec, bus, text, stays[text]
+        elif at in chosen:
+            verilog, tools = export(spec, CORE, bus.name if bus else "none")[f"{CORE}.v"], versions(target.route[0])
+            yield spec, bus, text, measure_core(spec, target, verilog, tools, ports_on(spec, bus), seeds).figures
 
 
 def fit(family: str) -> dict[str, list[float]]:
@@ -128,7 +129,7 @@ def before(family: str) -> dict[str, dict[str, float]]:
 def measured(family: str, only: Sequence[int] | None) -> list[tuple[str, float, float, float, float]]:
     """Return random cores: options, cells packed and estimated, MHz and estimated; those not in `only` stay."""
     rows = []
-    for spec, bus, text, figures in drawn(family, "cores", only, before(family)):
+    for spec, bus, text, figures in drawn(family, "compared", only, before(family)):
         found, (cells, *_), clock = estimate.Estimate.of(spec, bus, family), figures.values(), figures.get("Fmax", 0)
         guess = found.clock_hz / 1e6 if clock or FAMILIES[family].timed else 0
         rows.append((text, cells, float(found.cells), clock, guess))
