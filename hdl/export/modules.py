@@ -317,7 +317,8 @@ def _joined(circuit: Circuit, things: Mapping[Path, Any], comments: Mapping[str,
         path = circuit.modules[index].name
         kind = type(things.get(path))
         snake = re.sub(r"(?<!^)(?=[A-Z])", "_", kind.__name__).lower()
-        name = plain(f"{path[0]}_{snake}" if same[index] > 1 and path in things else "_".join(path))
+        short = same[index] > 1 and path in things
+        name = path[0] if not path[1:] else plain(f"{path[0]}_{snake}" if short else "_".join(path))
         while name in names.values():
             name += "_"
         names[f"{index}"] = name

@@ -25,7 +25,7 @@ from tachometry.spec.registers.manifest import manifest
 def test_options_reach_the_core(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     options = (
         "--method s --ppr 360 --decoding 2 --clock 10MHz --tick 50us --max-time 5ms --frac-bits 12 --no-cancel "
-        "--max-speed 3000rpm --name spindle"
+        "--max-speed 3000rpm --name spindle_"
     )
     assert run("generate", *options.split(), "-o", tmp_path / "new" / "rtl") == 0
     spec = STachometer(
@@ -36,9 +36,10 @@ def test_options_reach_the_core(tmp_path: Path, capsys: pytest.CaptureFixture[st
         cancel=False,
     )
     written = {path.name: path.read_bytes().decode() for path in (tmp_path / "new" / "rtl").iterdir()}
-    assert written == export(spec, "spindle")
+    assert written == export(spec, "spindle_")
+    assert "\nmodule spindle_ (\n" in written["spindle_.v"]
     assert capsys.readouterr().out.split("\n\n")[0].split() == [
-        str(tmp_path / "new" / "rtl" / f"spindle{suffix}")
+        str(tmp_path / "new" / "rtl" / f"spindle_{suffix}")
         for suffix in (".v", ".json", ".core", "_inst.v", "_pkg.vhd", "_tb.sv", ".xdc", ".sdc")
     ]
 
