@@ -147,7 +147,8 @@ test_refusals = refused({"disc-table=edges": "disc_table must not be given with 
         ),
         ("mt", "disc=other.json index=yes", "must have an index: type tachometry calibrate with --index"),
         ("mt", "disc=far.json index=yes index-at=A=0,B=1", "must have the index at 3, as --index-at, not 2"),
-        ("mt", "disc-table=edges ppr=4097", "disc_table must be of at most 16384 counts per turn, not 16388"),
+        ("mt", "disc-table=edges ppr=4097", "disc_table must be of 2 to 16384 counts per turn, not 16388"),
+        ("mt", "disc-table=edges ppr=1 decoding=1", "disc_table must be of 2 to 16384 counts per turn, not 1"),
         ("mt", "disc-table=sectors:3", "disc_table must be edges or sectors:N, N from 4 to 256, not sectors:3"),
         (
             "mt",

@@ -162,7 +162,7 @@ class DiscMap(Extra):
         own = encoder.encoder_counts, encoder.decoding
         most = MOST_IN_SECTORS if self.table.startswith("sectors") else MOST_EDGES
         refusals = {
-            f"must be of at most {most} counts per turn, not {own[0]}": own[0] > most,
+            f"must be of 2 to {most} counts per turn, not {own[0]}": not 2 <= own[0] <= most,
             "must be edges without --disc": disc is None and self.table == "auto",
             "does not work with --teeth": encoder.teeth is not None,
             "does not work with --bounds": spec.bounds and spec.facts.update_by != "count",
