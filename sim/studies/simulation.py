@@ -185,7 +185,7 @@ def simulate(
     """
     chosen = pick(running.engine)
     engine: Any = getattr(chosen, "in_pieces", None)
-    whole = running.whole or engine is None or not in_pieces(spec.tachometer)
+    whole = running.whole or engine is None or len(recordings) > 1 or not in_pieces(spec.tachometer)
     held = [_held(recording, whole=whole) for recording in recordings]
     tally, speed = Tally(spec.tachometer), truths[0].true_speed if truths else None
     trace = next(pins := _placed(spec, source, held, running.pulses))

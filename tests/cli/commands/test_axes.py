@@ -54,6 +54,12 @@ def test_simulate_and_replay(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert f"counts out {counts['1'][1]}," in other["0"]
 
 
+def test_axes_without_an_index(capsys: pytest.CaptureFixture[str]) -> None:
+    """Of one axis such a core would be run in pieces."""
+    assert run("simulate", *CORE[:-2], "--axes", "2", "--motion", "constant:9rad/s:20ms") == 0
+    assert [line.split(" updates")[0][:6] for line in rows(capsys) if line.startswith("axis")] == ["axis 0", "axis 1"]
+
+
 def test_what_the_reader_says_of_an_axis_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     lines = [f"{k / 1000},{k % 2},0,{'X' if k == 7 else 0},{k % 2}" for k in range(20)]
     (tmp_path / "c.csv").write_text("\n".join(["time,a0,b0,a1,b1", *lines, ""]))
