@@ -116,8 +116,7 @@ def fit(family: str) -> dict[str, list[float]]:
             for factor in (step, 1 / step):
                 while (found := error(more := [*times[:at], times[at] * factor, *times[at + 1 :]])) < least * 0.9999:
                     times, least = more, found
-    times = [max(each, 0.001) for each in times]
-    return {"cells": [round(float(each), 3) for each in weights], "times": [round(each, 3) for each in times]}
+    return {"cells": [round(float(each), 3) for each in weights], "times": [round(max(t, 0.001), 3) for t in times]}
 
 
 def before(family: str) -> dict[str, dict[str, float]]:

@@ -22,8 +22,8 @@ CORE = "--ppr 500 --clock 1MHz"
 BENCH = """module bench; timeunit 1us/1us; reg a = 0, b = 0; initial begin $dumpfile("%s"); $dumpvars;
 repeat (%d / 2) begin #50 a = ~a; #50 b = ~b; end #25 $finish; end endmodule"""
 # clocks of a tick; a lossy encoder whose shaft vibrates has 25,000 edges a second
-TICKS = dict.fromkeys(["m", "s", "t", "mt", "s --index", "m --lost 0.01 --vibration 100mrad:200Hz", "m --age"], 20)
-TICKS["track"] = 300
+KINDS = "m,s,t,mt,s --index,m --lost 0.01 --vibration 100mrad:200Hz,m --age".split(",")
+TICKS = dict.fromkeys(KINDS, 20) | {"track": 300}
 
 
 def measured(words: Sequence[str]) -> list[str]:

@@ -53,7 +53,8 @@ class EmulatedReads(Box):
     def _answer(self, m: Module, reads: Reads, place: Value, wrong: Value) -> Value:
         """Shift a frame onto the line; return when the position is taken."""
         frame = _frame(reads, place, wrong)
-        word, line, idle, before = Signal(len(frame)), Signal(init=1), Signal(init=1), Signal(init=1)
+        word = Signal(len(frame))
+        line, idle, before = (Signal(init=1, name=name) for name in ("line", "idle", "before"))
         last = (reads.rest + 2 * reads.half) // 2
         still = Signal(range(last + 1))  # clocks since a rise
         rises, falls = self.encoder_clock & ~before, ~self.encoder_clock & before

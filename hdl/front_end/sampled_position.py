@@ -49,7 +49,7 @@ class SampledPosition(Box):
             refused=Out(1),  # a read is not taken, as it is too far from the one before
             elapsed=Out(range(spec.timing.max_ticks + 1), init=spec.timing.max_ticks),  # from the read before
         )
-        self.place = Signal(place) if self._loads else self.position  # which no load changes
+        self.place = Signal(place, name="place") if self._loads else self.position  # which no load changes
         # Of the window that has not ended.
         self.open_number = Signal()
         self.open_sample = Signal(sampled.width)
