@@ -181,7 +181,7 @@ def measured_rows(state: State) -> list[tuple[str, str]]:
 def wrong_rows(state: State) -> list[tuple[str, str]]:
     """Return names and numbers of what has been wrong with its encoder."""
     rows = []
-    for name, text in _ERRORS.items():
+    for name, text in (_ERRORS | {"decode_errors": "wrong reads"} if state.spec.encoder.sampled else _ERRORS).items():
         if name in state.counters or name != "tick_errors":
             number = state.counters.get(name)
             rows.append((text, "-" if number is None else f"{number}{' or more' * (number == _SATURATED)}"))

@@ -27,7 +27,7 @@ from tachometry.boards.monitor.session import Frame
 from tachometry.boards.monitor.watch import State
 from tachometry.boards.simulated.board import SimulatedBoard
 from tachometry.cli.reports.monitor import LiveView, view
-from tachometry.spec import METHODS
+from tachometry.spec import METHODS, of_texts
 
 SIM = f"sim:{BOARD}"
 PAGE = docs.DOCS / "guides" / "monitor.md"
@@ -310,10 +310,10 @@ def test_the_view_fits(width: int) -> None:
     text = shown(state, width, 24)
     assert max(map(len, text.splitlines())) <= width
     if width > 50:
-        assert "255 or more" in text
-        assert "speed " in text
-        assert "bounds" in text
+        assert all(words in text for words in ("255 or more", "speed ", "bounds"))
         assert re.search(r"angle +90\.0° ↑ ", text)
+    state.spec = of_texts("m", {"sensor": "biss", "bits": "9"})
+    assert "wrong reads" in shown(state, 100, 24)
     state.waits_for = "it is out"
     assert "waiting" in shown(state, width, 24)
 
