@@ -3,7 +3,6 @@
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -224,7 +223,7 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     if encoder.sampled is not None:
         reads = Reads.of(spec, trace)
         found = Steps(none, none, reads.errors, none, none, reads=reads)
-        return _asked(spec, found, partial(changes, trace), SYNCHRONISER)
+        return _asked(spec, found, {name: changes(trace, name) for name in spec.front_end.controls}, SYNCHRONISER)
 
     def conditioned(name: str) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
         clock, level = changes(trace, name)
@@ -249,22 +248,19 @@ def decoded(spec: TachometerSpec, trace: PinTrace) -> Steps:
     rises, wide, missed = at[:0], at[:0], at[:0]
     if spec.index:
         rises, wide, missed = _indices(spec, clock, levels, step, conditioned("z"))
+    asked = {name: conditioned(name) for name in spec.front_end.controls}
     swallowed = np.sort(np.concatenate(returned)) + 3
     read = (at, packed([level ^ np.uint8(name in encoder.inverted) for name, level in lines.items()]).astype(np.int64))
     found = Steps(at[1:], step[1:], at[wrong], rises, swallowed, changed, wide, missed, rises, pins=pins, levels=read)
-    return _asked(spec, found, conditioned, spec.latency.pin_to_count)
+    return _asked(spec, found, asked, spec.latency.pin_to_count)
 
 
 def _asked(
-    spec: TachometerSpec,
-    steps: Steps,
-    conditioned: Callable[[str], tuple[NDArray[np.int64], NDArray[np.uint8]]],
-    delay: int,
+    spec: TachometerSpec, steps: Steps, pins: Mapping[str, tuple[NDArray[np.int64], NDArray[np.uint8]]], delay: int
 ) -> Steps:
-    """Return the same steps with the presets and the homing of the pins, whose steps come `delay` clocks later."""
+    """Return the same steps with the presets and the homing of pins, whose steps come `delay` clocks later."""
     asked = {"preset": _none(), "home": _none()}
-    for name in spec.front_end.controls:
-        at, level = conditioned(name)
+    for name, (at, level) in pins.items():
         asked[name] = at[1:][level[1:] > level[:-1]] + delay
     return steps.asked(spec, asked["preset"], np.full(len(asked["preset"]), spec.preset or 0), asked["home"])
 

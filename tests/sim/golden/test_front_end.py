@@ -69,6 +69,8 @@ def test_a_glitch_is_counted_when_the_line_has_gone_back() -> None:
     assert ticks["filtered_edges"].tolist() == [0, 0, 2, 2, 2, 2, 2]
     ticks, _ = count(spec, found, np.array([22, 23]))
     assert ticks["filtered_edges"].tolist() == [0, 2]  # with the strobes in clocks 24 and 25
+    preset = PinTrace.of_lines(trace.clock, 80, {"a": 0 * trace.a, "b": trace.b, "preset": trace.a})
+    assert decoded(spec_of(filter="3", preset="5"), preset).swallowed.tolist() == [22 + 3]
 
 
 @pytest.mark.parametrize("width", [8, 11])
