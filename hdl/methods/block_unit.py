@@ -16,7 +16,7 @@ class BlockUnit(Unit):
     """A multiplier for half a word, and a barrel shifter in two stages; `tracking_units.BLOCK` has their times.
 
     An operation begins in any clock while others are under way, and its result stays until the next one comes. The
-    program sees to it that no two want the same stage in one clock, see `tracking_schedule.clash`.
+    program sees to it that no two want the same stage in one clock, see `tracking_order.clash`.
     """
 
     def __init__(self, program: Program) -> None:

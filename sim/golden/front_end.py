@@ -12,6 +12,7 @@ from tachometry.sim.golden.index_state import in_state, passed_by
 from tachometry.sim.golden.sampled import Reads
 from tachometry.sim.golden.sorted_lookup import places
 from tachometry.sim.golden.tooth_wheel import Teeth, filled
+from tachometry.sim.signals.arrays import wrapped
 from tachometry.sim.signals.recording import PinTrace, merged, packed
 from tachometry.sim.signals.run import Table
 from tachometry.spec import Encoder, TachometerSpec
@@ -120,6 +121,8 @@ def changes(trace: PinTrace, name: str) -> tuple[NDArray[np.int64], NDArray[np.u
 def _none() -> NDArray[np.int64]:
     return np.empty(0, dtype=np.int64)
 
+
+MOST_FILTERED = (1 << 16) - 2  # edges: a glitch has two
 
 # clocks of `Steps`, and what it has for each
 _EVENTS = {"clock": ("step", "displaced", "mapped"), "presets": ("values",)} | dict.fromkeys(
@@ -286,12 +289,6 @@ def first_beyond(steps: Steps, last: NDArray[np.int64], limit: int) -> NDArray[n
     return found[:-1]
 
 
-def wrapped(value: NDArray[np.int64], bits: int) -> NDArray[np.int64]:
-    """Return values in two's complement."""
-    half = 1 << bits - 1
-    return (value + half & 2 * half - 1) - half
-
-
 @dataclass(frozen=True)
 class _Origins:
     """Says what is taken off the sum of all steps: at each index, and from what clock on."""
@@ -376,7 +373,7 @@ def count(
         columns["turned"] = reached - zeros[places(steps.index, last, "right")]
         columns["position_modulo"] = columns["turned"] % counts * parts % counts // parts
     if spec.filter_clocks:
-        columns["filtered_edges"] = 2 * np.minimum(places(steps.swallowed, strobe, "right"), (1 << 15) - 1)
+        columns["filtered_edges"] = np.minimum(2 * places(steps.swallowed, strobe, "right"), MOST_FILTERED)
     if steps.wheel is not None:
         columns["synced"] = steps.wheel.synced(strobe - 1)
     index = {"index_position": wrapped(origins.captured - origins.at_index, spec.position_width)}

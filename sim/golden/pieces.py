@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden import model
-from tachometry.sim.golden.front_end import Steps, count, decoded
+from tachometry.sim.golden.front_end import MOST_FILTERED, Steps, count, decoded
 from tachometry.sim.golden.output import in_unit, with_whole
 from tachometry.sim.golden.standstill import with_standstill
 from tachometry.sim.signals.recording import PinTrace, packed
@@ -110,8 +110,7 @@ class Golden:
         """Return ticks with what came before them, and keep what the next ones need."""
         spec = self._spec
         if spec.filter_clocks:
-            most = 2 * ((1 << 15) - 1)
-            ticks = ticks.having(filtered_edges=np.minimum(ticks.filtered_edges + self._filtered, most))
+            ticks = ticks.having(filtered_edges=np.minimum(ticks.filtered_edges + self._filtered, MOST_FILTERED))
         if spec.facts.rests_with == TICK:
             ticks = with_standstill(spec, ticks, np.ones(len(ticks), dtype=np.int64), self._silent)
         if len(ticks):

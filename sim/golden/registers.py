@@ -7,7 +7,7 @@ import numpy as np
 
 from tachometry.sim import golden
 from tachometry.sim.golden import extras
-from tachometry.sim.golden.front_end import decoded, homed
+from tachometry.sim.golden.front_end import MOST_FILTERED, decoded, homed
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.spec.language.field import WORD, Field, Register
 from tachometry.spec.language.port import INDEX, MISSED, TICK, UPDATE, WHOLE, WIDE
@@ -232,7 +232,7 @@ class GoldenBank:
         return {
             "time": clock % (1 << WORD),
             "age": min(age, self._map.spec.timing.max_ticks),
-            "filtered_edges": 2 * min(glitches, (1 << 15) - 1),
+            "filtered_edges": min(2 * glitches, MOST_FILTERED),
             **self._shown(extras.shown(self._map.spec, self._tables, np.array([clock]), self._cleared)),
             "homed": int(homed(self._map.spec, self._steps, np.array([clock]))[0]),
         }

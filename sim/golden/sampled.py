@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim.golden.encoder_read import Line, Records, records
 from tachometry.sim.golden.sampling import windows
+from tachometry.sim.signals.arrays import wrapped
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
@@ -108,9 +109,7 @@ def _jumps(
 
 def ways(position: NDArray[np.int64], width: int) -> NDArray[np.int64]:
     """Return how far each position of so many bits is from the one before, the first from 0: the shorter way round."""
-    half = 1 << width - 1
-    moved: NDArray[np.int64] = (np.diff(position, prepend=0) + half & 2 * half - 1) - half
-    return moved
+    return wrapped(np.diff(position, prepend=0), width)
 
 
 def ticks_of(spec: TachometerSpec, reads: Reads, last: NDArray[np.int64]) -> Table:
@@ -135,10 +134,10 @@ def ticks_of(spec: TachometerSpec, reads: Reads, last: NDArray[np.int64]) -> Tab
     begun = np.maximum.accumulate(np.where(has & ~known, number, 0))  # the tick of the read that is absolute
     total = np.cumsum(moved)
     position = np.where(through > 0, sample[begun] + total - total[begun], 0) - reads.zero
-    limit, wrap = spec.widths.max_pulse_count, 1 << spec.position_width - 1
+    limit = spec.widths.max_pulse_count
     columns = {
         "pulse_count": np.clip(moved, -limit, limit),
-        "position": (position + wrap & 2 * wrap - 1) - wrap,
+        "position": wrapped(position, spec.position_width),
         "overflow": np.abs(moved) > limit,
         "position_valid": silent < most,
         "number": has & ~forgets,
@@ -159,7 +158,7 @@ def with_presets(spec: TachometerSpec, ticks: Table, clock: NDArray[np.int64], v
     """Return ticks whose position is set in these clocks: that of the tick before becomes the value, if it is valid."""
     shown = np.searchsorted(ticks.clock - spec.latency.tick, clock)  # from these ticks on
     valid = np.append(False, ticks.position_valid)[shown]
-    shown, wrap = shown[valid], 1 << spec.position_width - 1
+    shown = shown[valid]
     ahead = np.append(0, ticks.position[shown - 1] - values[valid])
     position = ticks.position - ahead[np.searchsorted(shown, np.arange(len(ticks)), side="right")]
-    return ticks.having(position=(position + wrap & 2 * wrap - 1) - wrap)
+    return ticks.having(position=wrapped(position, spec.position_width))

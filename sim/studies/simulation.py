@@ -17,7 +17,7 @@ from tachometry.sim.engines.engine import Interrupted, Watch
 from tachometry.sim.engines.pick import pick
 from tachometry.sim.engines.waveform import Curve, add_curves
 from tachometry.sim.golden.pieces import Golden, in_pieces
-from tachometry.sim.signals.arrays import Ints
+from tachometry.sim.signals.arrays import Ints, wrapped
 from tachometry.sim.signals.axes import AxesTrace, Trace, of_axis
 from tachometry.sim.signals.flow import Flow
 from tachometry.sim.signals.progress import Bar, no_bar
@@ -69,17 +69,16 @@ class Axis:
     @property
     def difference(self) -> int:
         """Counts out less counts in; the position may have wrapped."""
-        half = 1 << (self.spec.position_width - 1)
-        return 0 if self.counts_in is None else (self.counts_out - self.counts_in + half) % (2 * half) - half
+        return 0 if self.counts_in is None else wrapped(self.counts_out - self.counts_in, self.spec.position_width)
 
     @property
     def index_distances(self) -> Ints:
         """Counts from each index to the next; the position may have wrapped, or each index resets it."""
-        position, half = np.concatenate(self.tally.places), 1 << (self.spec.position_width - 1)
+        position = np.concatenate(self.tally.places)
         if self.spec.front_end.index_once or self.spec.preset is not None:
             return position[:0]  # they tell of no turn
         distance = position[1:] if self.spec.front_end.index_resets else np.diff(position)
-        return (distance + half) % (2 * half) - half
+        return wrapped(distance, self.spec.position_width)
 
     @property
     def index_lasts(self) -> NDArray[np.float64] | None:

@@ -41,12 +41,6 @@ def clocks_of_product(bits: int, *, block: bool) -> int:
     return 4 if block else bits + 3
 
 
-def wrapped(angle: int, bits: int) -> int:
-    """Return an angle as a signed number."""
-    half = 1 << bits - 1
-    return (angle + half) % (2 * half) - half
-
-
 @dataclass(frozen=True)
 class Angles:
     """How counts and updates become a phase that is new in every clock: fractions of an electrical turn, in 2^-N."""

@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 
 from tachometry.sim.golden.extras import View
 from tachometry.sim.golden.sorted_lookup import Ints
+from tachometry.sim.signals.arrays import wrapped
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.electrical import LEADS, REFUSED, REFUSED_BITS, ElectricalAngle
-from tachometry.spec.formats.angles import SHOWN_BITS, Angles, Factor, wrapped
+from tachometry.spec.formats.angles import SHOWN_BITS, Angles, Factor
 from tachometry.spec.formats.sine import (
     AHEAD_BITS,
     ASIDE,

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from tachometry.sim.golden.extras import View
 from tachometry.sim.golden.extras.electrical import counts_of, slopes_at
 from tachometry.sim.golden.sorted_lookup import Ints
+from tachometry.sim.signals.arrays import wrapped
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.extras.electrical import AngleInTurn
-from tachometry.spec.formats.angles import PLACE_BITS, SHOWN_BITS, wrapped
+from tachometry.spec.formats.angles import PLACE_BITS, SHOWN_BITS
 from tachometry.spec.methods.axis import OneAxis
 
 

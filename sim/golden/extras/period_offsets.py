@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tachometry.sim.golden.extras import View
-from tachometry.sim.golden.front_end import Steps, wrapped
+from tachometry.sim.golden.front_end import Steps
 from tachometry.sim.golden.sorted_lookup import Ints
+from tachometry.sim.signals.arrays import wrapped
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec

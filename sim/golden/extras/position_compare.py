@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tachometry.sim.golden.extras import View
 from tachometry.sim.golden.front_end import Steps, positions_at
+from tachometry.sim.signals.arrays import wrapped
 from tachometry.sim.signals.recording import PinTrace
 from tachometry.sim.signals.run import Table
 from tachometry.spec import TachometerSpec
@@ -47,9 +48,7 @@ def tables(extra: PositionCompare, view: View) -> dict[str, Table]:
     """Return the first clocks of pulses, and their positions; of a list, which the trace fills, also how long it is."""
     spec, places = view.spec, extra.places
     if places.depth:
-        found, changes = _listed(
-            places.depth, _ways(spec, places, view.steps), view.trace, 1 << spec.position_width - 1
-        )
+        found, changes = _listed(places.depth, _ways(spec, places, view.steps), view.trace, spec.position_width)
         at, level = np.array([(0, 0), *changes], dtype=np.int64).T
         return {VALID: _table(found), _WAITING: Table(at, {_WAITING: np.cumsum(level)})}
     if places.fine and spec.carrying:
@@ -59,10 +58,9 @@ def tables(extra: PositionCompare, view: View) -> dict[str, Table]:
 
 def _ways(spec: TachometerSpec, compare: Compare, steps: Steps) -> dict[str, _Passes]:
     """Return where the shaft passes in each direction that counts."""
-    half = 1 << spec.position_width - 1
     # Both ways a position is the edge below it, so a step down from it leads over it.
     place = positions_at(spec, steps, steps.clock, reset=True) + ((steps.step < 0) & (compare.direction == BOTH))
-    place = (place + half) % (2 * half) - half
+    place = wrapped(place, spec.position_width)
     clock = steps.clock + spec.latency.tick
     return {
         way: _Passes(clock[rows], place[rows])
@@ -82,8 +80,8 @@ def _carried(view: View, compare: Compare, way: Carrying) -> Iterator[tuple[int,
     in which it catches up, then the velocity once a clock.
     """
     spec, updates = view.spec, view.tables["measured"]
-    half = 1 << spec.position_width - 1 + way.position_fine_bits
-    widest = half << way.more_bits
+    bits = spec.position_width + way.position_fine_bits
+    widest = bits + way.more_bits
     before = np.searchsorted(_sets(spec, view.steps), updates.clock - spec.latency.native_update, side="right")
     begins = [*(updates.clock + way.latency).tolist(), view.trace.n_clocks]
     columns = (updates.velocity, updates.position_fine, np.diff(before, prepend=0))
@@ -95,15 +93,15 @@ def _carried(view: View, compare: Compare, way: Carrying) -> Iterator[tuple[int,
         place = (fine << way.more_bits) + (turn * way.adds << FASTER_BITS)
         armed &= not jumped
         while clock < end and (number < compare.count or not compare.count):
-            beyond = (place + turn * (clock - since) - (awaited << way.more_bits) + widest) % (2 * widest) - widest
+            beyond = wrapped(place + turn * (clock - since) - (awaited << way.more_bits), widest)
             ahead = (beyond < 0) == (compare.direction == FORWARD)
             if ahead or not armed:
                 armed |= ahead
-                clock += _until(beyond, turn, widest)
+                clock += _until(beyond, turn, 1 << widest - 1)
             else:
                 yield clock, awaited
                 number += 1
-                awaited = (awaited + compare.in_lsb(compare.apart, way.position_fine_bits) + half) % (2 * half) - half
+                awaited = wrapped(awaited + compare.in_lsb(compare.apart, way.position_fine_bits), bits)
                 clock += 1
 
 
@@ -125,7 +123,7 @@ def _computed(spec: TachometerSpec, compare: Compare, steps: Steps, end: int) ->
 
     With both directions a position that is set is followed by one position a clock, until the shaft is between two.
     """
-    ways, half = _ways(spec, compare, steps), 1 << spec.position_width - 1
+    ways = _ways(spec, compare, steps)
     sets = _sets(spec, steps).tolist() if compare.both else []
     at = np.unique(np.append(sets, steps.clock + spec.latency.tick)) if sets else steps.clock[:0]
     place = positions_at(spec, steps, at - spec.latency.tick, reset=True)
@@ -138,7 +136,7 @@ def _computed(spec: TachometerSpec, compare: Compare, steps: Steps, end: int) ->
         for way, passes in ways.items():
             back = compare.direction == BOTH and way == BACKWARD
             if not compare.count or number != (0 if back else compare.count):
-                place = (compare.start + (number - back) * compare.apart + half) % (2 * half) - half
+                place = wrapped(compare.start + (number - back) * compare.apart, spec.position_width)
                 found.append((passes.first(place, clock + 1), place, -1 if back else 1))
         return min(found, default=(_NEVER, 0, 0))
 
@@ -147,7 +145,7 @@ def _computed(spec: TachometerSpec, compare: Compare, steps: Steps, end: int) ->
         here = int(place[np.searchsorted(at, clock + 1, side="right") - 1])
         beyond = here - compare.start - number * compare.step
         if not compare.count:
-            beyond = (beyond + half) % (2 * half) - half
+            beyond = wrapped(beyond, spec.position_width)
         above = beyond >= 0 and (number != compare.count or not compare.count)
         return above - (beyond < -compare.step and (number > 0 or not compare.count))
 
@@ -162,7 +160,7 @@ def _computed(spec: TachometerSpec, compare: Compare, steps: Steps, end: int) ->
             clock, number = clock + 1, number + turn
 
 
-def _listed(depth: int, ways: dict[str, _Passes], trace: PinTrace, half: int) -> tuple[Clocks, Clocks]:
+def _listed(depth: int, ways: dict[str, _Passes], trace: PinTrace, bits: int) -> tuple[Clocks, Clocks]:
     """Return the same of a list, and by how much the list changes, from which clocks on.
 
     A position is awaited two clocks after it was appended, or a clock after the one before it was reached. There is
@@ -184,7 +182,7 @@ def _listed(depth: int, ways: dict[str, _Passes], trace: PinTrace, half: int) ->
             empty(clock)
         elif append and len(awaited) - bisect_right(awaited, clock) != depth - 1:
             awaited.append(max(clock + 2, reached[-1][0] + 1 if reached else 0))
-            place = (place + half) % (2 * half) - half
+            place = wrapped(place, bits)
             reached.append((min(passes.first(place, awaited[-1]) for passes in ways.values()), place))
             changes.append((clock + 1, 1))
     empty(_NEVER - 1)

@@ -1,7 +1,7 @@
 """The tracking recursion of positions that are read; docs/concepts/track.md has its rules."""
 
 from tachometry.sim.golden.methods.track_recursion import ONE, REST, TRACKS, Recursion, Row, log2
-from tachometry.spec.formats.angles import wrapped
+from tachometry.sim.signals.arrays import wrapped
 from tachometry.spec.formats.tracking import WIDTH
 from tachometry.spec.formats.tracking_sampled import OFFSET_BITS, SampledTracking
 
