@@ -48,7 +48,7 @@ class AxisTickCounts(AxisCounters):
         # As a reset of registers, which takes no cells.
         with m.If(earlier_first):
             m.d.sync += [before[name].eq(0) for name in ("number", "places", "moved", "times")]
-        with m.If(~earlier_ready):  # the memory is not that of a reset
+        with m.If(~earlier_ready):  # a reset does not clear the memory
             m.d.sync += before.end.eq(0)
         number, moved = before.number, before.moved
         takes = Signal()

@@ -160,7 +160,7 @@ class SampledPosition(Box):
                 ]
 
     def _place(self, m: Module) -> None:
-        """Drive the position: the read, with its turns, less what is subtracted from it."""
+        """Drive the position: the read with its turns, less the zero, and less what a preset has left."""
         whole = Cat(self.sample_before, self.turns)
         if self._zeroed:
             zero = Signal.like(self.zero, name="zero_before")

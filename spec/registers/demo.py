@@ -49,7 +49,9 @@ class DemoMap(RegisterMap):
 
     def __post_init__(self) -> None:
         if not self.spec.encoder.plain:
-            raise ParameterError("sensor", "must be quadrature, sampled, ssi or biss on boards, as it comes")
+            raise ParameterError(
+                "sensor", "must be quadrature, sampled, ssi or biss on boards, not reversed or inverted"
+            )
         refuse(self.spec.extras, "demo")
 
     @cached_property

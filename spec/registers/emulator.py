@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from fractions import Fraction
 
 from tachometry.spec.core.tachometer import TachometerSpec
 
@@ -70,5 +69,4 @@ def fastest(spec: TachometerSpec) -> float:
 
 def _periods(spec: TachometerSpec, radians: float) -> float:
     """Return periods of a line in an angle of the shaft; of an encoder that is read, an edge is an LSB."""
-    periods = Fraction(spec.encoder.pulses_per_rev, 4 if spec.encoder.sampled else 1)
-    return radians / (2 * math.pi) * float(periods * spec.encoder.turns)
+    return radians / (8 if spec.encoder.sampled else 2) / math.pi * spec.encoder.pulses_per_rev * spec.encoder.turns
