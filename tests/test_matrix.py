@@ -46,9 +46,10 @@ def test_every_pair_of_options(method: str, part: int, tmp_path: Path) -> None:
 def check(words: tuple[str, ...], folder: Path, motions: int, left: int) -> None:
     folder.mkdir(exist_ok=True)
     spec = spec_of(words)
-    # Long windows and what waits for the filter give few updates.
+    # Long windows and what waits for the filter give few updates, as do edges that are not counted.
     rare = {"--min-time", "--lowpass"} & {*words}
-    trace = stress(spec, 1, 400 if rare else 300 if spec.timing.tick_cycles < 100 else 200)
+    edges = 400 if rare else 300 if spec.timing.tick_cycles < 100 else 200
+    trace = stress(spec, 1, edges if spec.encoder.decoding >= 4 else 3 * edges)
     n_clocks = trace.n_clocks + min(left, motions * stress(spec, 2, EDGES).n_clocks)
     verilator = LintingVerilator(folder, few=n_clocks < 3_000_000)
     engine: CompiledEngine = verilator
@@ -59,13 +60,12 @@ def check(words: tuple[str, ...], folder: Path, motions: int, left: int) -> None
     assert found.n_mismatches == 0, found.first
     # All that the configuration can show has happened.
     actual, updates = found.actual, found.actual.updates
-    assert np.count_nonzero(~updates.forced) > (5 if rare else 50)
+    assert np.count_nonzero(~updates.forced) > (5 if rare else 100)
     if "--paper-exact" not in words:  # a velocity that does not decay has one where the shaft rests
         assert spec.method == "m" or np.count_nonzero(updates.forced) > ("--no-bound-decay" not in words)
     assert actual.tables[spec.facts.rests_with].standstill.any()
     assert bool(len(actual.errors)) == (spec.encoder.sensor != "pulses") or bool(spec.filter_clocks)
-    # One that is taken once waits for homing.
-    assert bool(len(actual.index.clock)) == (spec.index is not None) or spec.front_end.index_once
+    assert bool(len(actual.index.clock)) == (spec.index is not None)
     assert bool(len(actual.tick_errors)) == spec.external_tick
     assert updates.get("velocity_overflow").any() <= ("--velocity-width" in words)
     # The golden low-pass filter goes from update to update.
