@@ -309,9 +309,8 @@ class Encoder:
 
     @property
     def plain(self) -> bool:
-        """Whether demos emulate it: quadrature whose lines are as they come, or positions that are read."""
-        emulated = ("quadrature", "sampled", *_SERIAL)
-        return self.sensor in emulated and not self.reverse and not self.invert
+        """Whether it is quadrature whose lines are as they come."""
+        return self.sensor == "quadrature" and not self.reverse and not self.invert
 
     @property
     def encoder_counts(self) -> int:

@@ -48,7 +48,8 @@ class DemoMap(RegisterMap):
     """
 
     def __post_init__(self) -> None:
-        if not self.spec.encoder.plain:
+        encoder = self.spec.encoder
+        if not encoder.plain and (encoder.reverse or encoder.sensor not in ("sampled", "ssi", "biss")):
             raise ParameterError(
                 "sensor", "must be quadrature, sampled, ssi or biss on boards, not reversed or inverted"
             )
