@@ -8,7 +8,10 @@ from typing import Any
 from tachometry.boards.fpga.flow import Flow
 
 # Lines of an encoder that the core reads are on the pins of others.
-_READ = {"encoder_data": "a", "encoder_clock": "b", "emulated_encoder_data": "emulated_a"}
+_READ = {
+    **{"encoder_data": "a", "encoder_clock": "b", "rs485_rx": "a", "rs485_tx": "b", "rs485_de": "z"},
+    **{f"emulated_{line}": "emulated_a" for line in ("encoder_data", "rs485_rx", "spi_miso")},
+}
 
 
 def pins(text: str) -> dict[str, str]:

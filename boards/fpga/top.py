@@ -69,8 +69,8 @@ class BoardTop(Elaboratable):
                 m.d.comb += port.eq(buffer.i)
             else:
                 m.d.comb += buffer.o.eq(port)
-            if name in _SHARED:
-                m.d.comb += buffer.oe.eq(~buffers[_SHARED[name]].i)
+                if name in _SHARED:
+                    m.d.comb += buffer.oe.eq(~buffers[_SHARED[name]].i)
         if _LEDS in self._core.signature.members:
             lights = Value.cast(getattr(self._core, _LEDS))
             for number in range(min(self._board.leds, len(lights))):

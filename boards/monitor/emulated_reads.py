@@ -28,6 +28,6 @@ def with_reads(spec: TachometerSpec, lines: PinTrace) -> PinTrace:
     else:
         at, level = answer(reads, start, Answers(place[1:], 1 + reads.delay, error=bad[1:]))
         read = {reads.line: level}
-    clock = merged(lines.clock, at)
-    clock, held = clock[clock < lines.n_clocks], np.searchsorted(at, clock, side="right") - 1
+    clock = merged(lines.clock, at[at < lines.n_clocks])
+    held = np.searchsorted(at, clock, side="right") - 1
     return PinTrace.of_lines(clock, lines.n_clocks, lines.at(clock) | {name: one[held] for name, one in read.items()})

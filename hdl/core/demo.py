@@ -13,7 +13,7 @@ from tachometry.hdl.wires.ports import Box, by_name, drive, follow, hand_through
 from tachometry.hdl.wires.synchronizer import Synchronizer
 from tachometry.spec.language.field import WORD
 from tachometry.spec.registers.buses import CAPTURE, Bus
-from tachometry.spec.registers.demo import DATA, ENCODER_LINES, PERIOD_WIDTH, DemoMap, demo_ports, emulated
+from tachometry.spec.registers.demo import ENCODER_LINES, PERIOD_WIDTH, DemoMap, demo_ports, emulated
 
 
 class Demo(Box):
@@ -96,13 +96,14 @@ class Demo(Box):
         core, bank = self.core, self.core.bank
         m.submodules.reads = ResetInserter(bank.restart)(reads)
         follow(m, reads, self.emulator, ("a", "b"))
-        if self._map.reads:
+        if (made := self._map.spec.reads) is None:
             given = by_name(reads, self._map.reads)
             drive(m, core, given | {"sample_valid": reads.sample_valid & bank.emulated})
             return {}
-        follow(m, reads, core, ["encoder_clock"])
-        follow(m, self, core, ["encoder_clock"])
-        return by_name(reads, [DATA])
+        _, *driven = (port.name for port in made.ports)
+        follow(m, reads, core, driven)
+        follow(m, self, core, driven)
+        return by_name(reads, [made.line])
 
     def _enable(self, m: Module) -> None:
         """Give the loop its enable, which comes from a pin, and which many flip-flops follow."""

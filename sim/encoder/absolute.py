@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tachometry.spec.core.chips import POSITION_BITS, SpiReads
 from tachometry.spec.core.reads import Reads, remainders
-from tachometry.spec.core.tformat import CHARACTER, N_CHARACTERS, PLACE, REQUEST, STATUS, TURNS, TformatReads
+from tachometry.spec.core.tformat import CHARACTER, IDENTITY, N_CHARACTERS, PLACE, REQUEST, STATUS, TURNS, TformatReads
 
 Clocks = NDArray[np.int64]
 
@@ -52,7 +52,7 @@ def _tformat(reads: TformatReads, answers: Answers) -> Clocks:
     data[:, 0], data[:, STATUS] = REQUEST, answers.of("error") << 4 | answers.of("warning") << 5
     for first, value in ((PLACE, answers.position & (1 << bits) - 1), (TURNS, answers.position >> bits)):
         data[:, first : first + 3] = value[:, None] >> np.array([0, 8, 16]) & 0xFF
-    data[:, 5] = 0x17  # its identification
+    data[:, TURNS - 1] = IDENTITY
     data[:, -1] = np.bitwise_xor.reduce(data, axis=1)
     sent = (data << 1 | 1 << CHARACTER - 1)[:, :, None] >> np.arange(CHARACTER) & 1
     return sent.reshape(len(sent), -1)

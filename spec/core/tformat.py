@@ -11,6 +11,7 @@ RATES = (2_500_000, 5_000_000)  # bits a second
 REQUEST = 0x1A  # data identifier 3: status, place, identification, turns, alarms
 CHARACTER, N_CHARACTERS = 10, 11  # bits with start and stop; characters of an answer, the last the XOR of the others
 STATUS, PLACE, TURNS = 1, 2, 6  # characters; those of places and turns are three, the lowest first
+IDENTITY = 0x17  # the character before those of turns, of an encoder of 17 bits
 MOST_BITS = 24  # of places and turns
 # Bits of the status: a counting error, or an error of the request; another alarm.
 ERRORS, WARNINGS = 0b1101_0000, 0b0010_0000

@@ -26,8 +26,6 @@ from tachometry.spec.registers.manifest import described_port
 from tachometry.spec.registers.map import RegisterMap
 
 ENCODER_LINES = ("a", "b", "z")
-DATA = "encoder_data"  # the line of an encoder that the core reads
-DRIVEN = ("current_pdm", "encoder_clock")  # the current of a loop, as a stream of bits; the clock of such an encoder
 LEDS = 4
 PERIOD_WIDTH = 16  # bits of the telemetry's period
 
@@ -49,10 +47,9 @@ class DemoMap(RegisterMap):
 
     def __post_init__(self) -> None:
         encoder = self.spec.encoder
-        if not encoder.plain and (encoder.reverse or encoder.sensor not in ("sampled", "ssi", "biss")):
-            raise ParameterError(
-                "sensor", "must be quadrature, sampled, ssi or biss on boards, not reversed or inverted"
-            )
+        if not encoder.plain and (encoder.reverse or not encoder.sampled):
+            rest = "must be quadrature or an absolute encoder on boards, not reversed or inverted"
+            raise ParameterError("sensor", rest)
         refuse(self.spec.extras, "demo")
 
     @cached_property
@@ -140,12 +137,13 @@ def demo_map(spec: TachometerSpec | LoopSpec) -> DemoMap:
 
 def demo_ports(registers: DemoMap, bus: Bus) -> tuple[Port, ...]:
     """Return all ports of a demo on a bus."""
-    inputs = registers.inputs
-    driven = [port for port in registers.core_ports if port.name in DRIVEN]
+    inputs, reads = registers.inputs, registers.spec.reads
+    line, *others = [port.name for port in reads.ports] if reads else ["z"]
+    driven = [port for port in registers.core_ports if port.name in ("current_pdm", *others)]  # a stream of bits
     emulated = [
         Port(f"emulated_{pin.name}", "output", help=f"Line {pin.name.upper()} of the emulated encoder.")
         for pin in inputs
-        if pin.name in (*ENCODER_LINES, DATA)
+        if pin.name in (*ENCODER_LINES, line)
     ]
     lights = "The shaft turns; it turned backward at the last update; something went wrong; the clock runs."
     return (*inputs, *bus.ports(registers), *emulated, *driven, Port("leds", "output", LEDS, help=lights))

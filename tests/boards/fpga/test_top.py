@@ -1,6 +1,7 @@
 """Ports are on the pins that boards have for them, and vendors' tools get projects."""
 
 import os
+import re
 import subprocess
 import sys
 import zipfile
@@ -14,7 +15,7 @@ from amaranth import Module
 from amaranth.lib import io, wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.sim import Simulator
-from support.nightly import only_rows
+from support.nightly import only, only_rows
 from support.simulate import clock_by_clock
 
 from tachometry.boards.fpga.board import Board
@@ -169,12 +170,24 @@ def test_every_board_has_pins_for_every_port(name: str, bus: str) -> None:
     assert not any("/site-packages/" in str(content) for content in plan.files.values())
 
 
-def test_the_lines_of_an_encoder_that_is_read_have_pins() -> None:
-    board, on = BOARDS["icebreaker"], bus_of("uart")
+# Lines of encoders that are read, that of the encoder first, and the ports whose pins they have.
+READ = {
+    "sensor=spi chip=amt22": ("spi_miso spi_sck spi_cs_n spi_mosi", "spi_miso spi_sck spi_cs_n spi_mosi"),
+    "sensor=ssi": ("encoder_data encoder_clock", "a b"),
+    "sensor=tformat": ("rs485_rx rs485_tx rs485_de", "a b z"),
+}
+
+
+@pytest.mark.parametrize("encoder", only([*READ][:1], READ))
+def test_the_lines_of_an_encoder_that_is_read_have_pins(encoder: str) -> None:
+    board, on = BOARDS["ulx3s-12f"], bus_of("uart")
     assert on is not None
-    texts = {"sensor": "ssi", "bits": "9", "clock": str(board.clock_hz), "tick": "1ms"}
-    lines = [*lines_of(prepared(component(of_texts("m", texts), on), board).files)]
-    for port, other in {"encoder_data": "a", "encoder_clock": "b", "emulated_encoder_data": "emulated_a"}.items():
+    texts = {"bits": "12", "clock": str(board.clock_hz), "tick": "1ms", **dict(re.findall(r"(\w+)=(\w+)", encoder))}
+    files = prepared(component(of_texts("m", texts), on), board).files
+    lines = [*lines_of(files)]
+    ports, others = (words.split() for words in READ[encoder])
+    assert f"connect \\{ports[1]} 1'" not in files["top.il"]  # always of one level
+    for port, other in zip((*ports, f"emulated_{ports[0]}"), (*others, "emulated_a"), strict=True):
         assert board.pins[port] == board.pins[other]
         assert any(f"tachometer_0__{port}__io" in line for line in lines)
 

@@ -63,6 +63,16 @@ def test_the_selftest_passes(method: str, capsys: pytest.CaptureFixture[str]) ->
     assert len(steps) >= 10
 
 
+@nightly  # tests/hdl/core/test_demo.py has each frame of them
+@pytest.mark.parametrize("encoder", ["spi --chip as5047p --bits 14", "spi --chip amt22 --bits 12", "tformat --bits 17"])
+def test_an_emulated_encoder_is_read_without_an_error(encoder: str, capsys: pytest.CaptureFixture[str]) -> None:
+    words = f"--sensor {encoder} --tick 200us --method m --set speed=100rad/s --duration 300ms".split()
+    assert run("monitor", "sim:ulx3s-12f", *words) == 0  # T-format needs a multiple of its bits for a clock
+    shown = re.search(r"speed (\S+) rad/s,.* wrong reads 0, ", capsys.readouterr().out.splitlines()[-1])
+    assert shown is not None
+    assert float(shown[1]) == pytest.approx(100, rel=0.1)
+
+
 def test_a_failed_selftest(capsys: pytest.CaptureFixture[str], manifest: Path) -> None:
     """The board always shows 0."""
     with SimulatedBoard(ToldBoard(demo_map()), CLOCK_HZ) as board:

@@ -6,15 +6,19 @@ import numpy as np
 import pytest
 from support.demo import DemoPort, uart
 from support.nightly import only
+from support.simulate import clock_by_clock
 
 from tachometry.boards.host.demo import DemoBoard
 from tachometry.boards.monitor.selftest import Step, selftest
+from tachometry.hdl.core.emulated_reads import EmulatedReads
+from tachometry.sim.encoder.absolute import Answers, answer
 from tachometry.spec import of_texts
 from tachometry.spec.core.index import Index
 from tachometry.spec.registers.demo import DemoMap, demo_manifest
 from tachometry.spec.registers.emulator import EmulatorSettings, fastest, rate_of, speed_of
 
 _COMMON = {"ppr": "16", "clock": "8MHz", "tick": "20us"}
+_READ = {"clock": "8MHz", "tick": "100us", "health": "yes"}
 WATCHED = {"health": "yes", "differential": "9"}
 CORES = {
     "index, filter, age": of_texts(
@@ -22,12 +26,15 @@ CORES = {
     ),
     "external tick, bounds": of_texts("m", {**_COMMON, "max-time": "1ms", "external-tick": "yes", "bounds": "yes"}),
     "reads": of_texts("m", {"sensor": "sampled", "bits": "2+6", "clock": "8MHz", "tick": "20us", "health": "yes"}),
-    "biss": of_texts("m", {"sensor": "biss", "bits": "2+8", "clock": "8MHz", "tick": "50us", "health": "yes"}),
+    "biss": of_texts("m", {"sensor": "biss", "bits": "2+8", **_READ, "tick": "50us"}),
     "ssi": of_texts(
         "m",
         {"sensor": "ssi", "bits": "9", "clock": "8MHz", "tick": "100us", "line-delay": "600ns"}
         | {"gray": "yes", "repeat": "yes", "external-tick": "yes"},
     ),
+    "as5047p": of_texts("m", {"sensor": "spi", "chip": "as5047p", "bits": "14", **_READ}),
+    "amt22": of_texts("m", {"sensor": "spi", "chip": "amt22", "bits": "12", "line-delay": "300ns", **_READ}),
+    "tformat": of_texts("m", {"sensor": "tformat", "bits": "3+9", "line-delay": "300ns", **_READ, "clock": "10MHz"}),
     "index that resets": of_texts("rairan", {**_COMMON, "max-time": "2ms", "index": "yes", "index-reset": "yes"}),
 }
 
@@ -61,7 +68,7 @@ def random_steps(registers: DemoMap, seed: int) -> list[Step]:
     ]
 
 
-@pytest.mark.parametrize("name", only([*[*CORES][:1], "biss"], [*CORES]))
+@pytest.mark.parametrize("name", only([*[*CORES][:1], "biss", "as5047p", "tformat"], [*CORES]))
 def test_every_frame_is_that_of_the_golden_models(name: str) -> None:
     spec = CORES[name]
     registers = DemoMap(spec)
@@ -72,6 +79,28 @@ def test_every_frame_is_that_of_the_golden_models(name: str) -> None:
     assert min(result.frames for result in results) > 5
     counts = board.link.receiver.counts
     assert (counts.lost, counts.bytes_dropped, port.board.n_broken) == (0, 0, 0)
+
+
+# The lines of a core in a clock of a read that begins in clock 0.
+DRIVEN = {
+    "amt22": lambda reads, clock: {
+        "spi_cs_n": clock < 1,
+        "spi_sck": any(0 <= clock - change - reads.half < reads.half for change in reads.changes),
+    },
+    "tformat": lambda reads, clock: {"rs485_de": 0 < clock < reads.taken, "b": clock > 0},  # a step backward
+}
+
+
+@pytest.mark.parametrize("name", DRIVEN)
+def test_an_emulated_line_changes_when_that_of_the_model_does(name: str) -> None:
+    """Where the core does not show each clock: the velocity of method m does not depend on the age of a read."""
+    reads = CORES[name].reads
+    assert reads is not None
+    rows = [DRIVEN[name](reads, clock) for clock in range(reads.longest)]
+    line = [row[reads.line] for row in clock_by_clock(EmulatedReads(CORES[name]), rows, [reads.line])]
+    place = np.array([(1 << reads.width) - 1 if name == "tformat" else 0])
+    model, _ = answer(reads, np.array([0]), Answers(place, 1 + reads.delay))
+    assert [clock for clock in range(1, len(line)) if line[clock] != line[clock - 1]] == model[1:].tolist()
 
 
 def test_pins_and_settings_survive_a_restart() -> None:
