@@ -146,8 +146,8 @@ def monitor(
                     stack.enter_context(publisher)
                 name = stack.enter_context(target.presence())
                 stop.orderly = True
-                label, described = target.label(name), target.manifest
-                session = Session(label, lambda: target.open(name), described, period, settings, screen.notice)
+                about = (target.label(name), lambda: target.open(name), target.manifest, period, settings)
+                session = Session(*about, screen.notice, target.timeout)
                 with screen:
                     watch(session, state, screen, [one for one in (recorder, publisher) if one], seconds, stop)
         except Exception as error:
@@ -174,8 +174,7 @@ def _selftest(target: Target) -> int:
     """Run the self-test, and print what its steps have shown; 1 if one has failed."""
     report = SelftestReport([step.name for step in steps(target.registers)])
     with target.presence() as name, target.open(name) as port:
-        # A simulated board is as late as its computer is busy.
-        board = connected(target.label(name), port, target.manifest, 30.0 if target.is_simulated else 0.5)
+        board = connected(target.label(name), port, target.manifest, target.timeout)
         report.head()
         results = run_selftest(board, target.registers, told=report.line)
     return 0 if report.verdict(results) else 1

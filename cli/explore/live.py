@@ -137,9 +137,8 @@ class _Watched:
         spec = target.registers.spec
         tick = float(spec.timing.tick_seconds)
         self._state = State(target.title, spec, {column.name: column for column in columns(target.registers)})
-        self._session = Session(
-            target.port, self._open, target.manifest, max(round(_EVERY / tick), 1), settings, self.notice
-        )
+        about = (target.port, self._open, target.manifest, max(round(_EVERY / tick), 1), settings)
+        self._session = Session(*about, self.notice, target.timeout)
         self._port = target.port
         self._rows: deque[tuple[Any, ...]] = deque(maxlen=_KEPT)
         self._told = "compiling the board…" if target.is_simulated else "connecting…"

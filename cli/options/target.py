@@ -43,6 +43,11 @@ class Target:
         """Whether there is no hardware."""
         return self.port.startswith(SIMULATED)
 
+    @property
+    def timeout(self) -> float:
+        """Seconds that an answer may take: a simulated board is as late as its computer is busy."""
+        return 30.0 if self.is_simulated else 0.5
+
     @contextmanager
     def presence(self) -> Iterator[str]:
         """Yield the name of the serial port, while there is a board at it."""

@@ -110,6 +110,16 @@ def test_a_recording(suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
 
 
+def test_a_busy_computer_has_time_to_simulate(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def session(*given: object) -> None:
+        raise ValueError(f"{given[-1]:g} s for an answer")
+
+    monkeypatch.setattr("tachometry.cli.commands.monitor.Session", session)
+    assert error(capsys, SIM, *WORDS, "--method", "m") == "30 s for an answer"
+
+
 @contextmanager
 def started(*words: object) -> "Iterator[subprocess.Popen[str]]":
     """Yield the command in a process of its own, which does not outlive the test."""

@@ -103,6 +103,8 @@ def test_a_slow_core_is_watched() -> None:
     live = Live(None, None)
     slow = {"method": "m", "ppr": "1", "tick": "1ms", "max-time": "1s", "max-speed": "0.01rad/s"}
     assert 0 < live.start(slow, f"sim:{BOARD}")["settings"][0]["value"] < 0.1
+    assert live._watched is not None
+    assert live._watched._session._timeout == 30  # seconds: the computer that simulates may be busy
     live.close()
     live.join()
 
