@@ -131,8 +131,8 @@ def _rows(axis: Axis) -> list[tuple[str, str]]:
         rows.append(("homed", "yes" if run.ticks.homed[-1] else "no"))
     if spec.preset is not None:
         rows.append(("position", f"{run.ticks.position[-1]} at the end; counts out are without presets"))
-    if spec.front_end.modulus is not None:
-        rows.append(("position modulo", f"{run.ticks.position_modulo[-1]} of {spec.front_end.modulus} at the end"))
+    if spec.modulus is not None:
+        rows.append(("position modulo", f"{run.ticks.position_modulo[-1]} of {spec.modulus} at the end"))
     rows += filter(None, (extra.row(spec, run) for extra in spec.extras))
     if spec.external_tick:
         rows.append(("tick errors", f"{len(run.tick_errors)} (external tick too early or missing)"))

@@ -87,7 +87,7 @@ class RegisterCore(Box):
 
     def _place(self, m: Module) -> None:
         """Let a program set the position, arm the index, and move the place within a modulus."""
-        core, bank, modulus = self.tachometer, self.bank, self._map.spec.front_end.modulus
+        core, bank, modulus = self.tachometer, self.bank, self._map.spec.modulus
         for name, box in core.controls.items():
             m.d.comb += box.asked.eq(getattr(bank, f"{name}_now"))
         if "preset" in core.controls:

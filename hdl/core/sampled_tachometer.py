@@ -58,7 +58,7 @@ class SampledTachometer(Tachometer):
         fault = Mux(reader.decode_error, Mux(reader.sample_ok, NO_ANSWER, wrong), Mux(warned, WARNING, 0))
         m.d.comb += self.read_fault.eq(Mux(reader.refused, JUMP, fault))
         drive(m, reader, {"last": self.sampling_clock.last})
-        if self._spec.front_end.modulus is not None:
+        if self._spec.modulus is not None:
             m.d.comb += self.position_modulo.eq(reader.place)
         shown = ("tick", "pulse_count", "overflow", "position", "position_valid", "decode_error")
         follow(m, self, reader, shown)

@@ -82,7 +82,7 @@ class Tachometer(Box):
         )
         self.position_counter: Box = PositionCounter(spec.position_width, latency, spec.preset)
         self.controls = {name: PinRise(latency) for name in front.controls}
-        self.modulo_counter = None if front.modulus is None else ModuloCounter(front.modulus, latency)
+        self.modulo_counter = None if spec.modulus is None else ModuloCounter(spec.modulus, latency)
         self.index_capture = None
         if spec.index:
             early = spec.displacement is not None

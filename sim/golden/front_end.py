@@ -367,9 +367,9 @@ def count(
     }
     if spec.front_end.index_once:
         columns["homed"] = homed(spec, steps, strobe)
-    if spec.front_end.modulus is not None:
+    if spec.modulus is not None:
         zeros = np.append(0, (origins.captured + steps.turned) * spec.front_end.index_resets) - steps.turned
-        counts, parts = spec.front_end.modulus.as_integer_ratio()
+        counts, parts = spec.modulus.as_integer_ratio()
         columns["turned"] = reached - zeros[places(steps.index, last, "right")]
         columns["position_modulo"] = columns["turned"] % counts * parts % counts // parts
     if spec.filter_clocks:

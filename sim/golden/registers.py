@@ -123,7 +123,7 @@ class GoldenBank:
     def _ask(self, accesses: Sequence[Access]) -> None:
         """Find what the core shows if a program sets the position, lets the index through, and writes offsets."""
         spec = self._map.spec
-        if not spec.front_end.controls and spec.front_end.modulus is None and spec.encoder.zero is None:
+        if not spec.front_end.controls and spec.modulus is None and spec.encoder.zero is None:
             return
         written_at = self._written(accesses)
         pins = self._pins

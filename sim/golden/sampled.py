@@ -149,8 +149,8 @@ def ticks_of(spec: TachometerSpec, reads: Reads, last: NDArray[np.int64]) -> Tab
         "length": np.diff(last, prepend=-1),
         **reads.exchanged(last + spec.latency.tick),
     }
-    if spec.front_end.modulus is not None:
-        columns["position_modulo"] = position % int(spec.front_end.modulus)
+    if spec.modulus is not None:
+        columns["position_modulo"] = position % int(spec.modulus)
     return Table(last + spec.latency.tick, columns)
 
 

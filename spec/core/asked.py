@@ -142,6 +142,14 @@ class Asked:
         spread = 0 if sampled.age is not None else 2 * self.timing.tick_cycles
         return Reach.of(sampled.width, counts, self.reads.age_spread if self.reads else spread)
 
+    @property
+    def modulus(self) -> Fraction | None:
+        """Counts within which `position_modulo` is, not always whole; None: there is none."""
+        if self.position_modulo is None:
+            return None
+        of, _, parts = self.position_modulo.partition("/")
+        return Fraction(self.encoder.counts_per_rev if of == "rev" else int(of)) / int(parts or 1)
+
     def read_starts(self, n_clocks: int) -> range:
         """Return the clocks in which reads begin, with ticks that are nominal."""
         assert self.reads is not None

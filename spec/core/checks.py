@@ -49,7 +49,7 @@ def _check_sampled(spec: Core) -> None:
     half = 1 << spec.position_width - 1
     if not -half <= (spec.encoder.zero or 0) < half:
         raise ParameterError("zero", f"must be from {-half} to {half - 1}, a position, not {spec.encoder.zero}")
-    if (counts := spec.front_end.modulus) and (counts.denominator > 1 or counts.numerator.bit_count() > 1):
+    if (counts := spec.modulus) and (counts.denominator > 1 or counts.numerator.bit_count() > 1):
         above = 1 << max(int(counts), 2).bit_length()
         typed = f"type {above // 2} or {above}"
         rest = f"must be a power of two for an encoder that is read, not {float(counts):.9g}: {typed}"
@@ -110,7 +110,7 @@ def _check_place(spec: Core) -> None:
     half = 1 << spec.position_width - 1
     if spec.preset is not None and not -half <= spec.preset < half:
         raise ParameterError("preset", f"must be from {-half} to {half - 1}, a position, not {spec.preset}")
-    if (counts := spec.front_end.modulus) is None:
+    if (counts := spec.modulus) is None:
         return
     if str(spec.position_modulo)[0] == "r" and spec.encoder.ratio is not None and spec.front_end.index_resets:
         raise ParameterError("position_modulo", "must be counts with --ratio and --index-reset: the encoder's index")

@@ -1,4 +1,4 @@
-"""The front end of a core: its lines and other inputs, and what the position is counted within and set by."""
+"""The front end of a core: its lines and other inputs, and what sets the position."""
 
 from dataclasses import dataclass
 from fractions import Fraction
@@ -109,17 +109,9 @@ class FrontEnd:
         return self.asked.index is not None and not self.asked.index.once
 
     @property
-    def modulus(self) -> Fraction | None:
-        """Counts within which `position_modulo` is, not always whole; None: there is none."""
-        if self.asked.position_modulo is None:
-            return None
-        of, _, parts = self.asked.position_modulo.partition("/")
-        return Fraction(self.asked.encoder.counts_per_rev if of == "rev" else int(of)) / int(parts or 1)
-
-    @property
     def shifted_modulus(self) -> Fraction | None:
         """The modulus, if a program may shift the place within it."""
-        modulus = self.modulus
+        modulus = self.asked.modulus
         return modulus if modulus and modulus.denominator == 1 and self.asked.encoder.sampled is None else None
 
     @property

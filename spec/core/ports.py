@@ -58,7 +58,7 @@ def ports_of(spec: Core, own: Iterable[Port]) -> Iterator[Port]:
 def _more_ports(spec: Core) -> Iterator[Port]:
     """Yield ports of options."""
     yield from _index_ports(spec)
-    if modulus := spec.front_end.modulus:
+    if modulus := spec.modulus:
         text = f"Counts up to this period modulo {modulus}, from 0 on, since reset or since an index that resets. "
         text += "It also changes between ticks. A preset does not change it."
         text = f"The position modulo {modulus}, from 0 on." if spec.encoder.sampled else text
