@@ -92,7 +92,10 @@ class RegisterCore(Box):
             m.d.comb += box.asked.eq(getattr(bank, f"{name}_now"))
         if "preset" in core.controls:
             m.d.comb += core.position_counter.value.eq(bank.preset_value)
-        if modulus is not None:
+        if self._map.spec.remainder is not None:  # it is as it was with the latest tick
+            for box in (self, bank):
+                follow(m, box, core, [_MODULO])
+        elif modulus is not None:
             counts, _ = modulus.as_integer_ratio()
             total = core.position_modulo + (bank.modulo_offset if self._map.spec.front_end.shifted_modulus else 0)
             latest = Signal.like(self.position_modulo)

@@ -7,6 +7,7 @@ from tachometry.hdl.core.tachometer import Tachometer
 from tachometry.hdl.front_end.conditioner import InputConditioner
 from tachometry.hdl.front_end.encoder_master import EncoderMaster
 from tachometry.hdl.front_end.pin_rise import PinRise
+from tachometry.hdl.front_end.remainder import Remainder
 from tachometry.hdl.front_end.sampled_position import SampledPosition
 from tachometry.hdl.front_end.sampling_clock import SamplingClock
 from tachometry.hdl.front_end.serial_encoder import SerialEncoder
@@ -30,10 +31,11 @@ class SampledTachometer(Tachometer):
         self.master = None if spec.reads is None else master_of(spec.reads)
         self.read_fault = Signal(READ_FAULT_BITS)
         self.modulo_counter, self.index_capture = None, None
+        self.remainder = None if spec.remainder is None else Remainder(spec.remainder)
         self.position_counter, self.controls = self.reader, {}
         if lines := spec.front_end.lines:  # the preset alone
             self.conditioner = InputConditioner(lines=lines)
-            self.controls = {name: PinRise(spec.latency.tick) for name in lines}
+            self.controls = {name: PinRise(spec.latency.place) for name in lines}
 
     @property
     def settable(self) -> tuple[wiring.Component, ...]:
@@ -58,12 +60,29 @@ class SampledTachometer(Tachometer):
         fault = Mux(reader.decode_error, Mux(reader.sample_ok, NO_ANSWER, wrong), Mux(warned, WARNING, 0))
         m.d.comb += self.read_fault.eq(Mux(reader.refused, JUMP, fault))
         drive(m, reader, {"last": self.sampling_clock.last})
-        if self._spec.modulus is not None:
+        follow(m, self, reader, ("decode_error",))
+        shown = ("tick", "pulse_count", "overflow", "position", "position_valid")
+        names = ("number", "times", "phase", "forgets", "silent", "elapsed", "length")
+        found = by_name(reader, (*shown, *names))
+        if self.remainder is not None:
+            found = self._wait(m, self.remainder, found)
+        elif self._spec.modulus is not None:
             m.d.comb += self.position_modulo.eq(reader.place)
-        shown = ("tick", "pulse_count", "overflow", "position", "position_valid", "decode_error")
-        follow(m, self, reader, shown)
-        names = ("coming", "next_count", "number", "times", "phase", "forgets", "silent", "elapsed", "length")
-        return by_name(reader, names)
+        self.phase = found["phase"]
+        drive(m, self, {name: found[name] for name in shown})
+        return found
+
+    def _wait(self, m: Module, box: Remainder, given: dict[str, Signal]) -> dict[str, Signal]:
+        """Find `position_modulo` of the reader's position, and return what the reader gives as it is from then on."""
+        reader = self.reader
+        m.submodules.remainder = box
+        drive(m, box, {"start": reader.coming, "value": reader.around})
+        held = {name: Signal.like(value, name=f"held_{name}") for name, value in given.items()}
+        with m.If(box.done):
+            m.d.sync += self.position_modulo.eq(box.remainder)
+            m.d.sync += [held[name].eq(value) for name, value in given.items()]
+        m.d.sync += held["tick"].eq(box.done)
+        return held
 
     def _read(self, m: Module, master: EncoderMaster) -> EncoderMaster:
         """Let the master read once in each tick, so that the answer comes before it ends, or after an external one."""
@@ -75,7 +94,7 @@ class SampledTachometer(Tachometer):
         return master
 
     def _taps(self, m: Module) -> dict[str, Value]:
-        taps = {"read_fault": self.read_fault, "phase": self.reader.phase, **self._whole(m)}
+        taps = {"read_fault": self.read_fault, "phase": self.phase, **self._whole(m)}
         if "offset_read" in self.datapath.signature.members:
             taps |= by_name(self.datapath, ("offset_read",))
         return taps

@@ -4,8 +4,9 @@ from amaranth import C, Cat, Module, Mux, Signal, Value, signed
 from amaranth.lib.wiring import In, Out
 
 from tachometry.hdl.arithmetic.saturate import saturate
+from tachometry.hdl.front_end.modulo_counter import ModuloCounter
 from tachometry.hdl.wires.delay import delay
-from tachometry.hdl.wires.ports import Box, by_name, only_if
+from tachometry.hdl.wires.ports import Box, by_name, drive, only_if
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.sampled import Reach
 
@@ -13,7 +14,7 @@ from tachometry.spec.core.sampled import Reach
 class SampledPosition(Box):
     """Takes the last good read of each tick: gives the position, and its difference from the read before as m_e.
 
-    Latency: `tick` is high `spec.latency.tick` clocks after the window's last clock; a read in that last clock still
+    Latency: `tick` is high `spec.latency.place` clocks after the window's last clock; a read in that last clock still
     belongs to the window. All outputs but `coming`, `next_count`, `decode_error` and `refused` change with `tick`.
 
     The lower bits of the position are the read; the upper ones count how often that wraps. `zero` is subtracted. `load`
@@ -59,6 +60,7 @@ class SampledPosition(Box):
         self.checks = Signal(self.spent)  # its clock
         self.anew = Signal()  # all that was known is not: a read of the window is far from those before it
         self.turns = Signal(signed(max(spec.position_width - sampled.width, 1)))
+        self.around = Signal(signed(spec.remainder.width if spec.remainder else 1))  # has the remainder of the position
 
     def build(self, m: Module) -> None:
         sampled = self._sampled
@@ -71,7 +73,7 @@ class SampledPosition(Box):
             read.eq(-self.sample if self._spec.encoder.reverse else self.sample),
             good.eq(self.sample_valid & self.sample_ok & young & ~self.checks.any()),
             self.decode_error.eq((self.sample_valid & ~good) | self.refused),
-            self.coming.eq(*delay(m, self.last, clocks=self._spec.latency.tick - 1)),
+            self.coming.eq(*delay(m, self.last, clocks=self._spec.latency.place - 1)),
         ]
         m.d.sync += [self.tick.eq(self.coming), self.open_times.eq(self.open_times + 1)]
         with m.If(self.coming):
@@ -136,12 +138,18 @@ class SampledPosition(Box):
             self.position_valid.eq(self.silent != most_ticks),
             self.phase.eq(self.sample_before),
         ]
-        self._place(m)
+        form = self._spec.remainder
+        rounds = None if form is None else ModuloCounter(form.turns, latency=1)
+        self._place(m, rounds)
         held, overflow = saturate(m, moved, self._spec.widths.max_pulse_count)
         m.d.comb += self.next_count.eq(Mux(known, held, 0))
         waited = self.silent + self.position_valid
         turn = Signal(signed(2))  # how the read has wrapped
         m.d.comb += turn.eq(Cat(off[-1] ^ off[width - 1], ~off[-1] & off[width - 1]))
+        if rounds is not None:
+            m.submodules.rounds = rounds
+            begins = self.coming & self.open_number & ~known
+            drive(m, rounds, {"step": Mux(self.coming, turn, 0), "clear": begins})
         with m.If(self.coming):
             m.d.sync += [
                 self.pulse_count.eq(held),
@@ -159,15 +167,18 @@ class SampledPosition(Box):
                     self.turns.eq(Mux(known, self.turns + turn, 0)),
                 ]
 
-    def _place(self, m: Module) -> None:
+    def _place(self, m: Module, rounds: ModuloCounter | None) -> None:
         """Drive the position: the read with its turns, less the zero, and less what a preset has left."""
         whole = Cat(self.sample_before, self.turns)
+        around = Cat(self.sample_before, () if rounds is None else rounds.count)
         if self._zeroed:
             zero = Signal.like(self.zero, name="zero_before")
             with m.If(self.coming):
                 m.d.sync += zero.eq(self.zero)
-            whole -= zero
+            whole, around = whole - zero, around - zero
         m.d.comb += self.place.eq(whole)
+        if rounds is not None:
+            m.d.comb += self.around.eq(around)
         if self._loads:
             ahead = Signal.like(self.place)
             with m.If(self.load & self.position_valid):

@@ -128,9 +128,10 @@ class GoldenBank:
         written_at = self._written(accesses)
         pins = self._pins
         if pins.reads is not None:
-            zero = self._held("zero", spec.encoder.zero or 0, self._tables[TICK].clock - 1)
+            ends = self._tables[TICK].clock - spec.latency.tick + spec.latency.place
+            zero = self._held("zero", spec.encoder.zero or 0, ends - 1)
             pins = replace(pins, reads=replace(pins.reads, zero=zero))
-        ahead = spec.latency.tick - 1
+        ahead = spec.latency.place - 1
         clocks = {
             name: np.union1d(of_pins, np.array([at for at, _ in written_at[f"{name}_now"]], dtype=np.int64) - ahead)
             for name, of_pins in (("preset", pins.presets), ("home", pins.arms))

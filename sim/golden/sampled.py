@@ -156,9 +156,11 @@ def ticks_of(spec: TachometerSpec, reads: Reads, last: NDArray[np.int64]) -> Tab
 
 def with_presets(spec: TachometerSpec, ticks: Table, clock: NDArray[np.int64], values: NDArray[np.int64]) -> Table:
     """Return ticks whose position is set in these clocks: that of the tick before becomes the value, if it is valid."""
-    shown = np.searchsorted(ticks.clock - spec.latency.tick, clock)  # from these ticks on
+    shown = np.searchsorted(ticks.clock - spec.latency.tick, clock)
     valid = np.append(False, ticks.position_valid)[shown]
-    shown = shown[valid]
+    clock, shown = clock[valid], shown[valid]
+    # From these ticks on: it may be that one, if it waits for its remainder.
+    first = np.searchsorted(ticks.clock - min(spec.latency.place + 1, spec.latency.tick), clock)
     ahead = np.append(0, ticks.position[shown - 1] - values[valid])
-    position = ticks.position - ahead[np.searchsorted(shown, np.arange(len(ticks)), side="right")]
+    position = ticks.position - ahead[np.searchsorted(first, np.arange(len(ticks)), side="right")]
     return ticks.having(position=wrapped(position, spec.position_width))

@@ -9,7 +9,7 @@ from tachometry.spec.core.encoder import Encoder
 from tachometry.spec.core.facts import Facts
 from tachometry.spec.core.index import Index
 from tachometry.spec.core.reads import Reads
-from tachometry.spec.core.sampled import Reach
+from tachometry.spec.core.sampled import Reach, Remainder
 from tachometry.spec.core.sensors import parse_modulo
 from tachometry.spec.core.timing import MAX_TICK_CYCLES, Timing, parse_clocks, parse_filter
 from tachometry.spec.formats.velocity_output import NATIVE, UNITS, parse_lsb
@@ -25,7 +25,9 @@ counted."""
 _PRESET = """Input preset sets the position to N when it rises. No count is lost, and the velocity does not change. \
 With --bus, register PRESET begins with N, and CONTROL.preset sets the position as well."""
 _POSITION_MODULO = """Output position_modulo, 0 to N-1. N is counts, rev is a revolution, rev/4 an electrical turn of \
-4 pole pairs. A preset does not change it, --index-reset makes it 0."""
+4 pole pairs. A preset does not change it, --index-reset makes it 0. It goes on where position wraps. \
+If the encoder is read, it begins with the M+B bits of the first good read, and N that is no power of two makes all \
+outputs later by up to 72 clocks, see tick_latency of the manifest."""
 _EXTERNAL_TICK = "Input tick_in ends a sampling period, as of a PWM carrier. --tick is its nominal length."
 _BOUNDS = """Bounds: outputs velocity_lower, velocity_upper, bounds_valid. They enclose the true mean speed over the \
 measured window, for an ideal disc and ideal lines, or within --edge-error, while no count is lost."""
@@ -149,6 +151,17 @@ class Asked:
             return None
         of, _, parts = self.position_modulo.partition("/")
         return Fraction(self.encoder.counts_per_rev if of == "rev" else int(of)) / int(parts or 1)
+
+    @property
+    def remainder(self) -> Remainder | None:
+        """How `position_modulo` of an encoder that is read is found; None: it is bits of the position."""
+        number, sampled, most = max(int(self.modulus or 1), 1), self.encoder.sampled, self.position_width
+        if sampled is None or (number.bit_count() == 1 and number >> most <= 1):
+            return None
+        shift = (number & -number).bit_length() - 1
+        turns = number >> min(shift, sampled.width)
+        width = sampled.width + (turns - 1).bit_length()
+        return Remainder(number >> shift, shift, turns, max(width, 0 if self.encoder.zero is None else most) + 1)
 
     def read_starts(self, n_clocks: int) -> range:
         """Return the clocks in which reads begin, with ticks that are nominal."""

@@ -49,11 +49,11 @@ def _check_sampled(spec: Core) -> None:
     half = 1 << spec.position_width - 1
     if not -half <= (spec.encoder.zero or 0) < half:
         raise ParameterError("zero", f"must be from {-half} to {half - 1}, a position, not {spec.encoder.zero}")
-    if (counts := spec.modulus) and (counts.denominator > 1 or counts.numerator.bit_count() > 1):
-        above = 1 << max(int(counts), 2).bit_length()
-        typed = f"type {above // 2} or {above}"
-        rest = f"must be a power of two for an encoder that is read, not {float(counts):.9g}: {typed}"
-        raise ParameterError("position_modulo", rest)
+    if (counts := spec.modulus) and counts.denominator > 1:
+        raise ParameterError("position_modulo", f"must be whole for an encoder that is read, not {float(counts):.9g}")
+    if spec.remainder and spec.timing.tick_cycles < spec.remainder.clocks:
+        rest = f"must be at least {spec.remainder.clocks} clocks for position_modulo, not {spec.timing.tick_cycles}"
+        raise ParameterError("tick_cycles", rest)
     refuse(spec.extras, "sampled")
     if (reads := spec.reads) is not None:
         least = reads.least_tick
@@ -114,8 +114,9 @@ def _check_place(spec: Core) -> None:
         return
     if str(spec.position_modulo)[0] == "r" and spec.encoder.ratio is not None and spec.front_end.index_resets:
         raise ParameterError("position_modulo", "must be counts with --ratio and --index-reset: the encoder's index")
-    if not 2 <= counts <= MAX_MODULUS:
-        raise ParameterError("position_modulo", f"must be from 2 to {MAX_MODULUS} counts, not {float(counts):.9g}")
+    most = MAX_MODULUS if spec.encoder.sampled is None else 999_999_999
+    if not 2 <= counts <= most:
+        raise ParameterError("position_modulo", f"must be from 2 to {most} counts, not {float(counts):.9g}")
 
 
 def _check_edge_error(spec: Core) -> None:

@@ -22,9 +22,14 @@ class Latency:
     registers_steps: bool = False  # whether a step is in a register before it counts: a clock of `counting`
 
     @property
-    def tick(self) -> int:
-        """Clocks from the last one of a window to `tick`: a read in it may be compared with those before it."""
+    def place(self) -> int:
+        """Clocks from the last one of a window to its position: a read in it may be compared with those before it."""
         return self.counting + (0 if self.asked.reach is None else self.asked.reach.clocks)
+
+    @property
+    def tick(self) -> int:
+        """Clocks from the last one of a window to `tick`: all outputs wait for a remainder of the position."""
+        return self.place + (0 if self.asked.remainder is None else self.asked.remainder.clocks)
 
     @property
     def pin_to_count(self) -> int:
@@ -81,4 +86,4 @@ class Latency:
     @property
     def min_tick(self) -> int:
         """Fewest clocks between two ticks: all work that is done step by step must be finished."""
-        return max(2, self.busy, self.output if self.output_serial else 0)
+        return max(2, self.busy, self.tick - self.place, self.output if self.output_serial else 0)

@@ -62,6 +62,7 @@ def _more_ports(spec: Core) -> Iterator[Port]:
         text = f"Counts up to this period modulo {modulus}, from 0 on, since reset or since an index that resets. "
         text += "It also changes between ticks. A preset does not change it."
         text = f"The position modulo {modulus}, from 0 on." if spec.encoder.sampled else text
+        text += f" tick waits {spec.latency.tick - spec.latency.place} clocks for it." if spec.remainder else ""
         yield held(TICK, "position_modulo", (ceil(modulus) - 1).bit_length(), unit="counts", help=text)
     if spec.external_tick:
         text = "One clock. Together with tick: the external tick was missing, and the core made one. Alone: an "

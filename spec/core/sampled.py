@@ -55,6 +55,24 @@ class Reach:
 
 
 @dataclass(frozen=True)
+class Remainder:
+    """The remainder of a position by a number, found in a clock a bit, from the highest on.
+
+    The number is an odd divisor times 2^shift: so many lowest bits of the remainder are those of the position.
+    """
+
+    divisor: int
+    shift: int
+    turns: int  # of the read, after which the remainder is the same again
+    width: int  # bits of the read with these turns, less its zero
+
+    @property
+    def clocks(self) -> int:
+        """Clocks that it takes."""
+        return self.width - self.shift + 1
+
+
+@dataclass(frozen=True)
 class Sampled:
     """Facts of an encoder that is read. A count is an LSB of the read."""
 

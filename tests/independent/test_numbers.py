@@ -41,6 +41,19 @@ def test_position_modulo_counts_from_an_electrical_zero(golden: Found, counts: i
     assert ticks.position_modulo.tolist() == since
 
 
+@pytest.mark.parametrize("number", [100, 1024, 3 << 24])
+def test_position_modulo_of_reads_goes_on_where_positions_wrap(golden: Found, number: int) -> None:
+    """Of a shaft with 16 counts in a turn, far forward and back; the position has 8 bits."""
+    places = [*range(3, 3000, 7), *range(3000, -3000, -5)]
+    words = {name: word for name, word in BASE.items() if name != "ppr"} | {"sensor": "sampled", "bits": "4"}
+    words |= {"position-width": "8", "position-modulo": str(number), "zero": "-30"}
+    lines = {"sample": [place % 16 for place in places for _ in "10"], "sample_valid": [1, 0] * len(places)}
+    lines |= {"sample_ok": [1], "sample_age": [0], "a": [0], "b": [0]}
+    ticks = golden(words, range(0, 100 * len(places), 50), 100 * len(places) + 40, **lines)["tick"]
+    assert ticks.position_modulo.tolist() == [(place + 30) % number for place in places]
+    assert ticks.position.tolist() == [(place + 30 + 128) % 256 - 128 for place in places]
+
+
 @pytest.mark.parametrize(("speed", "greatest"), [("1rev/s", 64), ("1.01rev/s", 64), ("60.9rpm", 64), ("59.9rpm", 63)])
 @pytest.mark.parametrize("sign", [1, -1])
 def test_over_speed_trips_beyond_the_speed(golden: Found, speed: str, greatest: int, sign: int) -> None:

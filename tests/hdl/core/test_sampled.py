@@ -42,13 +42,17 @@ CASES = {
         "health": "yes",
     },
     "m zero": {"bits": "2+10", "zero": "-700", "preset": "100", "position-modulo": "rev/4", "reverse": "yes"},
+    "m geared": {"bits": "3+9", "position-width": "14", "position-modulo": "1000", "zero": "-700", "preset": "100"},
     "m fixed": {"bits": "12", "sample-age": "7", "position-width": "48", "lowpass": "20kHz", "age": "yes"},
+    "m narrow": {"bits": "9", "position-width": "8", "position-modulo": str(1 << 20), "external-tick": "yes"},
     "track": SLOW,
     "track fine": SLOW
     | {"bits": "16+24", "multiplier": "block", "smooth": "yes", "external-tick": "yes"}
     | {"position-width": "48", "period": "64", "zero": "1000000007", "preset": "3", "crc": "none"}
     | {"electrical": "7", "lead": "1tick"},
-    "track coarse": SLOW | {"bits": "5", "unit": "rpm", "sample-age": "100", "reverse": "yes", "max-memory": "5ms"},
+    "track coarse": SLOW
+    | {"bits": "5", "unit": "rpm", "sample-age": "100", "reverse": "yes", "max-memory": "5ms"}
+    | {"position-modulo": "33"},
     "track period": SLOW
     | {"multiplier": "serial", "tick": "1000clk", "max-time": "10000clk", "period": "128", "crc": "none"},
 }
@@ -79,7 +83,7 @@ def both(spec: TachometerSpec, reads: list[tuple[int, int, int, int]], n_clocks:
 
 
 # A core of track is compiled for this.
-@pytest.mark.parametrize("case", only([*[*CASES][:4], "track fine"], CASES))
+@pytest.mark.parametrize("case", only([*[*CASES][:5], "track fine"], CASES))
 def test_gates_and_golden_model_agree_on_every_read(case: str) -> None:
     spec = core(case)
     few = case.startswith("track")
@@ -337,7 +341,8 @@ def test_a_core_is_made_again_from_its_options() -> None:
         ),
         ("m", {"decoding": "4"}, "decoding must be 1 for sampled, not 4"),
         ("m", {"zero": "3000000000"}, "zero must be from -2147483648 to 2147483647, a position, not 3000000000"),
-        ("m", {"position-modulo": "rev/3"}, "position_modulo must be a power .* 43690.6667: type 32768 or 65536"),
+        ("m", {"position-modulo": "rev/3"}, "position_modulo must be whole for .* read, not 43690.6667"),
+        ("m", {"position-modulo": "24", "tick": "10clk"}, "tick_cycles must be at least 18 clocks for position_modulo"),
         ("track", {"crc": "0x43"}, "crc must be none or left out with --sensor sampled, not 0x43"),
         ("m", {"period": "64"}, "period must not be given with method m"),
         ("track", SLOW | {"period": "4"}, "period must be a power of two from 8 to 131072 LSB, a turn, not 4"),

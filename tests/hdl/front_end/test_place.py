@@ -126,9 +126,8 @@ def test_the_index_is_taken_once_after_each_time_that_it_is_asked_for() -> None:
     assert run.ticks.position[-1] == latest // 10 - 8 * 32 - 3
 
 
-def check_registers(texts: dict[str, str], seed: int) -> None:
+def check_registers(spec: TachometerSpec, seed: int) -> None:
     """Write presets, offsets and CONTROL, and read what the core shows, on the native port."""
-    spec = spec_of(texts)
     registers, n_clocks, rng = RegisterMap(spec), 2500, np.random.default_rng(seed)
     trace = stress(spec, seed, 20).until(n_clocks)
     writable = [number for number, one in enumerate(registers) if one.writable]
@@ -143,4 +142,4 @@ def check_registers(texts: dict[str, str], seed: int) -> None:
 
 @pytest.mark.parametrize("texts", [CASES[2] | {"position-width": "48"}, CASES[3] | {"preset": "-5"}])
 def test_registers_set_the_position_and_let_the_index_through(texts: dict[str, str]) -> None:
-    check_registers(texts, 1)
+    check_registers(spec_of(texts), 1)
