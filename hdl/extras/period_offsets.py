@@ -19,11 +19,11 @@ class Gates(Box):
         super().__init__(
             tick=In(1),
             period_write=In(1),
-            period_address=In(2),
+            period_address=In(3),
             period_data=In(OFFSET_BITS),
             period_offset=Out(word),
             offset_written=Out(1),
-            offset_at=Out(2),
+            offset_at=Out(3),
             offset_value=Out(word),
             offset_read=In(word),
         )

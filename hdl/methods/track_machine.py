@@ -23,7 +23,7 @@ from tachometry.spec.formats.tracking_units import BLOCK, STAGES, Start
 
 _PLACES_BITS = PLACE_BITS - 1 - 6  # twice the places, over 64
 EXCHANGE = {
-    **dict(zip(EXCHANGED, (In(1), In(2), In(signed(OFFSET_BITS))), strict=True)),
+    **dict(zip(EXCHANGED, (In(1), In(3), In(signed(OFFSET_BITS))), strict=True)),
     "offset_read": Out(signed(OFFSET_BITS)),
 }
 
@@ -59,8 +59,8 @@ class TrackMachine(Box):
                 "last": In(range(form.most_last + 1)),
                 "moved": In(signed(form.moved_bits)),
                 "length": In(range(form.longest_tick + 1)),
-                "kind": In(2),  # of the last count's edge
-                "end": In(2),  # kind of the position at the end
+                "kind": In(form.kind_bits),  # of the last count's edge
+                "end": In(form.kind_bits),  # kind of the position at the end
                 "down": In(1),  # the last count went backward
                 **only_if(form.exchanges, **EXCHANGE),
                 **dict.fromkeys(program.outputs, Out(signed(WIDTH))),
@@ -311,12 +311,12 @@ class TrackMachine(Box):
 
     def _exchange(self, m: Module) -> None:
         """Write an offset as the program begins, which cannot do so yet; then show one, until the next begin."""
-        first = self._program.addresses[OFFSETS[0]] >> 2
+        first = self._program.addresses[OFFSETS[0]] >> 3
         given = by_name(self, EXCHANGE)
         entry = self._words.read_port()
         begun = Signal()
         m.d.sync += begun.eq(self.begin)
-        at = Cat(given["offset_at"], C(first, ADDRESS_BITS - 2))
+        at = Cat(given["offset_at"], C(first, ADDRESS_BITS - 3))
         m.d.comb += [entry.addr.eq(at), entry.en.eq(begun), given["offset_read"].eq(entry.data)]
         with m.If(given["offset_written"]):
             m.d.comb += [self._write.en.eq(1), self._write.addr.eq(at), self._write.data.eq(given["offset_value"])]
@@ -369,11 +369,13 @@ class TrackMachine(Box):
 
     def _stored(self, word: Value) -> Value:
         """Return the address of a word that is stored, which may be that of the last count's edge, or the next."""
-        kind = Mux(word[0], self.end, self.kind) if self._program.form.period_bits else self.kind
-        return self._offset(word, Cat(kind, word[2]))
+        kind = Mux(word[0], self.end, self.kind) if self._program.form.sampled else Cat(self.kind, word[2])
+        return self._offset(word, kind)
 
     def _chosen(self, m: Module, word: Value) -> Value:
         """Return the address of a word that is read, which may be one that the tick chooses among the offsets."""
+        if self._program.form.sampled:
+            return self._stored(word)
         chosen = Signal(ADDRESS_BITS)
         back = Cat(C(1, 1), ~self.down)  # −1; 1 if it went backward
         ways = {"o@down": C(-1, 2), "o@m2": back, "o@m3": C(2, 2)}

@@ -73,6 +73,7 @@ class Tracking:
     displacement: Displacement | None = None  # of edges off their places
 
     sampled: ClassVar[bool] = False  # whether positions are read in place of counted edges
+    kind_bits: ClassVar[int] = 2  # of the kind of an edge, or of the eighth of a period
     period_bits: int = 0  # bits of a period whose error is learned, in LSB of the read; 0: none is
     exchanges: bool = False  # whether a program reads and writes the offsets of the period
     waits: bool = False  # whether a read that is far waits for the next one, as nothing checks its frame

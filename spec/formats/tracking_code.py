@@ -237,7 +237,7 @@ class Program:
         """First contents of all words by name: what changes, constants; before those from half on the offsets."""
         used = [name for one in self.code.instructions for name in (*one.reads, one.store)]
         names = dict.fromkeys(name for name in used if name and name not in CHOSEN)
-        chosen = (*OFFSETS, "zero")  # which is in the place of no offset
+        chosen = (*OFFSETS[: 1 << self.form.kind_bits], "zero")  # which is in the place of no offset
         others = [name for name in names if name not in self.constants and name not in chosen]
         others += [name for name in self.constants if name in names and name not in chosen]
         assert len(others) + len(chosen) <= FIRST_INPUT

@@ -23,6 +23,7 @@ reset:                                  # before the first tick
     edges D = quarter log; reads D = least_noise log
     noises = noises_first; turn = zero; kinds o0 = zero; kinds o1 = zero
     kinds o2 = zero; kinds o3 = zero; p = zero; phase = minus_two
+    period {; o4 = zero; o5 = zero; o6 = zero; o7 = zero; }
     limit = order + ~ + ~; doubt = log_8; edges quiet = zero; after = minus_one
 tick:
     if empty goto silent
@@ -211,7 +212,7 @@ kinds {; offsets:
     edges zero s+ e min half over by    # a quarter of what the kind's offset learns
     period zero s+ e min step over by; edges o@last = o@last s+ ~ s+ ~ s+ ~ s+ ~
     period t = zero s+ ~; period o@last = o@last + t + t + t + t
-    o0 = o0 s- ~; o1 = o1 s- ~; o2 = o2 s- ~; o3 = o3 s- ~
+    o0 = o0 s- ~; edges o1 = o1 s- ~; o2 = o2 s- ~; edges o3 = o3 s- ~; period o4 = o4 s- ~; period o6 = o6 s- ~
     period $places by; period t + t + t + t product mean    # the next one has its share
     period o@last = o@last - ~; period o@up = o@up + ~; goto ready; }
 lone:

@@ -27,7 +27,8 @@ class SampledTracking(Tracking):
     max_ticks: int  # ticks without a read after which all is forgotten
 
     sampled = True
-    PHASE_BITS: ClassVar[int] = 6  # of the place within a quarter of a period
+    kind_bits = 3
+    PHASE_BITS: ClassVar[int] = 6  # of the place within an eighth of a period
     number_bits = 1
 
     @property
@@ -51,8 +52,8 @@ class SampledTracking(Tracking):
         return super().shifts | {"mean": self.PHASE_BITS + 13}
 
     def phase(self, sample: Any) -> tuple[Any, Any]:
-        """Return the quarter of a period in which a read is, and its place there, of an int or an array of them."""
-        within, rest, more = sample & (1 << self.period_bits) - 1, self.period_bits - 2, self.PHASE_BITS
+        """Return the eighth of a period in which a read is, and its place there, of an int or an array of them."""
+        within, rest, more = sample & (1 << self.period_bits) - 1, self.period_bits - 3, self.PHASE_BITS
         fine = within & (1 << rest) - 1
         return within >> rest, fine >> rest - more if rest >= more else fine << more - rest
 

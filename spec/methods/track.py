@@ -81,7 +81,7 @@ _MULTIPLIER = """Way in which products are computed. serial takes few cells and 
 multiplier of the FPGA and few clocks. auto is serial where that fits the tick."""
 _POSITION_FINE_BITS = "Fraction bits of position_fine, 1 to 16. Some extras need more than 6, and then have them."
 _PERIOD = """Period of the interpolation error of an encoder that is read. It is a power of two, in LSB: 128 for 1024 \
-periods of 17 bits. The core learns that error, as four offsets a period."""
+periods of 17 bits. The core learns that error, as eight offsets a period."""
 _SMOOTH = """Outputs velocity_smooth and smooth_delay. The velocity in the middle of the memory, some ms ago, has a \
 quarter of the noise; smooth_delay is how long ago, in clocks. For logs, identification, displays."""
 

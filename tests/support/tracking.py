@@ -41,7 +41,7 @@ class Interpreter:
         form = self.program.form
         t = form.time_bits
         if form.sampled:
-            last, end = end, kind + 1 & 3
+            last, end = end, kind + 1 & 7
         inputs = {
             "number": number,
             "counts": number << PLACE_BITS,

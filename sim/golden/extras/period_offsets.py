@@ -26,13 +26,13 @@ def displaced(extra: PeriodOffsets, view: View) -> Steps:
 
 
 def _exchanged(pins: PinTrace, tick: Ints) -> tuple[Ints, Ints]:
-    """Return the offset that is read in each tick, and 8 times the one that is written, twice its number, and 1; or 0.
+    """Return the offset that is read in each tick, and 16 times the one that is written, twice its number, and 1; or 0.
 
     A write before the first tick waits for the second.
     """
     latest = np.searchsorted(pins.high("period_write"), tick) * (tick > tick[:1].sum())
     word = wrapped(pins.line_at("period_data", tick), OFFSET_BITS)
-    told = (8 * word + 2 * pins.line_at("period_address", tick) + 1) * (np.diff(latest, prepend=0) > 0)
+    told = (16 * word + 2 * pins.line_at("period_address", tick) + 1) * (np.diff(latest, prepend=0) > 0)
     return pins.line_at("period_address", tick + 1), told
 
 

@@ -15,15 +15,16 @@ class SampledRecursion(Recursion):
         super().__init__(form, lead, smooth=smooth)
         self._reads, k = form, form.constants
         self.noise, self.slips = k["least_noise"], k["none"]
+        self.offsets = [0] * 8
         self.log_limit = 2 * log2(self.noise) + k["order"]
         self._kind = self._fine = 0
         self.far = _NEVER  # error from which a read waits for the next one
         self.more = self._log_dt = 0  # what the lag adds to the place; the logarithm of the time since the last read
 
     def exchanged(self, number: int, told: int) -> int:
-        """Return the lower bits of an offset after a write; `told` has 8 times it, twice its number, and 1, or is 0."""
+        """Return the lower bits of an offset after a write; `told` is 16 times it, twice its number, and 1, or 0."""
         if told:
-            self.offsets[told >> 1 & 3] = told >> 3
+            self.offsets[told >> 1 & 7] = told >> 4
         return wrapped(self.offsets[number], OFFSET_BITS)
 
     def _event(self, n: int, times: int, places: int, kind: int, down: int) -> Row:
@@ -58,7 +59,7 @@ class SampledRecursion(Recursion):
 
     @property
     def _error_of_period(self) -> int:
-        here, ahead = self.offsets[self._kind], self.offsets[self._kind + 1 & 3]
+        here, ahead = self.offsets[self._kind], self.offsets[self._kind + 1 & 7]
         return here + self._product(ahead - here, self._fine, "mean")
 
     def _learn(self, n: int, e: int, change: int, kind: int) -> None:
@@ -70,9 +71,9 @@ class SampledRecursion(Recursion):
         quarter = self._round(min(abs(e), most), self._shift(max(self.noises, k["noises_least"])))
         quarter = -quarter if e < 0 else quarter
         share = self._product(4 * quarter, self._fine, "mean")
-        self.offsets = [offset - quarter for offset in self.offsets]
+        self.offsets = [offset - quarter * (place % 2 == 0) for place, offset in enumerate(self.offsets)]
         self.offsets[self._kind] += 4 * quarter - share
-        self.offsets[self._kind + 1 & 3] += share
+        self.offsets[self._kind + 1 & 7] += share
 
     def _learn_lag(self, e: int) -> None:
         """Leave the lag, which was learned before it was shown."""

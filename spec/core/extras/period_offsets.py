@@ -21,8 +21,8 @@ class PeriodOffsets(Extra):
 
     on: bool = option(
         True,
-        "Let a program read and write what --period learns. So it can keep the four offsets while the power is off, by "
-        "registers PERIOD_DATA, PERIOD_ADDRESS and PERIOD_OFFSET, or by ports of these names.",
+        "Let a program read and write what --period learns. So it can keep the eight offsets while the power is off, "
+        "by registers PERIOD_DATA, PERIOD_ADDRESS and PERIOD_OFFSET, or by ports of these names.",
         name="period-offsets",
         flag=True,
         parse=parse_flag,
@@ -39,12 +39,12 @@ class PeriodOffsets(Extra):
         text = "Offset that period_write writes, signed, in the unit of period_offset."
         yield "PERIOD_DATA", "value", Pin(pin("period_data", text, OFFSET_BITS))
         text = "Number of the offset that period_write writes, and period_offset shows. Synchronous to clk."
-        yield "PERIOD_ADDRESS", "number", Pin(pin("period_address", text, 2))
+        yield "PERIOD_ADDRESS", "number", Pin(pin("period_address", text, 3))
         text = "Writes period_data with the next tick but the first; until then data and address must stay."
         yield "PERIOD_ADDRESS", "write", Pin(pin("period_write", text), act=True)
 
     def ports(self, spec: Numbers) -> Iterable[Port]:
         assert spec.encoder.sampled is not None
         unit = f"2^{spec.encoder.sampled.shift - PLACE_BITS} LSB"
-        text = "Offset at period_address, as it was at the tick before: one of four that are learned."
+        text = "Offset at period_address, as it was at the tick before: one of eight that are learned."
         yield held(TICK, "period_offset", OFFSET_BITS, signed=True, unit=unit, help=text)
