@@ -192,7 +192,7 @@ class Tracking:
         of_std = math.log2(self.velocity_std) - a - t - 6 - 3 / 2  # over the roots of the order and of log_8
         logs = {
             "of_straight": math.log2(STRAIGHT) + of_std, "of_curve": math.log2(CURVE) + of_std, "none": -127,
-            "log_3_2": math.log2(3 / 2), "log_9_4": math.log2(9 / 4), "log_8": 3, "log_45": 5.5, "log_64": 6,
+            "log_3_2": math.log2(3 / 2), "log_9_4": math.log2(9 / 4), "log_8": 3, "log_many": 5.5, "log_64": 6,
             "log_256": 8, "log_8192": MOST_EVENTS_BITS, "log_4": 2, "log_eighth": -3, "log_half": -1,
             "log_5_8": math.log2(8 / 5),
             "of_velocity": v - PLACE_BITS + t, "of_speed": v + t, "of_slope": a - v + t + 1,

@@ -67,7 +67,7 @@ event:
 grown:; }
     edges {; serial $number by; if one goto lone; left keep; serial P product mean
     block zero s+ left by; memory = T + step min most_memory max clock
-    serial t = places - ~; block log_dt + log_45 exp; block x = memory - ~ lo+ ~
+    serial t = places - ~; block log_dt + log_many exp; block x = memory - ~ lo+ ~
     serial zero s+ left by; V product place_64; smooth since + of_e out smooth_delay
     serial since = tau; serial P = P - moved; t s+ ~ keep log
     serial log_64 + minus_log_n + ~ exp; block minus_log_n + ~ exp
@@ -78,7 +78,7 @@ heard:; block tau + ahead by
     serial edges $counts + slack - one s- e; serial edges if neg goto slip; log_e = ~
     e - mu over 2; minus_D4 s+ e; if pos goto alone; mu = mu + ~ keep
     serial since + ahead by; minus_D3 s+ mu s+ mu; if neg goto calm
-    serial log_dt + log_45 exp; serial T = memory - ~ lo+ ~; slow_T = zero; block e over 1
+    serial log_dt + log_many exp; serial T = memory - ~ lo+ ~; slow_T = zero; block e over 1
     log_X + log_256; if pos goto kept
     serial e over 1                     # the memory was long: half of the error is of the place
     log_e = log_e + log_half; mu = mu s+ minus_Ds; P = P + ~; e = e - ~
@@ -219,7 +219,7 @@ lone:
     serial e = c - P keep log; serial edges edge = raw - moved
     smooth since + of_e out smooth_delay; smooth of_v out velocity_smooth; serial since = tau
     memory = T + step min most_memory max clock; serial P = P - moved
-    block log_dt + log_45 exp; block x = memory - ~ lo+ ~; block e = c - P keep log
+    block log_dt + log_many exp; block x = memory - ~ lo+ ~; block e = c - P keep log
     block edges u s- e; block edges if neg goto slip; goto heard
 alone:
     waits far s+ e; waits if pos goto later; mu = mu + ~; edges slips = slips min zero

@@ -86,6 +86,7 @@ class SampledTracking(Tracking):
         return super().constants | {
             "least_noise": round(lsb / 3),  # that of rounding alone
             "minus_change": -3 * lsb // 2,
+            "log_many": fixed_log(5),
             "minus_mean": -2 * lsb,  # of twice a mean
             "least_far": -3 * lsb,
             "most_silent": self.max_ticks << t,

@@ -126,7 +126,7 @@ struct Recursion : Tables {
     bool sudden = std::abs(e) >= alarm;
     if (sudden) slow_until = 0, grown = std::min(grown, power(log_dt + k.log_8, 1));
     else if (2 * std::abs(mean) >= 3 * certain) {
-      slow_until = 0, grown = std::min(grown, power(log_dt + k.log_45, 1));
+      slow_until = 0, grown = std::min(grown, power(log_dt + k.log_many, 1));
       if (log_share + k.log_256 < 0) {
         int64_t half = round(e, 1);
         P += half, e -= half, log_e += k.log_half, mean -= sign_of(mean) * sure;

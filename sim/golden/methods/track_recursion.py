@@ -183,14 +183,14 @@ class Recursion:
         k = self._k
         p, v, memory, log_dt = expected
         log_e = log2(e)
-        # A change of the speed leaves 8 or 45 events.
+        # A change of the speed leaves 8 events or 45, or 32 reads.
         quarter = self._round(e - self.mean, 2)
         self.mean += quarter
         sudden = abs(e) >= self.alarm
         if sudden:
             self.slow_until, memory = 0, min(memory, self._power(log_dt + k["log_8"]))
         elif 2 * abs(self.mean) >= self.mean_alarm:
-            self.slow_until, memory = 0, min(memory, self._power(log_dt + k["log_45"]))
+            self.slow_until, memory = 0, min(memory, self._power(log_dt + k["log_many"]))
             if self.log_share + k["log_256"] < 0:
                 half = self._round(e, 1)
                 p, e, log_e = p + half, e - half, log_e + k["log_half"]

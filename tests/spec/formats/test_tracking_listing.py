@@ -71,6 +71,20 @@ def test_listing_of_reads(multiplier: str) -> None:
     assert all(machine.met[machine.program.code.labels[label]] > 9 for label in ("later", "alone", "silent"))
 
 
+def test_a_speed_that_changes_gently_leaves_32_reads() -> None:
+    spec = of_texts("track", {"sensor": "sampled", "bits": "12"})
+    assert isinstance(spec, TrackTachometer)
+    form = spec.form
+    assert isinstance(form, SampledTracking)
+    machine, state, memory = Interpreter(spec.program), SampledRecursion(form, spec.program.ahead), list[float]()
+    for nth in range(400):
+        row = (1, 0, 0, 0, 10 + (nth > 300 and nth % 16 == 0), 0, 0, 0, form.tick_cycles)
+        assert machine.tick(*row) == state.tick(*row)
+        memory.append(state.memory / (form.tick_cycles << form.time_bits))
+    assert max(memory) > 300
+    assert min(memory[300:]) == pytest.approx(32, rel=0.01)
+
+
 @pytest.mark.parametrize(
     ("word", "upset", "held"), [("noises", -1 << WIDTH - 2, "noises_first"), ("D", 1 << WIDTH - 4, "most_noise")]
 )
