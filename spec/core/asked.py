@@ -160,8 +160,10 @@ class Asked:
             return None
         shift = (number & -number).bit_length() - 1
         turns = number >> min(shift, sampled.width)
-        width = sampled.width + (turns - 1).bit_length()
-        return Remainder(number >> shift, shift, turns, max(width, 0 if self.encoder.zero is None else most) + 1)
+        width = sampled.width + (turns - 1).bit_length() + 1
+        if self.encoder.zero is not None:  # the difference may be half of its range beyond
+            width = max(width, most) + 1
+        return Remainder(number >> shift, shift, turns, width)
 
     def read_starts(self, n_clocks: int) -> range:
         """Return the clocks in which reads begin, with ticks that are nominal."""

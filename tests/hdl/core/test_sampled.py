@@ -42,7 +42,7 @@ CASES = {
         "health": "yes",
     },
     "m zero": {"bits": "2+10", "zero": "-700", "preset": "100", "position-modulo": "rev/4", "reverse": "yes"},
-    "m geared": {"bits": "3+9", "position-width": "14", "position-modulo": "1000", "zero": "-700", "preset": "100"},
+    "m geared": {"bits": "3+9", "position-width": "14", "position-modulo": "1016", "zero": "-7000", "preset": "100"},
     "m fixed": {"bits": "12", "sample-age": "7", "position-width": "48", "lowpass": "20kHz", "age": "yes"},
     "m narrow": {"bits": "9", "position-width": "8", "position-modulo": str(1 << 20), "external-tick": "yes"},
     "track": SLOW,
