@@ -87,7 +87,7 @@ def build(
     begun = time.monotonic()
     check_module_name(name)
     on = _bus(_SERIAL[0] if bus == _EDGES else bus, baud, spec)
-    demo_map(spec)  # what cannot have registers is refused at once
+    demo_ports(demo_map(spec), on)  # what cannot have registers is refused at once
     from tachometry.boards.fpga import build as builder
 
     builder.check_tools(board)

@@ -205,7 +205,11 @@ def ports_on(spec: AnySpec, bus: Bus | None) -> tuple[Port, ...]:
     if bus is None:
         return spec.ports
     registers = registers_on(spec, bus)
-    ports = (*registers.core_ports, *bus.ports(registers))
+    return distinct((*registers.core_ports, *bus.ports(registers)), bus)
+
+
+def distinct(ports: tuple[Port, ...], bus: Bus) -> tuple[Port, ...]:
+    """Return ports of a core on a bus; ParameterError if two have one name."""
     if len({port.name for port in ports}) < len(ports):
         raise ParameterError("bus", f"must not be {bus.name}, whose pins have the names of the encoder's")
     return ports

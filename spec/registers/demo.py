@@ -11,7 +11,7 @@ from tachometry.spec.core.tachometer import TachometerSpec
 from tachometry.spec.language.field import WORD, Draft, Field
 from tachometry.spec.language.option import ParameterError
 from tachometry.spec.language.port import TICK, Port, held
-from tachometry.spec.registers.buses import Bus, manifest_on
+from tachometry.spec.registers.buses import Bus, distinct, manifest_on
 from tachometry.spec.registers.emulator import (
     BOUNCE_WIDTH,
     DROP_WIDTH,
@@ -136,7 +136,7 @@ def demo_map(spec: TachometerSpec | LoopSpec) -> DemoMap:
 
 
 def demo_ports(registers: DemoMap, bus: Bus) -> tuple[Port, ...]:
-    """Return all ports of a demo on a bus."""
+    """Return all ports of a demo on a bus; ParameterError if two have one name."""
     inputs, reads = registers.inputs, registers.spec.reads
     line, *others = [port.name for port in reads.ports] if reads else ["z"]
     driven = [port for port in registers.core_ports if port.name in ("current_pdm", *others)]  # a stream of bits
@@ -146,7 +146,8 @@ def demo_ports(registers: DemoMap, bus: Bus) -> tuple[Port, ...]:
         if pin.name in (*ENCODER_LINES, line)
     ]
     lights = "The shaft turns; it turned backward at the last update; something went wrong; the clock runs."
-    return (*inputs, *bus.ports(registers), *emulated, *driven, Port("leds", "output", LEDS, help=lights))
+    leds = Port("leds", "output", LEDS, help=lights)
+    return distinct((*inputs, *bus.ports(registers), *emulated, *driven, leds), bus)
 
 
 def demo_manifest(registers: DemoMap, bus: Bus, name: str = "tachometer") -> dict[str, Any]:
