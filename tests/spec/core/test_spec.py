@@ -5,6 +5,7 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
+from support import docs
 
 from tachometry.spec import (
     Encoder,
@@ -193,3 +194,11 @@ def test_ticks_between_a_cause_and_its_update() -> None:
                     spec = made(encoder=Encoder(8), timing=Timing(1_000_000, tick, 10), age=True, **options)
                     assert spec.widths.stamp == ticks(spec).bit_length()
     assert spec_of(1).widths.stamp == 0
+
+
+def test_options_of_the_page_of_absolute_encoders_are_taken() -> None:
+    found = re.findall(r"(?:`|generate )(--sensor .*? --bits [^`\n]*)", docs.page("guides/absolute.md"))
+    assert len(found) == 8
+    for options in found:
+        words = {name: word or "yes" for name, word in re.findall(r"--(\S+)(?: (?!-)(\S+))?", options)}
+        of_texts("track", {"clock": "50MHz", "tick": "1ms"} | words)
