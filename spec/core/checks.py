@@ -41,11 +41,12 @@ def check(spec: Core) -> None:
 
 def _check_sampled(spec: Core) -> None:
     """Refuse what needs edges."""
+    with_it = f"with --sensor {spec.encoder.sensor}"
     if not spec.facts.takes_reads:
-        raise ParameterError("method", f"must be track or m with --sensor sampled, not {spec.method}", "needs edges")
+        raise ParameterError("method", f"must be track or m {with_it}, not {spec.method}", "needs edges")
     for name, none in {"filter_clocks": 0, "blanking_clocks": 0, "index": None}.items():
         if getattr(spec, name) != none:
-            raise ParameterError(name, "must be left out with --sensor sampled: it is for edges")
+            raise ParameterError(name, f"must be left out {with_it}: it is for edges")
     half = 1 << spec.position_width - 1
     if not -half <= (spec.encoder.zero or 0) < half:
         raise ParameterError("zero", f"must be from {-half} to {half - 1}, a position, not {spec.encoder.zero}")

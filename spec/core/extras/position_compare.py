@@ -139,7 +139,7 @@ class PositionCompare(Extra):
 
     def missing(self) -> Mapping[str, str]:
         found = {"axes": "must be left out with --axes: what compares positions is for one axis"}
-        found["sampled"] = "must be left out with --sensor sampled: it needs edges"
+        found["sampled"] = "must be left out with an encoder that is read: it needs edges"
         if self.places.depth:
             found["demo"] = "must not be a list with a demo, which has no input for it"
             found["loop"] = "must not be a list together with --loop, whose inputs are commands"

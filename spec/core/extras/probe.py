@@ -90,7 +90,7 @@ class Probe(Extra):
     def missing(self) -> Mapping[str, str]:
         return {
             "axes": "must be left out with --axes: what latches is for one axis",
-            "sampled": "must be left out with --sensor sampled: it needs edges",
+            "sampled": "must be left out with an encoder that is read: it needs edges",
             "demo": "must be left out of a demo, which emulates an encoder and no probe",
         }
 
