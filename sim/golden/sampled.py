@@ -126,7 +126,7 @@ def ticks_of(spec: TachometerSpec, reads: Reads, last: NDArray[np.int64]) -> Tab
     latest = np.maximum.accumulate(np.where(has, number, -most))  # the tick of the latest read
     silent = np.minimum(number - latest, most)
     before = np.append(most, silent[:-1])
-    sample = reads.sample[row] if len(reads.sample) else np.zeros_like(last)
+    sample = np.where(through > 0, reads.sample[row], 0) if len(reads.sample) else np.zeros_like(last)
     way = ways(sample, sampled.width)
     forgets = np.diff(np.append(0, np.cumsum(reads.anew))[through], prepend=0) > 0
     known = has & (before < most) & ~forgets

@@ -82,6 +82,12 @@ def both(spec: TachometerSpec, reads: list[tuple[int, int, int, int]], n_clocks:
     return found.actual
 
 
+def test_the_angle_before_the_first_read_is_that_of_the_gates() -> None:
+    spec = of_texts("track", BASE | SLOW | {"electrical": "7"})
+    found = lockstep(spec, trace_of(spec, [(3000, 77_000, 3, 1)], 6000).completed(spec), PySim())
+    assert found.n_mismatches == 0, found.first
+
+
 # A core of track is compiled for this.
 @pytest.mark.parametrize("case", only([*[*CASES][:5], "track fine"], CASES))
 def test_gates_and_golden_model_agree_on_every_read(case: str) -> None:
