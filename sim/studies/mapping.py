@@ -17,7 +17,6 @@ _TREES = {"$_AND_": "and", "$_OR_": "or", "$_XOR_": "xor"}  # gates whose inputs
 _SUMS, _COMPARISONS = ("$add", "$sub", "$neg"), ("$lt", "$le", "$gt", "$ge")
 _SHIFTS = ("$shift", "$shiftx", "$shr", "$shl", "$sshr", "$sshl")
 _NO_TABLE = ("carry", "sum", "product")
-_FEW = 64  # words of a memory whose cells are counted
 _KEPT, _TRIED = 8, 24  # cuts of a gate that are kept, and that are tried
 
 
@@ -170,8 +169,12 @@ class Logic:
                     self.flip_flops.append((data, bit))
                     self.ends.append(data)
             return
-        if written and words <= _FEW and not block and (self.fabric.writes or words * width <= blocks):
-            self.small.append((-(-words // 16) if self.fabric.writes else words, len(read)))
+        rows, cost = words, words * width
+        if self.fabric.writes:  # as Yosys weighs tables of four bits, and the choice among them
+            rows = -(-words // 16)
+            cost = ports * (4 * rows * -(-width // 4) + (rows - 1) * width // 2)
+        if written and cost <= blocks and not block:
+            self.small.append((rows, len(read)))
         else:
             self.late |= {*_nets(read)}
 

@@ -91,6 +91,8 @@ def test_memories_are_blocks_tables_or_constants() -> None:
     block = mapped(ECP5, [memory(1024, 18)], [*range(100, 118)])
     assert (len(block.logic.late), LEVELS.period(block)) == (18, 100)
     assert mapped(ECP5, [memory(64, 32)], [*range(100, 132)]).logic.late == set()  # as many bits as a block counts
+    moving = [mapped(ECP5, [memory(63, width, WR_DATA=[90])], [100]).logic for width in (20, 22)]
+    assert [(logic.small, len(logic.late)) for logic in moving] == [([(4, 20)], 0), ([], 22)]  # costs of 110 and 129
     narrow, wide = (mapped(ICE40, [memory(*size, WR_DATA=[90])], [100]) for size in ((5, 16), (2, 82)))
     assert (len(narrow.logic.late), narrow.logic.small) == (16, [])
     assert (wide.logic.late, wide.logic.small, flip_flops(wide)) == (set(), [(2, 82)], 246)  # six blocks would be more
