@@ -71,7 +71,7 @@ class Logic:
             bits: sums[bits]
             for y, cell in sums.items()
             for name in "AB"
-            if (bits := (*cell["connections"].get(name, ()),)) in sums and len(bits) == len(y)
+            if (bits := (*cell["connections"].get(name, ()),)) in sums and len(bits) >= min(len(y), _exact(sums[bits]))
             if all(uses[bit] == 2 for bit in bits)
         }
         for cell in cells:
@@ -128,6 +128,10 @@ class Logic:
     def _sum(self, terms: list[Bits], y: Bits) -> None:
         carries = [at for at, term in enumerate(terms) if {*term[1:]} <= {"0"}][: len(terms) - 2]
         first = [bit for at in carries[:1] for bit in _nets(terms.pop(at))]
+        if len(terms) > 3:
+            pair = [self.gate(()) for _ in y]
+            self._chain(terms[0], terms[1], pair)
+            terms = [*terms[2:], pair]
         while len(terms) > 2:
             triples = [*zip(*terms[:3], strict=True)]
             terms = [*terms[3:], [self.gate(each) for each in triples], ["0", *map(self.gate, triples[:-1])]]
@@ -184,6 +188,11 @@ class Logic:
         for select in address[4:]:
             rows = [self.gate([*rows[at : at + 2], select]) for at in range(0, len(rows), 2)]
         return self.gate(rows, output)
+
+
+def _exact(cell: Mapping[str, Any]) -> int:
+    """Return bits of a sum that never overflow."""
+    return 1 + max(len(cell["connections"].get(name, ())) for name in "AB")
 
 
 def _nets(bits: Bits) -> tuple[int, ...]:

@@ -81,6 +81,13 @@ def test_sums_of_sums_are_one_chain() -> None:
         found = mapped(ECP5, [inner, add("$sub", y, last, z)], z)
         assert (found.logic.chains, len(found.tables)) == ([8], tables)
     assert mapped(ECP5, [inner, add("$add", y, c, z)], [*z, y[0]]).logic.chains == [8, 8]
+    outer = add("$add", y, c, [*range(60, 69)])
+    assert mapped(ECP5, [inner, outer], [68]).logic.chains == [8, 9]  # the inner sum may overflow
+    wide = add("$add", a, b, [*y, 50])
+    found = mapped(ECP5, [wide, add("$add", [*y, 50], c, [*range(60, 70)])], [69])
+    assert found.logic.chains == [10]
+    four = add("$add", z, [*range(70, 78)], [*range(80, 88)])
+    assert mapped(ECP5, [inner, add("$add", y, c, z), four], [87]).logic.chains == [8, 8]  # two first, then the rest
 
 
 def test_memories_are_blocks_tables_or_constants() -> None:
