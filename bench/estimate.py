@@ -107,11 +107,10 @@ def fit(family: str) -> dict[str, list[float]]:
     routed = [(core, 1000 / figures["Fmax"]) for core, figures in rows if figures.get("Fmax")]
 
     def error(times: Sequence[float]) -> float:
-        power = DRAWN[family].get("power", 2)
-        return sum(abs(log(Timing(*times).period(core) / period)) ** power for core, period in routed)
+        return sum(log(Timing(*times).period(core) / period) ** 2 for core, period in routed)
 
     least = error(times := [*DRAWN[family]["start"]])
-    for step in (1.3, 1.1):
+    for step in (1.3, 1.1, 1.3, 1.1, 1.05):
         for at in range(len(times)):
             for factor in (step, 1 / step):
                 while (found := error(more := [*times[:at], times[at] * factor, *times[at + 1 :]])) < least * 0.9999:

@@ -315,8 +315,8 @@ def has_a_broken_docstring(node: ast.AST) -> bool:
 
 # What may only fall, with the rule by which it is counted. A change that brings a capability raises lines alone.
 CEILING: dict[str, tuple[int, Callable[[], Counter[str]]]] = {
-    "lines of Python of the product": (56331, lambda: lines(*PRODUCT)),
-    "lines of Python of the tests": (45597, lambda: lines("tests")),
+    "lines of Python of the product": (56351, lambda: lines(*PRODUCT)),
+    "lines of Python of the tests": (45621, lambda: lines("tests")),
     "lines of Python of the benchmarks": (3515, lambda: lines("bench")),
     "functions over 40 lines": (14, lambda: every(is_long, *PRODUCT)),
     "functions with more than 6 parameters": (18, lambda: every(has_many_parameters, *PRODUCT)),

@@ -46,7 +46,7 @@ FAMILIES = {
 
 
 class Timing(NamedTuple):
-    """Times of a family in ns: `fan` for each doubling of the inputs that a wire drives, `end` to many flip-flops."""
+    """Times of a family in ns: `fan` and, to flip-flops, `end` for each doubling of the inputs that a wire drives."""
 
     start: float
     wire: float
@@ -74,7 +74,7 @@ class Timing(NamedTuple):
                 elif kind != "end" or source not in time:
                     at += self.wire + self.fan * log2(1 + takers) + into.get(kind, 0)
                 elif takers > 1:
-                    at += self.end
+                    at += self.end * log2(takers)
                 last = max(last, at)
             time[bit] = last + (self.table + self.wide * (inputs > 4) if inputs else 0)
         return time[0]
