@@ -13,7 +13,7 @@ from tachometry.hdl.wires.ports import Box, drive
 from tachometry.spec import TachometerSpec
 from tachometry.spec.core.chips import POSITION_BITS, SpiReads
 from tachometry.spec.core.reads import Reads, remainders
-from tachometry.spec.core.tformat import IDENTITY, REQUEST, TformatReads
+from tachometry.spec.core.tformat import IDENTITY, MOST_BITS, REQUEST, TformatReads
 from tachometry.spec.registers.emulator import READ_AGE
 
 
@@ -100,7 +100,7 @@ def _edges(m: Module, line: Value) -> tuple[Value, Value]:
 
 
 def _word(reads: SpiReads, place: Value, wrong: Value) -> Value:
-    """Return the bits of a chip, of which the lowest is sent first; that of a late one is the level before them."""
+    """Return the bits that a chip sends, the lowest first; before those of a late chip comes the level of the line."""
     place = Cat(C(0, POSITION_BITS - reads.width), place)
     if reads.late:
         return Cat(1, place.xor() ^ wrong, wrong, place[::-1])
@@ -108,9 +108,9 @@ def _word(reads: SpiReads, place: Value, wrong: Value) -> Value:
 
 
 def _characters(reads: TformatReads, place: Value, wrong: Value) -> Value:
-    """Return the level before an answer and its bits, of which the lowest is sent first."""
+    """Return the level of the line before an answer, and the bits of the answer, the lowest of which is sent first."""
     bits = reads.width - reads.turn_bits
-    own, turns = (Cat(part, C(0, 24 - len(part))) for part in (place[:bits], place[bits:]))
+    own, turns = (Cat(part, C(0, MOST_BITS - len(part))) for part in (place[:bits], place[bits:]))
     data = Cat(C(REQUEST, 8), C(0, 4), wrong, C(0, 3), own, C(IDENTITY, 8), turns, C(0, 8))
     each = [data.word_select(number, 8) for number in range(reads.characters - 1)]
     return Cat(1, *(Cat(0, one, 1) for one in (*each, reduce(xor, each))))

@@ -73,7 +73,7 @@ class SampledTachometer(Tachometer):
         return found
 
     def _wait(self, m: Module, box: Remainder, given: dict[str, Signal]) -> dict[str, Signal]:
-        """Find `position_modulo` of the reader's position, and return what the reader gives as it is from then on."""
+        """Compute `position_modulo`, and return the outputs of the reader, which wait for it."""
         reader = self.reader
         m.submodules.remainder = box
         drive(m, box, {"start": reader.coming, "value": reader.around})

@@ -15,7 +15,7 @@ class SampledPosition(Box):
     """Takes the last good read of each tick: gives the position, and its difference from the read before as m_e.
 
     Latency: `tick` is high `spec.latency.place` clocks after the window's last clock; a read in that last clock still
-    belongs to the window. All outputs but `coming`, `next_count`, `decode_error` and `refused` change with `tick`.
+    belongs to the window. All outputs but `coming`, `decode_error` and `refused` change with `tick`.
 
     The lower bits of the position are the read; the upper ones count how often that wraps. `zero` is subtracted. `load`
     makes the position `value` in the next clock; while no read is known, it is left out.
@@ -37,7 +37,6 @@ class SampledPosition(Box):
             pulse_count=Out(count),  # counts since the read before; 0 without a read, or without one before
             overflow=Out(1),  # it was saturated
             coming=Out(1),  # `tick` is high in the next clock
-            next_count=Out(count),  # what `pulse_count` is then
             position=Out(place),
             position_valid=Out(1),
             decode_error=Out(1),  # a read is not taken
@@ -142,7 +141,6 @@ class SampledPosition(Box):
         rounds = None if form is None else ModuloCounter(form.turns, latency=1)
         self._place(m, rounds)
         held, overflow = saturate(m, moved, self._spec.widths.max_pulse_count)
-        m.d.comb += self.next_count.eq(Mux(known, held, 0))
         waited = self.silent + self.position_valid
         turn = Signal(signed(2))  # how the read has wrapped
         m.d.comb += turn.eq(Cat(off[-1] ^ off[width - 1], ~off[-1] & off[width - 1]))
@@ -168,7 +166,7 @@ class SampledPosition(Box):
                 ]
 
     def _place(self, m: Module, rounds: ModuloCounter | None) -> None:
-        """Drive the position: the read with its turns, less the zero, and less what a preset has left."""
+        """Drive the position: the read with its turns, minus zero and preset."""
         whole = Cat(self.sample_before, self.turns)
         around = Cat(self.sample_before, () if rounds is None else rounds.count)
         if self._zeroed:

@@ -38,7 +38,7 @@ class Reads:
 
     def exchanged(self, tick: NDArray[np.int64]) -> dict[str, NDArray[np.int64]]:
         """Return columns of ticks in these clocks."""
-        return dict(zip(("asked", "told"), self.exchange(tick), strict=True))
+        return dict(zip(("asked", "written"), self.exchange(tick), strict=True))
 
     @classmethod
     def of(cls, spec: TachometerSpec, trace: PinTrace) -> "Reads":

@@ -131,7 +131,9 @@ def parse_modulo(what: str, text: str) -> str:
     """Return counts in which a position is told, a number, or parts of a revolution, `rev` or `rev/4`."""
     word = text.replace(" ", "").lower()
     if not re.fullmatch(r"0*[1-9]\d{0,8}|rev(/0*[1-9]\d{0,8})?", word, re.ASCII):
-        raise ParameterError(what, f"must be a number of counts, rev, or rev/P for P pole pairs, not {text!r}")
+        raise ParameterError(
+            what, f"must be a number of counts up to 999999999, rev, or rev/P for P pole pairs, not {text!r}"
+        )
     of, slash, parts = word.partition("/")
     return of + slash + str(int(parts)) if slash else of if of == "rev" else str(int(of))
 

@@ -32,8 +32,8 @@ def _exchanged(pins: PinTrace, tick: Ints) -> tuple[Ints, Ints]:
     """
     latest = np.searchsorted(pins.high("period_write"), tick) * (tick > tick[:1].sum())
     word = wrapped(pins.line_at("period_data", tick), OFFSET_BITS)
-    told = (16 * word + 2 * pins.line_at("period_address", tick) + 1) * (np.diff(latest, prepend=0) > 0)
-    return pins.line_at("period_address", tick + 1), told
+    written = (16 * word + 2 * pins.line_at("period_address", tick) + 1) * (np.diff(latest, prepend=0) > 0)
+    return pins.line_at("period_address", tick + 1), written
 
 
 def tables(extra: PeriodOffsets, view: View) -> dict[str, Table]:

@@ -96,7 +96,7 @@ class Windows:
         none, number = np.zeros(len(ticks), dtype=np.int64), ticks.number.astype(np.int64)
         kind, fine = form.phase(ticks.phase) if form.period_bits else (none, none)
         end = np.where(ticks.forgets, form.max_ticks, ticks.silent)
-        return cls(number, ticks.times, fine, ticks.asked, ticks.pulse_count, kind, ticks.told, end, ticks.length)
+        return cls(number, ticks.times, fine, ticks.asked, ticks.pulse_count, kind, ticks.written, end, ticks.length)
 
     def rows(self) -> Iterator[tuple[int, ...]]:
         """Yield what `Recursion.tick` takes, tick by tick."""

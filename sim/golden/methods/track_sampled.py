@@ -21,10 +21,10 @@ class SampledRecursion(Recursion):
         self.far = _NEVER  # error from which a read waits for the next one
         self.more = self._log_dt = 0  # what the lag adds to the place; the logarithm of the time since the last read
 
-    def exchanged(self, number: int, told: int) -> int:
-        """Return the lower bits of an offset after a write; `told` is 16 times it, twice its number, and 1, or 0."""
-        if told:
-            self.offsets[told >> 1 & 7] = told >> 4
+    def exchanged(self, number: int, written: int) -> int:
+        """Return the lower bits of an offset after a write; `written` is 16 times it, twice its number, and 1, or 0."""
+        if written:
+            self.offsets[written >> 1 & 7] = written >> 4
         return wrapped(self.offsets[number], OFFSET_BITS)
 
     def _event(self, n: int, times: int, places: int, kind: int, down: int) -> Row:

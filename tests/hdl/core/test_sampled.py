@@ -308,7 +308,7 @@ def test_a_wrong_offset_is_seen(monkeypatch: pytest.MonkeyPatch, name: str, gate
     assert found.n_mismatches > 0
 
 
-@pytest.mark.parametrize(("bits", "noise", "most"), [("20", 2.0, 0.1), ("23", 0.0, 0.05)])
+@pytest.mark.parametrize(("bits", "noise", "most"), [("20", 2.0, 0.1), ("23", 2.0, 0.05), ("23", 0.0, 0.05)])
 def test_an_interpolation_error_is_learned(bits: str, noise: float, most: float) -> None:
     """Eight offsets leave little of a sine, even where nothing else is wrong."""
     errors = []
