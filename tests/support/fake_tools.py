@@ -24,7 +24,8 @@ files = [word for word in words if word.startswith("top.") and not Path(word).ex
 for file in files:
     Path(file).write_text(name + " " + file)
 if "top.ys" in words:
-    Path("top.json").write_text(json.dumps({{"modules": {{}}}}))
+    for name in ("top.json", "top.syn.json"):
+        Path(name).write_text(json.dumps({{"modules": {{}}}}))
 if "--report" in words:
     seed = words[words.index("--seed") + 1]
     wanted = float(words[words.index("--freq") + 1])

@@ -3,11 +3,14 @@
 import importlib.metadata
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support.fake_tools import FakeTools
 
 from tachometry.boards.fpga import tools
+from tachometry.boards.fpga.boards import BOARDS
+from tachometry.boards.fpga.flow import widen_tables
 from tachometry.boards.fpga.timing import TimingError, check_hold, slowest_clock
 
 LOGS = Path(__file__).parent / "logs"
@@ -76,6 +79,16 @@ def test_only_hold_times_that_are_violated_are_violations() -> None:
     assert COUNT in FALSE_HOLD
     assert FALSE_HOLD.count(LEFT) == 8
     check_holds()
+
+
+def test_every_table_of_gowin_has_a_time() -> None:
+    """nextpnr has times for four inputs alone; those that are added change no value."""
+    values = {"LUT3": "01101001", "LUT1": "01", "LUT4": "0111111111111111", "DFF": "0"}
+    cells: dict[str, Any] = {kind: {"type": kind, "parameters": {"INIT": value}} for kind, value in values.items()}
+    widen_tables({"modules": {"top": {"cells": cells}}})
+    made = [(cell["type"], cell["parameters"]["INIT"]) for cell in cells.values()]
+    assert made == [("LUT4", "01101001" * 2), ("LUT4", "01" * 8), ("LUT4", values["LUT4"]), ("DFF", "0")]
+    assert {name for name, one in BOARDS.items() if one.flow and one.flow.netlist is widen_tables} == {"tang-nano-9k"}
 
 
 def test_a_recorded_design_that_is_too_slow() -> None:
