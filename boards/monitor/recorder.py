@@ -2,9 +2,9 @@
 
 import csv
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from tachometry.boards.monitor.columns import Column, Value
 from tachometry.boards.monitor.session import Frame
@@ -13,7 +13,7 @@ from tachometry.spec.language.tools import imported
 TIME = "time [s]"
 
 
-class Recorder:
+class Recorder(AbstractContextManager["Recorder"]):
     """Writes a row for each frame into a .csv or .parquet: its time, and the columns; a context manager.
 
     Rows are lines of CSV as they come, so that those on the disk can be read whatever happens; at the end they become
@@ -31,9 +31,6 @@ class Recorder:
         self._writer = csv.writer(self._file, lineterminator="\n")
         self._writer.writerow([TIME, *(column.head for column in columns)])
         self.rows, self.whole = 0, True
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         with self._writes():

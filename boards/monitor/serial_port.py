@@ -3,8 +3,8 @@
 import errno
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any, Self
+from contextlib import AbstractContextManager, contextmanager
+from typing import Any
 
 from tachometry.spec.language.tools import imported
 
@@ -27,7 +27,7 @@ def pyserial() -> Any:
     return imported("serial", "serial ports need pyserial: pip install 'tachometry[host]'")
 
 
-class SerialPort:
+class SerialPort(AbstractContextManager["SerialPort"]):
     """Opens a serial port, such as `/dev/ttyUSB1` or `COM5`, that nobody else uses; it is a context manager.
 
     It raises Unplugged if there is no such port, as `read` and `write` do if it is no more, and OSError if it cannot be
@@ -41,9 +41,6 @@ class SerialPort:
                 self._port: Any = serial.Serial(name, baud, timeout=_WAIT, write_timeout=1.0, exclusive=True)
         except ValueError as error:
             raise OSError(f"{name} must be a serial port that can be used at {baud} bits a second: {error}") from error
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

@@ -4,8 +4,8 @@ import os
 import select
 import threading
 import time
-from contextlib import suppress
-from typing import Protocol, Self
+from contextlib import AbstractContextManager, suppress
+from typing import Protocol
 
 try:
     import pty
@@ -27,7 +27,7 @@ class Simulation(Protocol):
         """Let clocks pass while bytes come; what is sent, and what of the bytes is left."""
 
 
-class SimulatedBoard:
+class SimulatedBoard(AbstractContextManager["SimulatedBoard"]):
     """Runs a simulation in a thread, in real time, or slower where the processor is; use as a context manager.
 
     Bytes that nobody reads are lost, as on a real line, once the pseudo-terminal holds no more. The serial port is
@@ -53,9 +53,6 @@ class SimulatedBoard:
             raise
         self._thread = threading.Thread(target=self._run, name=f"board at {self.path}", daemon=True)
         self._thread.start()
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

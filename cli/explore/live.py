@@ -5,9 +5,9 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from tachometry.boards.fpga.boards import BOARDS
 from tachometry.boards.monitor.columns import columns
@@ -128,7 +128,7 @@ class Live:
             return target_of(port, CoreTexts(options.get("method") or AUTO, texts, True), None)
 
 
-class _Watched:
+class _Watched(AbstractContextManager["_Watched"]):
     """A board that a thread watches; it is the display of the thread, too."""
 
     def __init__(self, target: Target, settings: Fields) -> None:
@@ -173,9 +173,6 @@ class _Watched:
 
     def _open(self) -> SerialPort:
         return self.target.open(self._port)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         pass

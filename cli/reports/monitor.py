@@ -3,6 +3,7 @@
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from typing import Any, Self
 
 import click
@@ -29,14 +30,11 @@ _SATURATED = 255
 _DIAL = "→↗↑↖←↙↓↘"
 
 
-class PlainLines:
+class PlainLines(AbstractContextManager["PlainLines"]):
     """A line on stdout for every second of the board, and on stderr what has changed."""
 
     def __init__(self) -> None:
         self._shown: float | None = None
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         pass

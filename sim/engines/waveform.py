@@ -1,6 +1,7 @@
 """Waveforms are written as VCD, with a GTKWave save file that shows them as an engineer wants to see them."""
 
 from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager
 from heapq import merge
 from operator import itemgetter
 from pathlib import Path
@@ -17,7 +18,7 @@ Change = tuple[int, str]  # picoseconds, and lines of the file
 Curve = tuple[NDArray[np.float64], NDArray[np.float64]]  # times in seconds, and values from then on
 
 
-class Waveform:
+class Waveform(AbstractContextManager["Waveform"]):
     """Writes sampled signals to `path`, and beside it a save file with the suffix `.gtkw`.
 
     Signals are those of the clock that begins at the time stamp; `clk` itself comes with `add_curves`, as it would be
@@ -68,9 +69,6 @@ class Waveform:
                         save.blank(analog_extend=True)
                 else:
                     save.trace(trace, datafmt="signed" if is_signed else "dec" if width > 1 else "bin")
-
-    def __enter__(self) -> "Waveform":
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._file.close()

@@ -2,8 +2,7 @@
 
 import socket
 import threading
-from contextlib import suppress
-from typing import Self
+from contextlib import AbstractContextManager, suppress
 
 CONNECT, PUBLISH, SUBSCRIBE, PING, DISCONNECT = 1, 3, 8, 12, 14
 
@@ -13,7 +12,7 @@ def _string(data: bytes, at: int) -> tuple[bytes, int]:
     return data[at + 2 : end], end
 
 
-class Broker:
+class Broker(AbstractContextManager["Broker"]):
     """Listens at a port of this machine; a context manager, which drops all clients when it ends."""
 
     def __init__(self, port: int = 0) -> None:
@@ -23,9 +22,6 @@ class Broker:
         self._retained: dict[bytes, bytes] = {}
         self._threads = [threading.Thread(target=self._accept)]
         self._threads[0].start()
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._listening.shutdown(socket.SHUT_RDWR)
