@@ -23,7 +23,7 @@ gc.disable()  # while tests are collected, which all stay
 def pytest_collection_finish() -> None:
     """Let Python look for garbage among what tests make, seldom, and no more in what was collected."""
     gc.freeze()
-    gc.set_threshold(20_000, 20, 20)
+    gc.set_threshold(200_000, 20, 20)
     gc.enable()
 
 
@@ -51,6 +51,23 @@ def local() -> Iterator[Any]:
 def scheduler(local: Any) -> list[str]:
     """Return the options that run points on that scheduler."""
     return ["--scheduler", local.scheduler_address]
+
+
+@pytest.fixture
+def mapped() -> None:
+    """Let commands estimate sizes from what is in a core, which takes a second."""
+
+
+@pytest.fixture(autouse=True)
+def unmapped(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Take one size for that of every core, except in tests that ask for `mapped`."""
+    if "mapped" not in request.fixturenames:
+        from tachometry.sim.studies.estimate import Estimate
+
+        monkeypatch.setattr(
+            "tachometry.sim.studies.estimate._estimate",
+            lambda spec, bus, family: Estimate(family, 1000, 500, 200e6, spec.tachometer.timing.clock_hz),
+        )
 
 
 @pytest.fixture

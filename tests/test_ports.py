@@ -46,7 +46,7 @@ def test_every_port(method: str, whole: bool, tmp_path: Path) -> None:
 
 def check(spec: TachometerSpec, tmp_path: Path) -> None:
     trace = stress(spec, seed=1, n_edges=40)
-    run = golden.run(spec, trace.until(min(trace.n_clocks, 300_000)))
+    run = golden.run(spec, trace.until(min(trace.n_clocks, 100_000)))
     write_trace(tmp_path / "trace", spec, run)
     write_counts(tmp_path / "counts", run)
     write_events(tmp_path / "events", run)

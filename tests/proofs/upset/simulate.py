@@ -122,6 +122,7 @@ def _state(wires: list[tuple[str, int]], memories: list[tuple[str, int, int]]) -
             f"now.flip(bit % {width}); return; }}"
         )
         first += width * depth
+    data = [(f"state.{name}", f"&model.top.{name}.data[0]", depth) for name, _, depth in memories]
     return _STATE.format(
         members=" ".join(
             [f"value<{width}> {name};" for name, width in wires]
@@ -129,24 +130,15 @@ def _state(wires: list[tuple[str, int]], memories: list[tuple[str, int, int]]) -
         ),
         save=" ".join(
             [f"state.{name} = model.top.{name}.curr;" for name, _ in wires]
-            + [
-                f"state.{name}.assign(&model.top.{name}.data[0], &model.top.{name}.data[0] + {depth});"
-                for name, _, depth in memories
-            ]
+            + [f"{kept}.assign({now}, {now} + {depth});" for kept, now, depth in data]
         ),
         load=" ".join(
             [f"model.top.{name}.curr = model.top.{name}.next = state.{name};" for name, _ in wires]
-            + [
-                f"std::copy(state.{name}.begin(), state.{name}.end(), &model.top.{name}.data[0]);"
-                for name, _, _ in memories
-            ]
+            + [f"std::copy({kept}.begin(), {kept}.end(), {now});" for kept, now, _ in data]
         ),
         same=" && ".join(
             [f"model.top.{name}.curr == state.{name}" for name, _ in wires]
-            + [
-                f"std::equal(state.{name}.begin(), state.{name}.end(), &model.top.{name}.data[0])"
-                for name, _, _ in memories
-            ]
+            + [f"std::equal({kept}.begin(), {kept}.end(), {now})" for kept, now, _ in data]
         ),
         flip=" ".join(flips),
     )

@@ -16,6 +16,8 @@ from tachometry.sim.studies.size import TARGETS
 from tachometry.spec import AxesSpec, STachometer, of_options, of_texts
 from tachometry.spec.registers.buses import bus_of
 
+pytestmark = pytest.mark.usefixtures("mapped")
+
 LEVELS = Timing(0, 0, 0, 1, 0, 0, 0, 0, 100, 0, 0)  # a period is the number of tables on the longest path
 CORE = {"ppr": "500", "max-speed": "1000rad/s", "tick": "20us", "max-time": "10ms"}
 
