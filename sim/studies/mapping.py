@@ -89,7 +89,9 @@ class Logic:
             self._chain(a, b, y)
         elif kind in _SUMS:
             if (*y,) not in self._joined:
-                self._sum([*self._terms(cell, len(y))], y)
+                exact = y[: _exact(cell)] if kind == "$neg" else y  # Yosys makes no bit twice
+                self._sum([*self._terms(cell, len(exact))], exact)
+                self.nodes |= {bit: ("gate", _nets(exact[-1:])) for bit in _nets(y[len(exact) :])}
         elif kind == "$mul":
             self.products.append((len(a), len(b)))
             self.nodes |= {bit: ("product", _nets([*a, *b])) for bit in _nets(y)}
