@@ -35,6 +35,7 @@ class Fabric:
     product: int = 3300
     short: int = 4  # bits of sums that lookup tables make
     writes: bool = True  # lookup tables can be memories
+    slice: int = 4  # bits of a word of these
     bypass: float = 0  # flip-flops for each bit of 16 words of these, to read what is being written; else of 1 word
     block: int = 128  # what a block RAM counts beside 16 bits of constants in tables
     widest: int = 36  # bits of a word of it
@@ -46,7 +47,7 @@ ECP5 = Fabric(300, (*_LUT4, *_WIDE), (0, 1, 1, 1, 1, 2, 4, 8), 516, 21.5, 257, 3
 _PINS = (), (316,), (316, 379), (316, 379, 400), (316, 379, 400, 449)
 ICE40 = Fabric(250, _PINS, (0, 1, 1, 1, 1), 259, 126, 316, 400, short=1, writes=False, bypass=1, block=64, widest=16)
 _GOWIN = (), (902,), (902, 1184), (902, 1184, 1486), (902, 1184, 1486, 1583), (680, 1116, 1371, 1638, 1638)
-GOWIN = Fabric(500, _GOWIN, (0, 1, 1, 1, 1, 2), 1505, 82, 811, 1432, short=2, bypass=1.5)
+GOWIN = Fabric(500, _GOWIN, (0, 1, 1, 1, 1, 2), 1505, 82, 811, 1432, short=2, slice=1, bypass=1.5)
 
 
 class Logic:
@@ -176,9 +177,9 @@ class Logic:
                     self.ends.append(data)
             return
         rows, cost = words, words * width
-        if self.fabric.writes:  # as Yosys weighs tables of four bits, and the choice among them
+        if self.fabric.writes:  # as Yosys weighs tables, and the choice among them
             rows = -(-words // 16)
-            cost = ports * (4 * rows * -(-width // 4) + (rows - 1) * width // 2)
+            cost = ports * (rows * self.fabric.slice * -(-width // self.fabric.slice) + (rows - 1) * width // 2)
         if written and cost <= blocks and not block:
             self.small.append((rows, len(read)))
         else:

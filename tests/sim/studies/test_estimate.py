@@ -11,13 +11,12 @@ from support.nightly import nightly
 
 from tachometry.sim.studies import estimate
 from tachometry.sim.studies.estimate import FAMILIES, SPREAD, Estimate, Timing, flip_flops
-from tachometry.sim.studies.mapping import ECP5, ICE40, Fabric, Logic, Mapped
+from tachometry.sim.studies.mapping import ECP5, GOWIN, ICE40, Fabric, Logic, Mapped
 from tachometry.sim.studies.size import TARGETS
 from tachometry.spec import AxesSpec, STachometer, of_options, of_texts
 from tachometry.spec.registers.buses import bus_of
 
 pytestmark = pytest.mark.usefixtures("mapped")
-
 LEVELS = Timing(0, 0, 0, 1, 0, 0, 0, 0, 100, 0, 0)  # a period is the number of tables on the longest path
 CORE = {"ppr": "500", "max-speed": "1000rad/s", "tick": "20us", "max-time": "10ms"}
 
@@ -104,6 +103,7 @@ def test_memories_are_blocks_tables_or_constants() -> None:
     assert mapped(ECP5, [memory(64, 32)], [*range(100, 132)]).logic.late == set()  # as many bits as a block counts
     moving = [mapped(ECP5, [memory(63, width, WR_DATA=[90])], [100]).logic for width in (20, 22)]
     assert [(logic.small, len(logic.late)) for logic in moving] == [([(4, 20)], 0), ([], 22)]  # costs of 110 and 129
+    assert mapped(GOWIN, [memory(63, 22, WR_DATA=[90])], [100]).logic.small == [(4, 22)]  # no bit is paid for in vain
     narrow, wide = (mapped(ICE40, [memory(*size, WR_DATA=[90])], [100]) for size in ((5, 16), (2, 82)))
     assert (len(narrow.logic.late), narrow.logic.small) == (16, [])
     assert (wide.logic.late, wide.logic.small, flip_flops(wide)) == (set(), [(2, 82)], 246)  # six blocks would be more
