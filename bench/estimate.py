@@ -88,7 +88,7 @@ def drawn(
     """Yield the random cores of a family that are compared, or that have a part in its fit, with their figures."""
     target, numbers = FAMILIES[family].target, DRAWN[family]
     chosen = {at for ends in numbers.get(part, []) for at in range(*ends)}
-    seeds = [1, 2, 3][: min(numbers.get("seeds", 3), 3 if part == "compared" else 1)]  # one shows what to fit to
+    seeds = [1, 2, 3] if part == "compared" else [1]  # one shows what to fit to
     for at, (spec, bus, text) in enumerate(random_cores(max(chosen, default=-1) + 1)):
         if only is not None and at in chosen - {*only}:
             if text in stays:  # else it has not been measured yet
@@ -128,9 +128,8 @@ def measured(family: str, only: Sequence[int] | None) -> list[tuple[str, float, 
     """Return random cores: options, cells packed and estimated, MHz and estimated; those not in `only` stay."""
     rows = []
     for spec, bus, text, figures in drawn(family, "compared", only, before(family)):
-        found, (cells, *_), clock = estimate.Estimate.of(spec, bus, family), figures.values(), figures.get("Fmax", 0)
-        guess = found.clock_hz / 1e6 if clock or FAMILIES[family].timed else 0
-        rows.append((text, cells, float(found.cells), clock, guess))
+        found, (cells, *_) = estimate.Estimate.of(spec, bus, family), figures.values()
+        rows.append((text, cells, float(found.cells), figures["Fmax"], found.clock_hz / 1e6))
     return rows
 
 

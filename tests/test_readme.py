@@ -15,7 +15,9 @@ from support.command import run
 from support.nightly import nightly, only
 from support.script import load
 
+from tachometry.sim.studies.estimate import Estimate
 from tachometry.spec import METHODS
+from tachometry.spec.registers.buses import bus_of
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text()
@@ -124,6 +126,12 @@ def test_numbers_without_a_place_are_an_error() -> None:
     for wrong in (TEXT.replace("RMS error is", "error is"), TEXT.replace("| [`track`]", "| `trace`"), 2 * TEXT):
         with pytest.raises(ValueError, match=r"place of track once, not [02] times"):
             readme.filled(wrong, table)
+
+
+@pytest.mark.usefixtures("mapped")
+def test_the_clock_of_its_core_is_the_estimate() -> None:
+    found = Estimate.of(readme.cores()["track"], bus_of("axi-lite"), "ecp5")
+    assert f" an ECP5 reaches about {found.clock_hz / 1e6:.0f} MHz" in TEXT
 
 
 def test_all_commands_have_one_drive() -> None:

@@ -137,11 +137,10 @@ def advice(plans: Plans) -> list[tuple[str, str]]:
 
 def size_rows(found: Estimate) -> list[tuple[str, str]]:
     """Return rows of the estimated cells and greatest clock, and a warning if the clock of the core is above it."""
-    family = FAMILIES[found.family]
-    rows = [("cells", f"about {found.cells:,}, with {found.flip_flops:,} flip-flops ({family.title})")]
-    if family.timed:
-        clock = f"about {found.clock_hz / 1e6:.0f} MHz ({family.title}); seeds of the router differ by {SPREAD:.0%}"
-        rows.append(("greatest clock", clock))
+    title = FAMILIES[found.family].title
+    cells = f"about {found.cells:,}, with {found.flip_flops:,} flip-flops ({title})"
+    clock = f"about {found.clock_hz / 1e6:.0f} MHz ({title}); seeds of the router differ by {SPREAD:.0%}"
+    rows = [("cells", cells), ("greatest clock", clock)]
     if found.is_too_slow:
         near = found.wanted_hz < found.clock_hz * (1 + SPREAD)
         remedy = "take a lower --clock" + ", or route it with several seeds" * near

@@ -34,14 +34,13 @@ class Family:
     fabric: Fabric
     factor: int  # greatest factor of its multipliers, in bits; 0: it has none
     packs: bool  # a flip-flop whose data no table makes takes a cell
-    timed: bool  # whether the estimated clock is within 20 % of what nextpnr reaches, see `bench/estimate.py`
 
 
 FAMILIES = {
-    "ecp5": Family("ECP5", size.TARGETS["ECP5"], ECP5, 18, packs=False, timed=True),
-    "ice40hx": Family("iCE40 HX", size.TARGETS["HX8K"], ICE40, 0, packs=True, timed=True),
-    "ice40up": Family("iCE40 UltraPlus", size.TARGETS["UP5K"], ICE40, 16, packs=True, timed=True),
-    "gowin": Family("Gowin GW1N", size.GOWIN, GOWIN, 18, packs=False, timed=False),
+    "ecp5": Family("ECP5", size.TARGETS["ECP5"], ECP5, 18, packs=False),
+    "ice40hx": Family("iCE40 HX", size.TARGETS["HX8K"], ICE40, 0, packs=True),
+    "ice40up": Family("iCE40 UltraPlus", size.TARGETS["UP5K"], ICE40, 16, packs=True),
+    "gowin": Family("Gowin GW1N", size.GOWIN, GOWIN, 18, packs=False),
 }
 
 
@@ -119,8 +118,8 @@ class Estimate:
 
     @property
     def is_too_slow(self) -> bool:
-        """Whether the clock of the core is out of reach, as far as that is known."""
-        return FAMILIES[self.family].timed and self.clock_hz < self.wanted_hz
+        """Whether the clock of the core is out of reach."""
+        return self.clock_hz < self.wanted_hz
 
     @staticmethod
     def of(spec: AnySpec, bus: Bus | None, family: str) -> "Estimate":
