@@ -113,9 +113,10 @@ def _deaf_to_interrupts() -> Iterator[None]:
         return
     came: list[int] = []
     before = signal.signal(signal.SIGTERM, lambda number, frame: came.append(number))
-    resource_tracker.ensure_running()  # as it starts, it takes these signals out of the mask of the thread that asks
     # Threads and processes that are started have this mask, too.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGHUP))
+    resource_tracker.ensure_running()  # as it starts, it takes SIGINT out of the mask of the thread that asks
+    signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
     try:
         yield
     finally:
