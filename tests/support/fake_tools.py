@@ -20,13 +20,14 @@ print(told.get("output", ""))
 if told.get("status"):
     sys.exit(told["status"])
 words = sys.argv[1:]
-files = [word for word in words if word.startswith("top.") and not Path(word).exists()]
-for file in files:
+for file in [word for word in words if word.startswith("top.") and not Path(word).exists()]:
     Path(file).write_text(name + " " + file)
 if "top.ys" in words:
-    for name in ("top.json", "top.syn.json"):
-        Path(name).write_text(json.dumps({{"modules": {{}}}}))
+    table = {{"type": "LUT1", "parameters": {{"INIT": "01"}}, "connections": {{}}}}
+    for made in ("top.json", "top.syn.json"):
+        Path(made).write_text(json.dumps({{"modules": {{"top": {{"ports": {{}}, "cells": {{"t": table}}}}}}}}))
 if "--report" in words:
+    assert "himbaechel" not in name or "LUT1" not in Path(words[words.index("--json") + 1]).read_text()
     seed = words[words.index("--seed") + 1]
     wanted = float(words[words.index("--freq") + 1])
     clock = {{"achieved": told.get("fmax", {{}}).get(seed, 99.5), "constraint": wanted}}
