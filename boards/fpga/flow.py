@@ -77,7 +77,7 @@ def gowin(part: str, family: str) -> Flow:
 
 
 def widen_tables(netlist: Mapping[str, Any]) -> None:
-    """Give lookup tables of `synth_gowin` four inputs, with the others open: of fewer, nextpnr leaves out the time."""
+    """Give lookup tables of `synth_gowin` four inputs, with the others open: nextpnr has no times for smaller ones."""
     for cell in (cell for module in netlist["modules"].values() for cell in module["cells"].values()):
         if cell["type"] in ("LUT1", "LUT2", "LUT3"):
             cell["type"], values = "LUT4", cell["parameters"]["INIT"]

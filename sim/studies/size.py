@@ -67,8 +67,8 @@ TARGETS = {
         {"LC": "ICESTORM_LC", "RAM": "ICESTORM_RAM", "DSP": "ICESTORM_DSP"},
     ),
 }
-# Without ports, as nextpnr wants a pin for each, and takes no time for tables of fewer inputs than LUT4, which includes
-# the bits of adders.
+# Without ports, as nextpnr wants a pin for each; it has no times for tables of less than four inputs. LUT4 includes the
+# bits of adders.
 GOWIN = Target(
     "GW1NR-9C, QFN88",
     "synth_gowin -noiopads -top {}; chtype -set LUT4 t:LUT1 t:LUT2 t:LUT3; delete -port w:*",

@@ -30,7 +30,7 @@ class Jump(IntEnum):
 
 EARLY = (Jump.ALWAYS, Jump.EMPTY, Jump.ONE)  # no sum decides, so the quick machine jumps two clocks earlier
 
-OFFSETS = tuple(f"o{number}" for number in range(8))  # the last four are of a period
+OFFSETS = tuple(f"o{number}" for number in range(8))  # the last four for eighths of a period
 CHOSEN = ("o@last", "o@up", "o@down", "o@m1", "o@m2", "o@m3")  # an offset that the tick chooses
 
 
